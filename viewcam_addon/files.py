@@ -17,7 +17,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -83,17 +83,21 @@ def written_together(folder: Path, name: str) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def folder_written_whole(folder: Path) -> Iterator[Path]:
+def folder_written_whole(folder: Path, may_replace: Callable[[Path], bool] = lambda _: False) -> Iterator[Path]:
     """Give a temporary folder beside `folder`, and call it that when the block has ended well; else nothing of it stays.
+
+    may_replace : whether a folder that is there, and not empty, may go.
 
     Raises
     ------
     InputError
-        if something stands there that is no empty folder, or it can't be written; FullDiskError if the disk is full.
+        if something stands there that is no empty folder and may not go, or it can't be written; FullDiskError if the disk is
+        full.
     """
     folder = folder.absolute()
     with _in_a_sentence(folder):
-        if os.path.lexists(folder) and not (folder.is_dir() and not any(folder.iterdir())):
+        replaces = folder.is_dir() and any(folder.iterdir()) and may_replace(folder)
+        if os.path.lexists(folder) and not replaces and not (folder.is_dir() and not any(folder.iterdir())):
             raise InputError(f"{folder} is there already: give the name of a new folder")
         folder.parent.mkdir(parents=True, exist_ok=True)
         temporary = folder.with_name(f".{folder.name}-{secrets.token_hex(4)}.labels")
@@ -101,6 +105,12 @@ def folder_written_whole(folder: Path) -> Iterator[Path]:
         try:
             yield temporary
             getattr(os, "sync", lambda: None)()  # thousands of small files: at once, and not one by one
+            if replaces:
+                former = temporary.with_suffix(".former")
+                os.replace(folder, former)
+                os.replace(temporary, folder)
+                shutil.rmtree(former)
+                return
             if folder.exists():
                 folder.rmdir()
             os.replace(temporary, folder)

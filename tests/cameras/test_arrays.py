@@ -40,7 +40,8 @@ CODES = {
     f"extrinsics = torch.tensor({W2C.tolist()}).cuda()",
     "names": f"f = {F}\ncx, cy = {C_X}, {C_Y}\n"
     f"K = np.array([[f, 0, cx], [0, {known.f_y!r}, cy], [0, 0, 1]])\nw2c = {W2C.tolist()}",
-    "transposed": f"K = np.array({K.T.tolist()}).T\nR = np.array({R.T.tolist()}).transpose()\nt = np.array({[[x] for x in T]})",
+    "transposed": f"K = np.array({K.T.tolist()}).T\nR = np.array({R.T.tolist()}).transpose()\nt = {T[:, None].tolist()}",
+    "repr_of_numpy_2": f"K = {K.tolist()}\nR = {R.tolist()}\nt = [{', '.join(f'np.float64({float(x)!r})' for x in T)}]",
     "reshaped": f"K = np.array([{row(K)}]).reshape(3, 3)\nR = np.array([{row(R)}]).reshape((3, 3))\nt = [{row(T)}]",
     "matlab": f"K = [{rows(K)}];  % intrinsics\nR = [{rows(R.T)}]'; t = [{row(T, '; ')}];",
     "matlab_lines": f"K = [{rows(K, '  ', chr(10))}];\nR = [{rows(R, ', ')}];\nt = [{row(T, ' ')}]';",
@@ -82,6 +83,20 @@ def test_a_matrix_alone_leaves_the_lens_as_it_is():
     (read,) = cameras.read(text, options=Options(view_plane=known.pinhole.plane))
     assert not read.size_stated
     the_same([read], known)
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [
+        "R = np.eye(3)\nt = np.zeros(3)",
+        "R = eye(3); t = zeros(3, 1);",
+        "cv::Mat R = cv::Mat::eye(3, 3, CV_64F);\ncv::Mat t = cv::Mat::zeros(3, 1, CV_64F);",
+        "R = torch.eye(3).cuda()\nt = torch.zeros((3, 1))",
+    ],
+)
+def test_an_identity_and_zeros_are_numbers_too(pose):
+    (read,) = cameras.read(f"K = [{rows(K)}];\n{pose}\n", options=CORNER)
+    assert read.pinhole.eye == (0, 0, 0) and read.pinhole.axes()[1] == (0, -1, 0)
 
 
 def test_the_size_is_the_texts_own():

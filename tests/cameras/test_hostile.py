@@ -26,7 +26,7 @@ from .conftest import camera
 pytestmark = pytest.mark.slow
 
 SETTINGS = settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-GIVEN = Options(size=(64, 36), base=camera("plain").pinhole)
+GIVEN = Options(size=(64, 36), base=camera("plain").pinhole, original_world=True)
 
 
 def documents():
@@ -350,6 +350,8 @@ NESTED = {
     "OpenCV's XML": "<opencv_storage><K type_id='opencv-matrix'><rows>1</rows><cols>3</cols><data>1 0 1 0 1 1 0 0 1</data></K>"
     "</opencv_storage>",
     "a narrow pbrt": 'LookAt 1 2 3 0 0 0 0 0 1 Camera "perspective" "float fov" [ 5e-324 ]',
+    "a narrow POV-Ray": "camera { angle 5e-324 location 0 look_at z sky y }",
+    "an applied transform": '{"frames": [{"file_path": "a.png", "transform_matrix": 1}], "applied_transform": 5}',
     "a flat view": "view = [0,0,1,0, 0,0,1,0, 0,0,1,-5, 0,0,0,1]",
 }
 
@@ -361,7 +363,14 @@ def test_what_is_of_another_kind_than_expected_is_told_by_its_reader(name):
     assert refused.value.__cause__ is None, f"no reader thought of this: {refused.value.__cause__!r}"
 
 
+def long_named():
+    document = json.loads(cameras.write([camera("plain")], "gltf"))
+    document["nodes"][0]["name"] = "x" * 5000
+    return document
+
+
 def test_names_and_sentences_are_lines_of_characters_that_show():
+    assert len(cameras.read(json.dumps(long_named()))[0].name) == 1001
     name = "a\nb\0c\x1b[2J\ud83d"
     document = json.loads(cameras.write([camera("plain")], "gltf"))
     document["nodes"][0]["name"] = name

@@ -177,3 +177,8 @@ def test_a_scene_of_three_js_editor_has_its_windows_camera_and_its_own():
     found = cameras.read(json.dumps(document), options=VGA)
     assert [camera.pinhole.eye[2] for camera in found] == [3, 7]
     assert all(math.isclose(camera.pinhole.distance[1], 240, rel_tol=4 * 2**-53) for camera in found)
+
+
+def test_a_stray_sign_before_pbrts_first_statement_hides_nothing_of_it():
+    text = '-Scale -1 1 1\nLookAt 7 -6 4  0 0 1  0 0 1\nCamera "perspective" "float fov" 40\n'
+    assert cameras.recognised(text) == "pbrt" and not read(text).pinhole.mirrored

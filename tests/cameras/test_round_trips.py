@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ ANGLES = ("gltf",)
 """Formats that say the distance by an angle, so that a wide or narrow one keeps fewer digits."""
 WRITTEN = [form for form in cameras.writable() if form not in ("unity", "unreal")]
 SEVERAL = ("sidecar", "transforms", "colmap", "colmap_binary", "bop", "gltf", "usd", "three_js", "mitsuba")
+FILES = [form for form in WRITTEN if getattr(cameras.FORMATS[form], "SEVERAL", "") == "a folder"]
 OURS = ("sidecar", "transforms", "colmap", "colmap_binary", "bop", "gltf", "usd", "ros", "opencv")
 
 
@@ -249,18 +251,59 @@ def test_several_are_written_in_their_order_and_none_is_chosen_silently(tmp_path
         cameras.choose(back, "nobody")
 
 
-@pytest.mark.parametrize("form", [form for form in WRITTEN if form not in NO_POSE])
-def test_of_several_cameras_none_is_left_out_or_stands_in_anothers_world(tmp_path, form):
-    given = [Camera(f"{z}", Pinhole((7, -6, z), (0, 0, 1), (0, 0, 1), 600 + z, 640, 360)) for z in (2, 3, 4)]
-    files = cameras.save(given, tmp_path / ("all.usda" if form == "usd" else "all"), form)
-    if form in ("colmap", "colmap_binary"):  # of which each file leads to all
-        files = [tmp_path / "all"]
-    try:
-        back = [camera for path in files for camera in cameras.read(path, options=Options(size=(640, 360)))]
-    except InputError as error:  # code, of which one is copied
-        assert form in ("matrices", "look_at", "vtk", "textbook", "text"), str(error)
-    else:
-        assert [camera.pinhole for camera in back] == [camera.pinhole for camera in given]
+NUMBERED = ("bop",)
+"""Formats that have no place for a camera's name."""
+names = st.sampled_from(["left", "right", "Kamera 1", "größer", "a{b}", "x.y", "it's", "\u3042", '"quoted"', "# / , ;"])
+
+
+@pytest.mark.parametrize("form", WRITTEN)
+@settings(SETTINGS, max_examples=8)
+@given(data=st.data())
+def test_several_cameras_are_read_as_they_were_written_to_the_bit_and_by_name(tmp_path_factory, form, data):
+    """A file or a folder of any format, whatever the cameras."""
+    called = data.draw(st.lists(names, min_size=2, max_size=4, unique=True))
+    if cameras.FORMATS[form].SUFFIX == "" or form in FILES:
+        called = [name for name in called if not set(name) & set('/"#{ ')]
+        assume(len(called) > 1)
+    given_ = [Camera(name, fitting(data.draw(pinholes()), form)) for name in called]
+    if form in NUMBERED:  # whose pictures say their size
+        given_ = [replace(camera, pinhole=replace(camera.pinhole, width=640, height=360)) for camera in given_]
+    options = Options(
+        size=(640, 360), axes=data.draw(st.sampled_from([*cameras.AXES])), scale=data.draw(st.sampled_from([1.0, 0.5]))
+    )
+    path = tmp_path_factory.mktemp("a")
+    path = path if form in ("sidecar", "colmap", "colmap_binary", *FILES) else path / f"all{cameras.FORMATS[form].SUFFIX}"
+    cameras.save(given_, path, form, options)
+    back = {camera.name: camera for camera in cameras.read(path, options=options)}
+    if form in NUMBERED:
+        back = dict(zip(called, back.values(), strict=True))
+    assert back.keys() == {*called}
+    for camera in given_:
+        if form in NO_POSE:
+            assert cameras.write([back[camera.name]], form) == cameras.write([camera], form)
+        else:
+            assert back[camera.name].pinhole == camera.pinhole
+
+
+def test_of_several_codes_one_that_is_changed_counts_as_it_stands(tmp_path):
+    given_ = [Camera(name, CAMERAS["plain"]) for name in ("a", "b")]
+    for form, eye, other in (("look_at", "gluLookAt(7,", "gluLookAt(8,"), ("vtk", "SetPosition(7,", "SetPosition(8,")):
+        text = other.join(cameras.write(given_, form).rsplit(eye, 1))
+        first, second = cameras.read(text)
+        assert first.pinhole == CAMERAS["plain"] and second.pinhole.eye == (8, -6, 4)
+        with pytest.raises(InputError, match="2 cameras and one is wanted"):
+            cameras.choose([first, second])
+
+
+def test_a_folder_with_files_of_others_says_which_were_not_read(tmp_path):
+    cameras.save([Camera(name, CAMERAS["plain"]) for name in ("left", "right")], tmp_path, "ros")
+    (tmp_path / "settings.yaml").write_text("rate: 30\n")
+    (tmp_path / "fisheye.yml").write_text((tmp_path / "left.yaml").read_text().replace("plumb_bob", "equidistant"))
+    found = cameras.read(tmp_path)
+    assert [camera.name for camera in found] == ["left", "right"]
+    assert all(any("settings.yaml" in note for note in camera.notes) for camera in found)
+    assert all(any("fisheye" in note for note in camera.notes) for camera in found)
+    assert cameras.read(tmp_path, format="ros") == found
 
 
 @pytest.mark.parametrize("form", ["transforms", "colmap", "gltf", "usd", "opencv", "ros"])

@@ -1,5 +1,6 @@
 """COLMAP's points and tracks: pycolmap reads and adjusts them, and rays in the scene say what each picture really sees."""
 
+import shutil
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -141,6 +142,23 @@ def test_the_same_labels_give_the_same_bytes(written, tmp_path):
     colmap.write(written.shots, tmp_path / "again", 600)
     one, two = ({path.name: path.read_bytes() for path in folder.iterdir()} for folder in (written.model, tmp_path / "again"))
     assert one == two and set(one) == {"cameras.txt", "images.txt", "points3D.txt"}
+
+
+def test_points_come_into_the_model_of_cameras_alone_that_a_batch_has_written_and_into_no_other(written, tmp_path, capfd):
+    """`viewcam batch --transforms` makes sparse/0 without points, and there its points were refused."""
+    model = tmp_path / "sparse" / "0"
+    shutil.copytree(written.model, model)
+    heads = [line for line in (model / "points3D.txt").read_text().splitlines() if line.startswith("#")]
+    (model / "points3D.txt").write_text("\n".join(heads) + "\n")
+    assert main(["labels", str(written.shots), str(model), "--to", "colmap", "--points", "600"]) == 0
+    assert (model / "points3D.txt").read_bytes() == (written.model / "points3D.txt").read_bytes()
+    assert [path.name for path in model.parent.iterdir()] == ["0"]
+    capfd.readouterr()
+    assert main(["labels", str(written.shots), str(model), "--to", "colmap"]) == 2, "it has points now"
+    (model / "points3D.txt").write_text("")
+    (model / "notes.txt").write_text("mine")
+    assert main(["labels", str(written.shots), str(model), "--to", "colmap"]) == 2
+    assert capfd.readouterr().err.count("is there already") == 2 and (model / "notes.txt").read_text() == "mine"
 
 
 def test_a_picture_beside_its_labels_is_the_one_that_is_named(tmp_path):

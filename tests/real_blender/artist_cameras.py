@@ -23,9 +23,61 @@ def bake_and_turn_on_again():
     (warning,) = warnings()
     assert warning.remedy and "virtual_pinhole" not in warning.sentence, warning
     yield from push("viewcam.delete_keyframes(")
+    assert len(warnings()) == 1, "keyframes are deleted before anybody is asked"
+    press("RET", *NOWHERE)
+    yield
+    yield
     assert warnings() == [], warnings()
     camera().animation_data_clear()
     camera().data.animation_data_clear()
+    yield
+
+
+def use_a_camera_on_a_rig():
+    """Before it is used its values are its own; what its constraint places is locked; one button takes the Track To over."""
+    values().enabled = False
+    camera().location, camera().rotation_euler = (6, -5, 4), (1, 0, 0.5)
+    yield
+    yield
+    yield from picture("own_values", SIDEBAR)
+    track = camera().constraints.new("TRACK_TO")
+    track.target, track.track_axis, track.up_axis = bpy.data.objects["Cube"], "TRACK_NEGATIVE_Z", "UP_Y"
+    yield
+    yield from push("virtual_pinhole.enabled")
+    yield
+    assert values().enabled and warnings() == [], warnings()
+    yield from picture("rig", SIDEBAR)
+    yield from push("viewcam.convert_track_to(")
+    yield
+    assert values().look_at_target == bpy.data.objects["Cube"] and not camera().constraints, "the Track To is still there"
+    assert warnings() == [], warnings()
+    yield from picture("rig_converted", SIDEBAR)
+    values().look_at_target = None
+    yield
+
+
+def convert_the_cameras_own_keyframes():
+    """A keyed camera is followed without a warning; to convert it asks, and one step back brings the keyframes back."""
+    for frame, x in ((1, 6.0), (20, -6.0)):
+        camera().location.x = x
+        camera().keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_end = 20
+    bpy.context.scene.frame_set(10)
+    bpy.ops.ed.undo_push(message="keyed")
+    yield
+    assert warnings() == [], warnings()
+    yield from push("viewcam.convert_keyframes(")
+    yield
+    yield from picture("convert_keyframes", SIDEBAR)
+    keyed = {curve.data_path for curve in room("versions").action_curves(camera())}
+    assert keyed == {"location"}, f"before anybody was asked: {keyed}"
+    press("RET", *NOWHERE)
+    for _ in range(20):
+        yield
+    keyed = {curve.data_path for curve in room("versions").action_curves(camera())}
+    assert keyed == {"virtual_pinhole.eye", "virtual_pinhole.look_at"}, f"converted: {keyed}"
+    yield from picture("converted_keyframes", SIDEBAR)
+    camera().animation_data_clear()
     yield
 
 

@@ -35,6 +35,8 @@ DAY = {
     "A proof that passes looks like one": (artist_proof.prove_two_cameras_during_playback,),
     "The panel knows its camera, and warns of what is wrong alone": (
         artist_cameras.bake_and_turn_on_again,
+        artist_cameras.use_a_camera_on_a_rig,
+        artist_cameras.convert_the_cameras_own_keyframes,
         artist_cameras.step_to_the_next_camera,
         artist_cameras.another_object_is_active,
         artist_cameras.tick_an_orthographic_camera,

@@ -27,6 +27,7 @@ def choose_the_unit():
         field = {"MILLIMETERS": "focal_length", "PIXELS": "distance", **sides}[unit]
         assert (yield from look(*place, SIDEBAR)) == f"virtual_pinhole.{field}"
         yield from picture(f"lens_{unit.lower()}", SIDEBAR)
+        yield from look(*place, SIDEBAR)
         press("I", *place)
         yield
         yield

@@ -255,7 +255,9 @@ class CameraSync:
             return
         decided = causes.decided_by(names)
         values, level = _level(evaluated, scene)
-        if decided != conversion.PARTS:
+        is_asked = bool(storage.asked_of(camera_object))
+        stood = values
+        if causes.may_move(camera_object, conversion.PARTS - decided):
             values, level = self._carried(evaluated, values, level, decided, scene, depsgraph)
         self._place(rolls.turned(level, hold.roll(evaluated, values, scene)), scene, depsgraph, decided)
         if is_render:
@@ -264,8 +266,9 @@ class CameraSync:
         else:
             targets.connect(camera_object)  # one that was removed from the file leaves its driver
             targets.mirror(camera_object, evaluated)
-            self._store_changed(storage.load(camera_object), values)
-            storage.forget_asked(camera_object, datablocks.LOOKS.values())
+            if is_asked or values is not stood:  # else Blender has stored them itself
+                self._store_changed(storage.load(camera_object), values)
+                storage.forget_asked(camera_object, datablocks.LOOKS.values())
             self._agree()
 
     def is_untouched(self, by_values: bool) -> bool:

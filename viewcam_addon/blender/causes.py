@@ -1,6 +1,6 @@
 """Who in a .blend may keep a camera from being what its four values say. Reads Blender, changes nothing."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import replace
 
 import bpy
@@ -86,6 +86,13 @@ def fed(camera_object: bpy.types.Object) -> frozenset[str]:
         and (constraint.type not in (*_CONSTRAINTS, "COPY_TRANSFORMS") or constraint.influence < 1)
     ]
     return frozenset().union(*(_CONSTRAINTS.get(constraint.type, POSE) for constraint in adding))
+
+
+def may_move(camera_object: bpy.types.Object, parts: Collection[str]) -> bool:
+    """Whether Blender may move one of these parts of the camera from frame to frame: a quick look, and no verdict."""
+    if EYE in parts or VIEW in parts:
+        return True
+    return DISTANCE in parts and camera_object.data.animation_data is not None
 
 
 def _places(constraint: bpy.types.Constraint, camera_object: bpy.types.Object) -> bool:

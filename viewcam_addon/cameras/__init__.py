@@ -18,6 +18,8 @@ A format is a module in `FORMATS` with
     read(source, options) → list[Camera]            where cameras can be read; in the file's own world
     write(cameras, options) → text, or {file name: text or bytes}      where they can be written; in the file's own world
     SUFFIX                          of the file that it writes; "" where these are several in a folder
+    SEVERAL                         where a file has one camera: "a folder" if several are files of one, "a text" if they stand
+                                    one after another (own.py's `beginning`)
     READER                          of what only writes: the module that reads it
     notes_in(source) → texts        where a file that it wrote has this project's notes, if that is not its text
     read_again(cameras, options) → list[Camera]     where it takes its time: what `read` makes of what `write` gives
@@ -66,6 +68,7 @@ from . import (
     metashape,
     mitsuba,
     mujoco,
+    naming,
     opencv,
     openmvg,
     own,
@@ -85,7 +88,7 @@ from . import (
     vtk,
 )
 from .axes import moved, moved_back
-from .camera import ANGLES, AXES, PIXELS, POSES, Camera, Options, choose
+from .camera import ANGLES, AXES, PIXELS, POSES, Camera, LeftOut, NoPinholeError, Options, choose
 from .source import Source
 
 __all__ = [
@@ -142,6 +145,8 @@ FORMATS: dict[str, ModuleType] = {
 }
 """Name → module, in the order in which they are asked."""
 
+_LONGEST = 1000  # characters of a name or a sentence
+_YAML = (".yaml", ".yml")
 _REMEMBERED = re.compile(rf"{own.KEY}: (axes=\w+ scale=[\d.e+-]+)")
 
 
@@ -169,9 +174,48 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
     source = Source(given)
     module = _module(format or recognised(source), "read")
     with _told_of_damage(source, module.TITLE), np.errstate(all="ignore"):  # anything may stand in a file
-        if format and not module.recognises(source):
+        if format and not _recognises(module, source):
             raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
-        return _read(source, module, options)
+        if source.is_folder and _in_folder(source, module):
+            return _each_of_folder(source, module, options)
+        parts = own.parts(source.text) if getattr(module, "SEVERAL", "") == "a text" else []
+        if not parts:
+            return _read(source, module, options)
+        sources = [source] if len(parts) == 1 else [Source(text) for _, text in parts]
+        names = [name for name, _ in parts]
+        return [
+            replace(camera, name=name)
+            for part, name in zip(sources, names, strict=True)
+            for camera in _read(part, module, options)
+        ]
+
+
+def _recognises(module: ModuleType, source: Source) -> bool:
+    return module.recognises(source) or (source.is_folder and any(map(module.recognises, _in_folder(source, module))))
+
+
+def _in_folder(source: Source, module: ModuleType) -> list[Source]:
+    """The files of a folder that may each be a camera of this format, if it has a file for each."""
+    if getattr(module, "SEVERAL", "") != "a folder" or source.path is None or module.recognises(source):
+        return []
+    suffixes = _YAML if module.SUFFIX in _YAML else (module.SUFFIX,)
+    return [file for suffix in suffixes for file in source.files(f"*{suffix}")]
+
+
+def _each_of_folder(source: Source, module: ModuleType, options: Options) -> list[Camera]:
+    """The cameras of a folder's files, called as these, with a note on those that are of another format."""
+    left_out, cameras, others = LeftOut(), [], []
+    for file in _in_folder(source, module):
+        path = Path(file.name)
+        name = path.stem
+        if not module.recognises(file):
+            others.append(path.name)
+            continue
+        with left_out.unless_pinhole(name):
+            found = _read(file, module, options)
+            cameras += [replace(camera, name=name if len(found) == 1 else f"{name} {camera.name}") for camera in found]
+    told = (f"Not read, since they are not {module.TITLE}: {naming.several(others)}",) if others else ()
+    return [camera.noted(*told) for camera in left_out.told(sorted(cameras, key=lambda camera: camera.name))]
 
 
 def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
@@ -179,7 +223,8 @@ def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
         cameras = module.read(source, options)
     except InputError as error:
         if source.path and source.path.name not in str(error):
-            raise InputError(f"{source.name}: {error}") from error.__cause__
+            kind = NoPinholeError if isinstance(error, NoPinholeError) else InputError
+            raise kind(f"{source.name}: {error}") from error.__cause__
         raise
     if not cameras:
         raise InputError(f"{source.name} holds no camera: give another file")
@@ -197,7 +242,7 @@ def _told_of_damage(source: Source, title: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if (sentence := terminal.plain(str(error))) == str(error):
+        if (sentence := _shown(str(error))) == str(error):
             raise
         raise InputError(sentence) from error.__cause__
     except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
@@ -217,7 +262,7 @@ def recognised(source: str | Path | Source) -> str:
         raise InputError("there is no text: copy a camera first")
     for name in readable():
         with _told_of_damage(source, FORMATS[name].TITLE):
-            if FORMATS[name].recognises(source):
+            if _recognises(FORMATS[name], source):
                 return name
     if source.json_problem:
         raise InputError(f"{source.name} looks like JSON and is none ({source.json_problem}): correct it")
@@ -324,10 +369,16 @@ def _doubted(camera: Camera) -> Camera:
 def _readable(camera: Camera) -> Camera:
     """The camera, whose name and notes show as they are; a picture's path that does not leads nowhere."""
     texts = (camera.name, camera.image or "", *camera.notes)
-    if all(map(str.isprintable, texts)):
+    if all(text.isprintable() and len(text) <= _LONGEST for text in texts):
         return camera
-    image = camera.image if camera.image == terminal.plain(camera.image or "") else None
-    return replace(camera, name=terminal.plain(camera.name), image=image, notes=tuple(map(terminal.plain, camera.notes)))
+    image = camera.image if camera.image == _shown(camera.image or "") else None
+    return replace(camera, name=_shown(camera.name), image=image, notes=tuple(map(_shown, camera.notes)))
+
+
+def _shown(text: str) -> str:
+    """The text on one line of characters that show, and not too long a one."""
+    text = terminal.plain(text)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
 
 
 def _unmirrored(camera: Camera, options: Options) -> Camera:

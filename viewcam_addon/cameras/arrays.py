@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from . import opencv, texts, tokens
+from . import opencv, own, texts, tokens
 from .camera import Camera, Options
 from .expressions import JOINTS, Expressions
 from .source import Source
@@ -59,6 +59,8 @@ class _Unknown:
 
 def recognises(source: Source) -> bool:
     if source.is_binary or source.is_folder or source.document or source.xml is not None or len(source.text) > _MOST_CHARACTERS:
+        return False
+    if own.lines_of(source):  # several cameras of our own, whose names look like a program's
         return False
     if source.json_problem and not {*"('"} & {*source.text}:  # JSON that is damaged, and no dictionary of Python
         return False
@@ -216,6 +218,8 @@ class _Code:
         last, after = first, tokens.token(self.text, first.end)
         while after.text in JOINTS and (part := tokens.token(self.text, after.end)).kind == "name":
             last, after = part, tokens.token(self.text, part.end)
+        if last.text in ("eye", "identity", "zeros") and after.text == "(":
+            return self._filled(last.text, after.start)
         if not _MAKERS.fullmatch(last.text):
             return (None, after.start) if after.text == "(" else None
         end = after.start
@@ -239,6 +243,14 @@ class _Code:
             if math.prod(shape) == len(rows):
                 rows = (np.reshape(rows, shape) if order else np.reshape(rows, shape[::-1]).T).tolist()
         return self._changed(rows, close)
+
+    def _filled(self, kind: str, opened: int) -> "tuple[list | None, int]":
+        """The rows of eye(3) or zeros((3, 1))."""
+        end = _end_of(self.text, opened)
+        sides = [int(side) for side in re.findall(r"\b[1-4]\b", self.text[opened : min(end, opened + 40)])]
+        if not sides or (kind != "zeros" and len({*sides}) > 1):
+            return None, end
+        return self._changed(np.eye(sides[0]).tolist() if kind != "zeros" else [0.0] * math.prod(sides[:2]), end)
 
     def _changed(self, rows: "list | None", end: int) -> "tuple[list | None, int]":
         """The rows after .T, .reshape(…) and what leaves numbers as they are; None after anything else."""

@@ -25,7 +25,19 @@ _BEFORE_NAMES = {"new", "const", "auto", "return"}
 _CAST_TO = {"float", "double", "int", "GLfloat", "GLdouble", "FLOAT", "real"}
 JOINTS = {".", "->", "::"}
 _CLOSING = {"(": ")", "[": "]", "{": "}", "<": ">"}
-_PLAIN = {"sqrt": math.sqrt, "tan": math.tan, "sin": math.sin, "cos": math.cos, "abs": abs, "min": min, "max": max}
+_PLAIN = {
+    "float": float,
+    "float32": float,
+    "float64": float,
+    "double": float,
+    "sqrt": math.sqrt,
+    "tan": math.tan,
+    "sin": math.sin,
+    "cos": math.cos,
+    "abs": abs,
+    "min": min,
+    "max": max,
+}
 _INVERSE = {"atan": math.atan, "atan2": math.atan2, "asin": math.asin, "acos": math.acos}
 _PI = {
     "pi": 1.0,

@@ -41,10 +41,12 @@ from .source import Source
 
 TITLE = "code that places a camera (gluLookAt, three.js, VTK, lookfrom …)"
 SUFFIX = ".txt"
+SEVERAL = "a text"
 
 _COMMENT = r"//[^\n]*|/\*.*?(?:\*/|\Z)|#(?!\s*define)[^\n]*"
 _WINDOW = re.compile(r"renderer|ren\w{0,3}win|renderwindow")
 _MOST_CHARACTERS = 2**23
+_LIBRARIES = {"np", "numpy", "jnp", "torch", "Mat"}
 _MOST_STATEMENTS = 2_000
 _IS_CODE = re.compile(r"\w\s*\(\s*[-\w.]|;\s*$|\w\.\w+\s*[=(]", re.MULTILINE)
 _CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
@@ -217,6 +219,8 @@ class _Code:
             if sign not in ("=", "(", ":", "{"):
                 continue
             at += 1
+            if parts[-1] == "eye" and sign == "(" and ({*parts} & _LIBRARIES or (words[at].isdigit() and words[at + 1] == ")")):
+                continue  # an identity matrix
             if (key := (sign, *parts)) not in known:
                 known[key] = self._may_say(parts, sign)
             if known[key]:
@@ -886,7 +890,7 @@ def _written(camera: Camera) -> str:
     window = [-c_x / d_x * near, (width - c_x) / d_x * near, -c_y / d_y * near, (height - c_y) / d_y * near]
     vectors = ", ".join(texts.listed(vector, ", ") for vector in texts.look(pinhole))
     lines = [
-        f"// {own.comment(pinhole)}",
+        *own.beginning(camera, "//"),
         f"windowSize = ({width}, {height});",
         f"glFrustum({texts.listed([*window, near, far], ', ')});",
         f"gluLookAt({vectors});",

@@ -26,6 +26,7 @@ from .source import Source
 
 TITLE = "view and projection matrices (OpenGL, Direct3D, glm)"
 SUFFIX = ".txt"
+SEVERAL = "a text"
 
 _ROLES = {
     **dict.fromkeys(
@@ -223,7 +224,7 @@ def view(camera: Camera) -> np.ndarray:
 def _written(camera: Camera) -> str:
     matrices = {"view": view(camera), "projection": projection(camera)}
     width, height = camera.pinhole.width, camera.pinhole.height
-    lines = [f"# {camera.name}: OpenGL, column vectors; near {_NEAR:g}, far {_FAR:g}", f"# {own.comment(camera.pinhole)}"]
+    lines = [*own.beginning(camera, "#"), f"# OpenGL, column vectors; near {_NEAR:g}, far {_FAR:g}"]
     lines += [f"size = {width}, {height}"]
     for name, matrix in matrices.items():
         rows = ",\n    ".join(f"[{texts.listed(row, ', ')}]" for row in matrix.tolist())

@@ -35,6 +35,7 @@ from .source import Record, Source, flat, number, pixels
 
 TITLE = "OpenCV K, R, t (FileStorage YAML, JSON or XML; NPZ)"
 SUFFIX = ".yml"
+SEVERAL = "a folder"
 
 _K = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", "cammatrix", "camk", "kmatrix")
 _R = ("r", "rot", "rotation", "rmat", "rotationmatrix", "rw2c")

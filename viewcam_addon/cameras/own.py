@@ -1,6 +1,7 @@
 """This project's own cameras: a line of JSON, a scene file, a picture's sidecar, and what people type.
 
-`write` gives one line of JSON for each camera, with the keys of a scene file (docs/scene-file.md); it reads back bit for bit.
+`write` gives one line of JSON for each camera, with the keys of a scene file (docs/scene-file.md), and of several with their
+names; it reads back bit for bit.
 `read` understands that and
 
     eye=(7, -6, 4) look_at=0,0,1 up=[0 0 1] d=1200        in any order, spelling and punctuation; also a Python dict
@@ -16,6 +17,7 @@ import json
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 from .. import checks
 from ..errors import InputError
@@ -34,6 +36,7 @@ KEY = "virtual_pinhole"
 """Under which another format's file has a `document` beside its own numbers; or it stands so in a comment."""
 
 _DOCUMENTS = re.compile(rf"{KEY}[^\w{{]{{0,4}}(?:\d{{1,18}} )?(\{{[^{{}}]*\}})")
+_BEGINNINGS = re.compile(rf"^(?:#|//) {KEY} of (\"(?:[^\"\\\n]|\\.){{0,1000}}\")", re.MULTILINE)
 # What a text says, checked: eye, look_at, up; distance (one or two), width, height, principal_point, mirrored; fov, fov_x,
 # fov_y with their axis, degrees or radians as `_Angle` says.
 Values = dict[str, object]
@@ -73,6 +76,7 @@ _TRUTH = re.compile(r"\s*(true|false|yes|no|0|1)\b", re.IGNORECASE)
 _PIXELS = re.compile(r"(?:\s*(?:px|pixels?)\b)?")
 _UNIT = re.compile(r"(?:\s*(?:(°|deg(?:rees?)?\b)|(rad(?:ians?)?\b)))?")
 _JSON = re.compile(r"\A\s*(?:\{|\"\w+\"\s*:)")
+_MOST_LINES = 100_000
 _SAID = "write eye=…, look_at=…, up=… and d=…, or copy a camera"
 
 
@@ -83,6 +87,8 @@ class _Angle(float):
 def recognises(source: Source) -> bool:
     if source.is_binary or source.is_folder:
         return False
+    if lines_of(source):
+        return True
     if isinstance(document := _document(source), dict):
         return any(isinstance(document.get(key), dict) for key in ("stated_camera", "camera")) or _is_camera(document)
     word = _word(source.text, _GAP.match(source.text).end())
@@ -94,13 +100,21 @@ def _is_camera(document: dict) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
+    if lines := lines_of(source):
+        return [
+            replace(camera(_of_json(line), options, f"camera {number}"), name=str(line.get("name", f"camera {number}")))
+            for number, line in enumerate(lines, start=1)
+        ]
     document = _document(source)
     values = _of_json(document) if isinstance(document, dict) else pairs(source.text.replace("−", "-"))
     return [camera(values, options, source.name)]
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
-    return "\n".join(json.dumps(document(camera.pinhole)) for camera in cameras)
+    """A line of JSON for each camera, which has its name where there are several."""
+    if len(cameras) == 1:
+        return json.dumps(document(cameras[0].pinhole))
+    return "\n".join(json.dumps({"name": camera.name} | document(camera.pinhole)) for camera in cameras)
 
 
 def document(pinhole: Pinhole) -> dict:
@@ -120,6 +134,25 @@ def document(pinhole: Pinhole) -> dict:
 def comment(pinhole: Pinhole) -> str:
     """The values as a comment has them, without the signs of one."""
     return f"{KEY} {json.dumps(document(pinhole))}"
+
+
+def beginning(camera: Camera, sign: str) -> list[str]:
+    """The lines with which a camera's code begins where that of others stands before or after it: its name and its values.
+
+    sign : of a comment.
+    """
+    return [f"{sign} {KEY} of {json.dumps(camera.name)}", f"{sign} {comment(camera.pinhole)}"]
+
+
+def parts(text: str) -> list[tuple[str, str]]:
+    """The name and the code of each camera of a text, split where `beginning` stands; none if it stands nowhere."""
+    starts = [*_BEGINNINGS.finditer(text)]
+    ends = [*(found.start() for found in starts[1:]), len(text)]
+    whole = [0, *(found.start() for found in starts[1:])]  # what stands before the first is the first one's
+    return [
+        (str(json.loads(found[1], strict=False)), text[start:end])
+        for found, start, end in zip(starts, whole, ends, strict=False)
+    ]
 
 
 def pinholes_in(text: str) -> list[Pinhole]:
@@ -201,6 +234,19 @@ def _spelt(key: object) -> str | None:
 # ---- JSON
 
 
+def lines_of(source: Source) -> list[dict]:
+    """The cameras of a text with one on each line; none if it is something else."""
+    lines = [line for line in source.text.split("\n", _MOST_LINES) if line.strip()]
+    if len(lines) < 2 or not all(line.startswith("{") and line.rstrip().endswith("}") for line in lines):
+        return []
+    found = [Source(line).document for line in lines]
+    return found if all(map(_is_camera_of_several, found)) else []
+
+
+def _is_camera_of_several(document: dict) -> bool:
+    return _is_camera({key: value for key, value in document.items() if key != "name"})
+
+
 def _document(source: Source) -> object:
     """The JSON object, also without its braces; None if this is none."""
     text = source.text
@@ -218,6 +264,8 @@ def _of_json(document: dict) -> Values:
     given = next((document[key] for key in ("stated_camera", "camera") if isinstance(document.get(key), dict)), document)
     values: Values = {}
     for key, value in given.items():
+        if key == "name" and given is document:
+            continue
         name = _spelt(key)
         if name is None:
             raise InputError(f"the key {checks.shown(key)} is none of a camera: write eye, look_at, up and distance")

@@ -31,11 +31,12 @@ from .source import Source
 
 TITLE = "pbrt scene"
 SUFFIX = ".pbrt"
+SEVERAL = "a folder"
 
 _COMMENT = r"#[^\n]*"
 _WORDS = re.compile(
     r"\"([^\"\\]*(?:\\.[^\"\\]*)*)\"|([A-Za-z]\w*)|([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?(?![\w.]))|([][])"
-    r"|(\"[^\"\\]*(?:\\.[^\"\\]*)*|[-+.\d][\w.]*|\S)"
+    r"|(\"[^\"\\]*(?:\\.[^\"\\]*)*|\d[\w.]*|\S)"
 )
 _KINDS = ("perspective", "orthographic", "environment", "spherical", "realistic")
 _STATEMENT = re.compile(rf'\bLookAt\s+[-+.\d\[]|\bCamera\s*"(?:{"|".join(_KINDS)})"|^[ \t]*Camera[ \t]*"\w+"', re.MULTILINE)

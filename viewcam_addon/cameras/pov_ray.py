@@ -30,6 +30,7 @@ from .source import Source
 
 TITLE = "POV-Ray camera"
 SUFFIX = ".pov"
+SEVERAL = "a folder"
 
 _CAMERA = re.compile(r"\bcamera\s*\{")
 _COMMENT = r"//[^\n]*|/\*.*?(?:\*/|\Z)"
@@ -39,6 +40,7 @@ _VERSION = re.compile(r"#\s*version\s+(\d+(?:\.\d+)?)")
 _WORD = re.compile(r"\s*([A-Za-z_]\w*)")
 _VECTORS = ("location", "right", "up", "direction", "sky", "look_at")
 _SIZE = (800, 600)
+_NARROWEST = 1e-9  # degrees
 _PARALLEL = 1e-10  # POV-Ray's EPSILON
 _MOVES = ("rotate", "translate", "scale", "matrix")
 _KINDS = (
@@ -244,7 +246,7 @@ class _Block:
             raise InputError("right, up or direction of POV-Ray's camera has no length: give each one")
         if "angle" in said:
             angle = float(said["angle"])
-            if not 0 < angle < 180:
+            if not _NARROWEST < angle < 180:
                 raise InputError(f"angle of POV-Ray's camera is {angle:g}°: give one between 0 and 180")
             direction = direction / lengths[2] * (lengths[0] / 2 / math.tan(math.radians(angle) / 2))
             lengths[2] = math.hypot(*direction)

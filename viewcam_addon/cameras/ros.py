@@ -21,6 +21,7 @@ from .source import Record, Source
 
 TITLE = "ROS camera_info"
 SUFFIX = ".yaml"
+SEVERAL = "a folder"
 
 _KEYS = {"image_width", "image_height", "camera_matrix", "distortion_model"}
 

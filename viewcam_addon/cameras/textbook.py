@@ -25,7 +25,7 @@ def _written(camera: Camera) -> str:
     pinhole = camera.pinhole
     centred_field_of_view(camera, "a textbook ray tracer")
     lines = [
-        f"// {own.comment(pinhole)}",
+        *own.beginning(camera, "//"),
         "Pinhole* camera = new Pinhole;",
         *(
             f"camera->set_{name}({texts.listed(vector, ', ')});"

@@ -270,7 +270,8 @@ def _applied(top: Record):
     """The function that takes a matrix back into the world before `applied_transform` and `applied_scale`."""
     applied = np.eye(4)
     if "applied_transform" in top:
-        numbers = np.array(top.numbers("applied_transform", 16 if len(top.values["applied_transform"]) == 4 else 12))
+        rows = top.values["applied_transform"]
+        numbers = np.array(top.numbers("applied_transform", 16 if isinstance(rows, list) and len(rows) in (4, 16) else 12))
         applied[:3] = numbers.reshape(-1, 4)[:3]
     if abs(np.linalg.det(applied)) < 1e-12:
         raise InputError("the applied_transform can't be undone: its determinant is 0")

@@ -29,7 +29,7 @@ def _written(camera: Camera) -> str:
     if abs(d_x / d_y - 1) > 2.0**-23:
         raise InputError(f"VTK can't say that the pixels of {camera.name} are not square: change it, or write matrices")
     lines = [
-        f"# {own.comment(pinhole)}",
+        *own.beginning(camera, "#"),
         f"windowSize = ({width}, {height})",
         *(
             f"camera.Set{name}({texts.listed(vector, ', ')})"

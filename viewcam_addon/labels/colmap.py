@@ -57,8 +57,9 @@ class _Sampled(NamedTuple):
 def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
     """Write a new folder of cameras.txt, images.txt and points3D.txt, whole or not at all.
 
-    folder : of label files that have depth and masks. output : must not be there yet, or be empty. points : how many are
-    sampled in each picture, evenly over what it shows; those that no other picture sees are left out.
+    folder : of label files that have depth and masks. output : must not be there yet, be empty, or hold a model of cameras
+    alone, as a batch with --transforms writes it. points : how many are sampled in each picture, evenly over what it shows;
+    those that no other picture sees are left out.
 
     Returns how many images, points and observations there are.
 
@@ -70,7 +71,7 @@ def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
     """
     pictures, _ = found(folder)
     states: dict[str, int] = {}
-    with folder_written_whole(output) as temporary:
+    with folder_written_whole(output, _has_no_points) as temporary:
         views, pieces = [], []
         for number, (path, told) in enumerate(pictures):
             with files.understood(path):
@@ -116,6 +117,14 @@ def _planes(path: Path, told: Document, states: dict[str, int]) -> tuple[Array, 
     numbers = np.array([of_ids[each] if each else -1 for each in known.astype(int).tolist()])
     state = np.where(depth < BACKGROUND_DEPTH, numbers[places.reshape(ids.shape)], -1)
     return depth.astype(np.float64), state, ids
+
+
+def _has_no_points(folder: Path) -> bool:
+    """Whether a folder holds a text model that lacks nothing but points, and nothing else."""
+    if {path.name for path in folder.iterdir()} != {"cameras.txt", "images.txt", "points3D.txt"}:
+        return False
+    with open(folder / "points3D.txt", encoding="utf-8", errors="replace") as lines:
+        return not any(line.strip() and not line.startswith("#") for line in lines)
 
 
 def _sampled(

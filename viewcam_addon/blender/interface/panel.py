@@ -90,8 +90,8 @@ def standing(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[tu
         return []
     roll = math.degrees(rolls.angle_from(preferences.up_axis(), found))
     return [
-        ("Camera", tuple(datablocks.length(number, scene) for number in readouts.rounded(found.eye))),
-        ("Look At", tuple(datablocks.length(number, scene) for number in readouts.rounded(found.look_at))),
+        ("Camera", tuple(datablocks.length(number, scene, digits=4) for number in readouts.rounded(found.eye))),
+        ("Look At", tuple(datablocks.length(number, scene, digits=4) for number in readouts.rounded(found.look_at))),
         ("Up", tuple(f"{number:.4g}" for number in readouts.rounded(found.up))),
         ("Lens", (f"{camera_object.data.lens:.6g} mm",)),
         ("Roll", (f"{round(roll, 3) + 0.0:g}°",)),

@@ -129,6 +129,9 @@ def note_object(
         ledger.call_for_cycles(real.original, materials.fill_empty_slots, stands_in=False)
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
             ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
+    if used and all(materials.is_volume_alone(slots[index]) for index in used):
+        # Transparent alone, where it lies on a floor a ray that has gone through it would miss the floor.
+        ledger.set_for_cycles(real.original, "hide_render", True)
     for material in filter(None, slots):
         if materials.is_volume_alone(material):
             ledger.note(name, "skipped", f"material {material.name!r} is a volume without a surface, which is not modelled")
