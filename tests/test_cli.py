@@ -369,6 +369,25 @@ def test_what_can_not_be_written_is_said_before_anything_is_traced_or_rendered(t
     assert not (tmp_path / "new").exists(), "to look whether it can be written leaves nothing"
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["batch", "a.blend", "--orbit", "3", "--out", ""],
+        ["check", "a.blend", "--report", ""],
+        ["check", "a.blend", "--junit="],
+        ["export", "a.blend", ""],
+        ["labels", "", "out.json"],
+        ["camera", "a.json", "--out", ""],
+        ["render", "a.json", "a.exr", "--json", ""],
+    ],
+)
+def test_an_empty_name_is_not_taken_for_the_current_folder(tmp_path, capfd, monkeypatch, words):
+    """--out "", of a shell's variable that was empty, filled the folder that one stood in."""
+    monkeypatch.chdir(tmp_path)
+    assert "the name is empty" in fails(capfd, *words)
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_result_goes_to_standard_output_by_its_name_and_devices_stay(tmp_path):
     """As root, --json /dev/null once left a file in its place."""
     scene = write_scene(tmp_path)

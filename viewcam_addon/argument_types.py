@@ -34,6 +34,12 @@ def size(text: str) -> tuple[int, int]:
     return positive(width), positive(height)
 
 
+def path(text: str) -> Path:
+    if not text:  # which Path takes for the current folder
+        raise argparse.ArgumentTypeError("the name is empty: give that of a file or folder, or . for the current folder")
+    return Path(text)
+
+
 def names(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
 

@@ -109,7 +109,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             def add_words(added: argparse.ArgumentParser) -> None:
                 added.set_defaults(writes=())
                 added.add_argument("--threads", type=types.positive, metavar="N", help="threads to use (default: all)")
-                added.add_argument("--json", metavar="FILE", type=Path, help="write the result as JSON")
+                added.add_argument("--json", metavar="FILE", type=types.path, help="write the result as JSON")
                 added.add_argument(
                     "--log-json", action="store_true", help="tell on standard output a JSON object for each event"
                 )
@@ -121,7 +121,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
 
     def blend(added: argparse.ArgumentParser) -> None:
         if not blend_is_open:
-            added.add_argument("blend", metavar="FILE.blend", type=Path, help="any file that Blender opens")
+            added.add_argument("blend", metavar="FILE.blend", type=types.path, help="any file that Blender opens")
         else:
             added.set_defaults(blend=None)
         trust(added)
@@ -165,24 +165,24 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument("--error", type=types.above_zero, metavar="E", help=text)
 
     def report(added: argparse.ArgumentParser) -> None:
-        added.add_argument("--report", metavar="DIR", type=Path, help="write an HTML report there")
+        added.add_argument("--report", metavar="DIR", type=types.path, help="write an HTML report there")
         added.add_argument("--difference", metavar="FILE.png", type=types.png, help="draw there what differs, pixel by pixel")
-        added.add_argument("--junit", metavar="FILE.xml", type=Path, help="write the result as a test's, for CI systems")
+        added.add_argument("--junit", metavar="FILE.xml", type=types.path, help="write the result as a test's, for CI systems")
         added.set_defaults(writes=("report", "difference"))
 
     @command("export", "Write the scene of a .blend as the tracer reads it.")
     def add_export(added: argparse.ArgumentParser) -> None:
         added.set_defaults(run=verification.export)
         blend(added)
-        added.add_argument("scene", metavar="SCENE.json", type=Path)
+        added.add_argument("scene", metavar="SCENE.json", type=types.path)
         added.set_defaults(writes=("scene",))
         scene_choices(added)
 
     @command("render", "Trace a scene file into an EXR.")
     def add_render(added: argparse.ArgumentParser) -> None:
         added.set_defaults(run=verification.render)
-        added.add_argument("scene", metavar="SCENE.json", type=Path)
-        added.add_argument("image", metavar="OUT.exr", type=Path)
+        added.add_argument("scene", metavar="SCENE.json", type=types.path)
+        added.add_argument("image", metavar="OUT.exr", type=types.path)
         added.set_defaults(writes=("image",))
         added.add_argument("--size", type=types.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
         added.add_argument("--stated", action="store_true", help="trace the four values as stated, not as Blender stored them")
@@ -197,7 +197,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         )
         for other in ("previous", "next"):
             words = f"the {other} frame, for --labels flow"
-            added.add_argument(f"--{other}", metavar="SCENE.json", type=Path, help=words)
+            added.add_argument(f"--{other}", metavar="SCENE.json", type=types.path, help=words)
         words = "steps of the labels' 16-bit depth in a scene unit (default: 1000, millimetres of metres)"
         added.add_argument("--depth-steps", type=types.above_zero, metavar="N", default=1000.0, help=words)
 
@@ -205,19 +205,22 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     def add_cycles(added: argparse.ArgumentParser) -> None:
         added.set_defaults(run=verification.cycles)
         blend(added)
-        added.add_argument("image", metavar="OUT.exr", type=Path)
+        added.add_argument("image", metavar="OUT.exr", type=types.path)
         added.set_defaults(writes=("image",))
         scene_choices(added)
 
     @command("compare", "Compare EXRs of one camera against derived tolerances and noise.")
     def add_compare(added: argparse.ArgumentParser) -> None:
         added.set_defaults(run=verification.compare)
-        added.add_argument("reference", metavar="REFERENCE.exr", type=Path)
+        added.add_argument("reference", metavar="REFERENCE.exr", type=types.path)
         added.add_argument(
-            "tests", metavar="TEST.exr", type=Path, nargs="+", help="several are one picture, rendered with several seeds"
+            "tests", metavar="TEST.exr", type=types.path, nargs="+", help="several are one picture, rendered with several seeds"
         )
         added.add_argument(
-            "--scene", metavar="SCENE.json", type=Path, help="the reference's scene: explains silhouettes, brings the ledger"
+            "--scene",
+            metavar="SCENE.json",
+            type=types.path,
+            help="the reference's scene: explains silhouettes, brings the ledger",
         )
         strict(added, "if anything in the picture is not modelled")
         words = "what TEST.exr holds, made elsewhere: position=P.X,P.Y,P.Z depth=Z; also distance, normal, uv, object-index"
@@ -238,7 +241,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument("--device", choices=DEVICES, default="CPU", help=words)
         error(added, "the tracer takes")
         against = "the scene that Cycles must show, as viewcam export wrote it (default: what the file holds now)"
-        added.add_argument("--scene", metavar="SCENE.json", type=Path, help=against)
+        added.add_argument("--scene", metavar="SCENE.json", type=types.path, help=against)
         report(added)
         many = added.add_argument_group("many checks, a shot each; --report has their page and results")
         many.add_argument("--frames", metavar="A..B", help="the camera at each frame (from -5 on: --frames=-5..3)")
@@ -263,13 +266,15 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
 
         added.set_defaults(run=audit.run)
         added.add_argument(
-            "dataset", metavar="DATASET", type=Path, help="transforms.json, a COLMAP model, or the folder of one"
+            "dataset", metavar="DATASET", type=types.path, help="transforms.json, a COLMAP model, or the folder of one"
         )
         by = added.add_mutually_exclusive_group()
-        by.add_argument("--points", metavar="COLMAP", type=Path, help="a COLMAP model of the same pictures and world")
-        by.add_argument("--against", metavar="CAMERAS", type=Path, help="true cameras of the same pictures, in any format")
+        by.add_argument("--points", metavar="COLMAP", type=types.path, help="a COLMAP model of the same pictures and world")
+        by.add_argument(
+            "--against", metavar="CAMERAS", type=types.path, help="true cameras of the same pictures, in any format"
+        )
         text = "the file that was rendered, whose cameras are called as the pictures, or whose frames end their names"
-        by.add_argument("--blend", metavar="FILE.blend", type=Path, help=text)
+        by.add_argument("--blend", metavar="FILE.blend", type=types.path, help=text)
         trust(added)
         added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
 
@@ -278,8 +283,8 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         from .commands import labels
 
         added.set_defaults(run=labels.run, writes=("output",))
-        added.add_argument("folder", metavar="FOLDER", type=Path, help="where viewcam render --labels has written")
-        added.add_argument("output", metavar="OUT", type=Path, help="a file of COCO's; of another format a new folder")
+        added.add_argument("folder", metavar="FOLDER", type=types.path, help="where viewcam render --labels has written")
+        added.add_argument("output", metavar="OUT", type=types.path, help="a file of COCO's; of another format a new folder")
         words = "COCO's instances (default) or panoptic format; BOP's scene; COLMAP's points and tracks; KITTI's depth and flow"
         added.add_argument("--to", choices=["coco", "panoptic", *_FOLDERS], default="coco", help=words)
         added.add_argument("--amodal", action="store_true", help="whole objects, in place of what is visible of them")
@@ -305,7 +310,11 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         light(added)
         error(added, "the tracer takes")
         added.add_argument(
-            "--report", metavar="DIR", type=Path, default=Path("demo"), help="where the report goes (default: %(default)s)"
+            "--report",
+            metavar="DIR",
+            type=types.path,
+            default=Path("demo"),
+            help="where the report goes (default: %(default)s)",
         )
 
     @command("chart", "Measure the methods and draw how they compare, in a clone of the project.")
@@ -321,7 +330,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument(
             "--output",
             metavar="DIR",
-            type=Path,
+            type=types.path,
             default=Path("docs", "charts"),
             help="where the SVGs go (default: %(default)s)",
         )
@@ -330,7 +339,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument(
             "--figures",
             metavar="FILE",
-            type=Path,
+            type=types.path,
             help="what an earlier run has measured, its JSON: is drawn anew, or with --only kept of all others",
         )
 

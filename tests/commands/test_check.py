@@ -49,6 +49,16 @@ def test_words_that_contradict_each_other_are_one_sentence(capfd, words, sentenc
     assert sentence in told and told.count("\n") == 1, told
 
 
+@pytest.mark.parametrize("name", ["scene.json", "scene.npz", "cycles.exr", "reference.exr", "everything.exr", "index.html"])
+def test_a_folder_where_a_file_of_the_report_belongs_is_refused_before_anything_is_rendered(tmp_path, capfd, monkeypatch, name):
+    monkeypatch.setattr("viewcam_addon.blender.rendering.cycles.render", lambda *_: pytest.fail("it is rendered"))
+    (tmp_path / name).mkdir()
+    assert check(CORNELL, *SMALL, "--report", tmp_path) == 2
+    told = capfd.readouterr().err
+    assert f"{name} is a folder" in told and told.count("\n") == 1, told
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
 @pytest.mark.slow
 def test_each_camera_is_a_shot_with_its_report_and_a_junit_case(tmp_path, capfd):
     out, junit, result = tmp_path / "out", tmp_path / "a.xml", tmp_path / "a.json"

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from viewcam_addon.errors import FullDiskError, InputError
 from viewcam_addon.files import written_whole
+from viewcam_addon.jobs import dataset
 from viewcam_addon.jobs.folder import Folder, Outputs, write_json
 
 plain = st.recursive(
@@ -72,6 +73,51 @@ def test_a_sidecar_that_lacks_a_key_or_has_it_otherwise_is_not_finished(folder, 
         owner[key] = value
     write_json(sidecar, record)
     assert folder.finished("shot_000", made_from(painting), Outputs(check=True)) is None
+
+
+@pytest.mark.parametrize(
+    "text", ["1e999", "-1e999", "NaN", "Infinity", '"\\ud800"', '{"\\udfff": 1}', "9" * 5000, "[" * 900 + "]" * 900]
+)
+@pytest.mark.parametrize("key", ["timing.seconds", "warnings", "camera", "other"])
+def test_a_sidecar_of_what_no_summary_can_hold_is_rendered_again(tmp_path, painting, text, key):
+    """Infinite numbers ended every later --resume in a bug."""
+    painting.paint(tmp_path, 2)
+    sidecar = tmp_path / "shot_000.json"
+    whole = sidecar.read_bytes()
+    record = json.loads(whole)
+    outer, _, inner = key.partition(".")
+    record[outer] = {**record[outer], inner: "@"} if inner else ["@"]
+    sidecar.write_text(json.dumps(record).replace('"@"', text), encoding="utf-8")
+    painter = painting.Painter()
+    summary = painting.paint(tmp_path, 2, painter=painter, resume=True)
+    assert summary.exit_status == 0 and painter.painted in ([], ["shot_000"])
+    assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["counts"]["done"] == 2
+
+
+@pytest.mark.parametrize(
+    "name", ["summary.json", "contact-sheet.html", "shot_001.json", "shot_001.exr", "shot_001.png", "shot_001.labels.json"]
+)
+@pytest.mark.parametrize("how", [{}, {"resume": True}, {"overwrite": True}], ids=lambda how: next(iter(how), "new"))
+def test_a_folder_where_a_file_belongs_is_refused_before_anything_is_rendered(tmp_path, painting, name, how):
+    """A folder called summary.json was found when all was rendered."""
+    (tmp_path / name).mkdir()
+    painter = painting.Painter()
+    with pytest.raises(InputError, match=rf"{name} is a folder, and a file is to be written there"):
+        painting.paint(tmp_path, 3, painter=painter, labels=("depth",), **how)
+    assert not painter.painted and (tmp_path / name).is_dir()
+
+
+def test_what_is_no_business_of_the_batch_may_be_a_folder(tmp_path, painting):
+    for name in ("sparse", "shot_009.exr", "shot_001.labels.json"):
+        (tmp_path / name).mkdir()
+    assert painting.paint(tmp_path, 2).exit_status == 0
+
+
+@pytest.mark.parametrize("name", ["transforms.json", "sparse/0/images.txt"])
+def test_a_folder_where_a_dataset_belongs_is_refused_before_anything_is_rendered(tmp_path, name):
+    (tmp_path / name).mkdir(parents=True)
+    with pytest.raises(InputError, match=rf"{name.rpartition('/')[2]} is a folder"):
+        dataset.check_folder(Folder(tmp_path))
 
 
 def test_a_shot_of_other_settings_is_not_finished(folder):

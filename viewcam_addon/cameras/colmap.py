@@ -61,6 +61,9 @@ MODELS: dict[str, tuple[int, tuple[str, ...]]] = {
 
 _STRAIGHT = ("f", "fx", "fy", "cx", "cy")
 _FILES = ("cameras", "images")
+
+TEXTS = ("images.txt", "cameras.txt", "points3D.txt")
+"""The files of a model that is written."""
 NOTES = "virtual_pinhole.txt"
 _FOLDERS = ((), ("0",), ("sparse", "0"), ("sparse",), ("colmap", "sparse", "0"))
 

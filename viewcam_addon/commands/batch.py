@@ -55,7 +55,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     shots.add_argument(
         "shots",
         metavar="SHOTS",
-        type=Path,
+        type=types.path,
         nargs="?",
         help="a list (.csv, .json, .jsonl …) or any cameras",
     )
@@ -78,7 +78,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     said.add_argument("--seed", type=types.seed, metavar="N", help="another noise for another number (default: the scene's)")
 
     written = added.add_argument_group("what is written")
-    written.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder of the pictures")
+    written.add_argument("--out", metavar="DIR", type=types.path, required=True, help="the folder of the pictures")
     kept = written.add_mutually_exclusive_group()
     kept.add_argument("--resume", action="store_true", help="keep the shots that are there from the same settings")
     known = "the same, unless what they were made from can't all be known: then render all of them anew"

@@ -27,7 +27,7 @@ def add_options(added: argparse.ArgumentParser) -> None:
     added.add_argument("--camera", metavar="NAME", help="only this one of them")
     added.add_argument("--from", dest="format", choices=cameras.readable(), help="the format (default: by its content)")
     added.add_argument("--to", choices=cameras.writable(), help="write them in this format")
-    added.add_argument("--out", metavar="FILE", type=Path, help="where to; a folder for some formats (default: printed)")
+    added.add_argument("--out", metavar="FILE", type=types.path, help="where to; a folder for some formats (default: printed)")
     add_reading_options(added)
     added.add_argument("--out-axes", choices=[*cameras.AXES], default="as_is", help="the axes of what is written")
     added.add_argument("--out-scale", type=types.above_zero, metavar="S", default=1.0, help="1 unit written is S units here")

@@ -89,6 +89,8 @@ def carry_out(
                 events.tell("note", command=plan.command, text=_OPEN_TO_ALL.format(plan.scheduler))
             machines = stack.enter_context(cluster.opened(plan.scheduler or None, plan.workers, program))
         folder = Folder(plan.out, plan.shard.strip().replace("/", "-of-") if plan.shard else "")
+        if plan.transforms:
+            dataset.check_folder(folder)
         if plan.is_on_cluster:
             about = (plan.outputs, plan.trust, plan.time_limit)
             work = machines.work(blend, folder, work_list.settings, work_list.made_from, *about)

@@ -10,6 +10,7 @@ from typing import Any
 from ..cameras import Camera, colmap, save, transforms
 from ..cameras.naming import several
 from ..errors import InputError
+from ..files import check_writable
 from ..pinhole import Pinhole
 from .folder import Folder
 from .job import Job
@@ -21,6 +22,13 @@ MODEL = ("sparse", "0")
 def refuse(shots: Sequence[Job], suffix: str) -> None:
     """Raise InputError for shots that no dataset could name, before any of them is rendered. suffix : as of `write`."""
     colmap.check_names([f"{shot.name}.{suffix}" for shot in shots])
+
+
+def check_folder(folder: Folder) -> None:
+    """Raise InputError if a dataset can't be written into the folder, as far as that is known before anything is rendered."""
+    check_writable(folder.path / transforms.FILE)
+    for file in colmap.TEXTS:
+        check_writable(folder.path.joinpath(*MODEL, file))
 
 
 def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suffix: str) -> str:

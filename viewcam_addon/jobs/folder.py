@@ -7,6 +7,7 @@ Rejected: to hash the pictures as well; each was written whole, and to read them
 """
 
 import json
+import os
 import re
 import shutil
 from collections.abc import Iterable, Mapping
@@ -16,6 +17,9 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import read_bytes, written_whole
+from ..labels import PASSES
+from ..labels import endings as endings_of_labels
+from .tracing import SIDES
 
 _TEMPORARY = re.compile(r"\.(.+)-[0-9a-f]{8}\.(?:exr|png|json|html|txt|labels)")
 
@@ -67,6 +71,23 @@ class Folder:
     def sidecar(self, name: str) -> Path:
         return self.path / f"{name}.json"
 
+    def refuse_what_is_in_the_way(self, shots: Iterable[str], outputs: Outputs) -> None:
+        """Raise InputError where a folder, or anything else that is no file, has the name of a file that a batch would write.
+
+        shots : their names. outputs : what is made of each.
+        """
+        endings = ["json", *(("exr", "png") if outputs.picture else ()), *(("html", SIDES["test"]) if outputs.report else ())]
+        if outputs.labels:
+            endings += endings_of_labels([each for kind in outputs.labels for each in PASSES[kind]])
+        ours = {self.summary.name, self.contact_sheet.name, *(f"{shot}.{ending}" for shot in shots for ending in endings)}
+        with os.scandir(self.path) as entries:
+            for entry in entries:
+                if entry.name in ours and os.path.exists(entry.path) and not entry.is_file():
+                    what = "a folder" if entry.is_dir() else "no file"
+                    raise InputError(
+                        f"{Path(entry.path)} is {what}, and a file is to be written there: move it, or choose another folder"
+                    )
+
     def finished(self, name: str, settings: str, outputs: Outputs | None = None) -> dict[str, Any] | None:
         """The sidecar of the shot, if all that it tells of is there whole and made from these settings, else None.
 
@@ -92,6 +113,7 @@ class Folder:
         """The sidecar of the shot, whatever it was made from; None where it is missing, or somebody else's."""
         try:
             record = json.loads(read_bytes(self.sidecar(name)).decode("utf-8"))
+            _compact(record).encode("utf-8")  # what is infinite, or no text, no summary could hold
         except (OSError, ValueError, RecursionError):
             return None
         return record if _is_sidecar(record, name) else None

@@ -47,6 +47,7 @@ def run(
     InputError
         if some of these shots are there already and neither is said, or if the folder can't be written.
     """
+    folder.refuse_what_is_in_the_way([shot.name for shot in shots], outputs or Outputs())
     batch = _Batch(shots, folder, settings, events, outputs or Outputs(), interruption)
     with Claims(folder.lock) as claims:
         batch.begin(resume, overwrite)

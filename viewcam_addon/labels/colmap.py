@@ -121,7 +121,7 @@ def _planes(path: Path, told: Document, states: dict[str, int]) -> tuple[Array, 
 
 def _has_no_points(folder: Path) -> bool:
     """Whether a folder holds a text model that lacks nothing but points, and nothing else."""
-    if {path.name for path in folder.iterdir()} != {"cameras.txt", "images.txt", "points3D.txt"}:
+    if {path.name for path in folder.iterdir()} != {*colmap.TEXTS}:
         return False
     with open(folder / "points3D.txt", encoding="utf-8", errors="replace") as lines:
         return not any(line.strip() and not line.startswith("#") for line in lines)

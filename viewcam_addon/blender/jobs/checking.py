@@ -23,6 +23,7 @@ from typing import Any
 import bpy
 
 from ...events import Events
+from ...files import check_writable
 from ...jobs.job import Job
 from ...jobs.tracing import Tracing, Written
 from ...pinhole import Pinhole
@@ -122,9 +123,12 @@ class Checker:
         folder = keep or self._files.folder
         folder.mkdir(parents=True, exist_ok=True)
         tests = [folder / (f"{engine}-{i + 1}.exr" if count > 1 else f"{engine}.exr") for i in range(count)]
+        everything = folder / "everything.exr"
+        if keep:
+            for path in (*tests, everything, *(keep / name for name in ("scene.json", "scene.npz", "reference.exr"))):
+                check_writable(path)
         started = time.perf_counter()
         with numbered_indices(_numbered(job.scene)), staged(job, scene, camera_object, notes) as stage:
-            everything = folder / "everything.exr"
             everything.unlink(missing_ok=True)
             exported = self.both_sides(stage, job, tests, everything)
         if not keep:  # the page has to be the same bytes each time
