@@ -53,7 +53,7 @@ class JobSettings:
         self._camera_of_file = scene.camera
         self._bindings = datablocks.bindings_of(scene)
         overrides.afterwards(self._bind_markers, True)
-        for name in ("use_multiview", "use_sequencer", "use_stamp"):
+        for name in ("use_sequencer", "use_stamp"):
             overrides.set(render, name, False)
         overrides.set(render, "use_persistent_data", True)
         overrides.set(VIEWCAM_RenderEngine, "keeps_scene", True)

@@ -34,7 +34,7 @@ from ..opening import opened
 from ..rendering.engine import VIEWCAM_RenderEngine
 from ..scenes.depsgraph import render_still
 from ..scenes.export import survey
-from ..temporary_settings import Overrides, numbered_indices
+from ..temporary_settings import Overrides, numbered_indices, overridden
 from . import obstacles, origins, persistent_data, pictures
 from .checking import Checker
 from .job_settings import JobSettings
@@ -142,10 +142,12 @@ class BlenderRenderer:
         """
         warnings = self._set(shot)
         if image and preview:
-            if self._settings.engine == "EEVEE" and not self._has_drawn:  # see persistent_data.py
+            with overridden() as overrides:
+                overrides.set(self.scene.render, "use_multiview", False)  # here alone: a check's ledger tells of stereoscopy
+                if self._settings.engine == "EEVEE" and not self._has_drawn:  # see persistent_data.py
+                    render_still(self.scene)
+                    self._has_drawn = True
                 render_still(self.scene)
-                self._has_drawn = True
-            render_still(self.scene)
             if self.scene.render.engine == VIEWCAM_RenderEngine.bl_idname:
                 warnings += VIEWCAM_RenderEngine.warnings
             pictures.write(self.scene, image, preview)
