@@ -591,6 +591,68 @@ def test_vtks_own_angle_counts_where_its_code_says_none_whatever_camera_was_ther
     assert camera.pinhole.distance[1] == pytest.approx(180 / math.tan(math.radians(15))) and "30°" in camera.notes[0]
 
 
+@pytest.mark.parametrize(
+    ("part", "size"),
+    [
+        ((1920, 0, 640, 360), (640, 360)),
+        ((0, 360, 640, 360), (1280, 720)),
+        ((-100, 50.5, 700, 300), (350, 300)),
+        ((0, 0, 5760, 2160), (5760, 2160)),
+    ],
+)
+def test_three_js_view_offset_shows_a_part_of_the_full_picture(part, size):
+    """Where a point of space is in the part, it is in the full picture less the part's place. It was ignored."""
+    text = "camera = new THREE.PerspectiveCamera(40, {}); camera.position.set(7, -6, 4); camera.lookAt(0, 0, 1);"
+    full_width, full_height = 5760, 2160  # three by two screens, as in three.js' documentation
+    (full,) = cameras.read(text.format("5760 / 2160"), options=Options(size=(full_width, full_height)))
+    offset = f"const w = {full_width}; camera.setViewOffset(w, {full_height}, {', '.join(map(str, part))});"
+    renderer = f"renderer.setSize({size[0]}, {size[1]});"
+    (camera,) = cameras.read(text.format(1.5) + offset + renderer, options=GL)
+    assert (camera.pinhole.width, camera.pinhole.height) == size
+    points = np.random.default_rng(5).normal(size=(100, 3))
+    column, row, _ = full.pinhole.project(points)
+    found = camera.pinhole.project(points)
+    x, y, width, height = part
+    assert found[0] == pytest.approx((column - x) * size[0] / width, abs=1e-9 * full_width)
+    assert size[1] - found[1] == pytest.approx((full_height - row - y) * size[1] / height, abs=1e-9 * full_width)
+
+
+def test_three_js_view_offset_says_the_size_and_may_be_cleared():
+    text = CODE["three.js"] + "camera.setViewOffset(1920, 1080, 640, 0, 640, 540);"
+    (camera,) = cameras.read(text, options=Options(size=(300, 200)))
+    assert (camera.pinhole.width, camera.pinhole.height) == (640, 540) and camera.size_stated
+    assert camera.pinhole.principal_point == (320, 0)  # the full picture's middle, from the part's lower left corner
+    (cleared,) = cameras.read(text + "camera.clearViewOffset();", options=GL)
+    assert cleared.pinhole == cameras.read(CODE["three.js"], options=GL)[0].pinhole
+
+
+@pytest.mark.parametrize(
+    ("more", "problem"),
+    [
+        ("camera.setViewOffset(innerWidth * 3, 1080, 0, 0, 640, 540);", "give six plain numbers"),
+        ("camera.setViewOffset(1920, 1080, 0, 0);", "give six plain numbers"),
+        ("camera.setViewOffset(1920, 1080, 0, 0, 0, 540);", "an empty part"),
+        ("camera.setViewOffset(1920, 1080, 0, 0, 1e999, 540);", "number|empty part"),
+        ("camera.setViewOffset(6, 4, 0, 0, 3, 2); camera.setViewOffset(6, 4, 3, 0, 3, 2);", "something else in line"),
+        ("camera.setViewOffset(1920, 1080, 0, 0, 640, 540); camera.aspect = 2;", "another aspect"),
+        ("camera.setFocalLength(50);", "by other means"),
+    ],
+)
+def test_a_view_offset_that_can_not_be_told_is_refused(more, problem):
+    with pytest.raises(InputError, match=problem):
+        cameras.read(CODE["three.js"] + more, options=GL)
+
+
+@pytest.mark.parametrize("point", ["0, 0, 1", "new THREE.Vector3(0, 0, 1)", "[0, 0, 1]"])
+def test_potrees_view_has_its_up_along_z(point):
+    """It was three.js' y."""
+    text = "window.viewer = new Potree.Viewer(area); viewer.setFOV(40);\nviewer.scene.view.position.set(7, -6, 4);\n"
+    (camera,) = cameras.read(text + f"viewer.scene.view.lookAt({point});", options=GL)
+    expected = cameras.read(CODE["three.js"], options=GL)[0].pinhole
+    assert (camera.pinhole.eye, camera.pinhole.look_at, camera.pinhole.up) == ((7, -6, 4), (0, 0, 1), (0, 0, 1))
+    assert camera.pinhole.distance == pytest.approx(expected.distance)
+
+
 def test_three_js_turns_by_the_up_that_all_objects_have():
     text = "camera = new THREE.PerspectiveCamera(40, 2); camera.position.set(1, 2, 3); camera.lookAt(0, 0, 0);"
     (camera,) = cameras.read(f"THREE.Object3D.DEFAULT_UP.set(0, 0, 1); {text}", options=GL)

@@ -16,13 +16,17 @@ quaternions) or computed from what the text does not say is refused.
 **Angles.** Whose unit a program's documentation says is taken so: degrees of the height in gluPerspective, three.js and
 VTK; radians in glm, gl-matrix, Direct3D and Cesium (there of the longer side). Others: texts.angle_of, as of vfov.
 
+**three.js.** setViewOffset is a part of the full picture: its pixels, and its principal point, which lies outside for most.
+Potree's view is three.js' camera whose up is z.
+
 **Textbooks.** The view plane's pixels have the size s and the zoom z magnifies: d · z / s in pixels. roll_angle has no agreed
 sense and is refused unless it is 0.
 
 Sources: the OpenGL reference pages of gluLookAt and gluPerspective; glm's ext/matrix_clip_space.inl; three.js'
-PerspectiveCamera and Object3D.lookAt; VTK's vtkCamera.h and vtkCamera.cxx (WindowCenter, defaults); Shirley's books; Suffern's
-Ray Tracing from the Ground Up, chapters 8 to 10; PyBullet's quickstart guide; PyTorch3D's renderer/cameras.py (degrees of the
-picture's shorter side, a point of view on a sphere about `at` whose pole is y). Rejected: running the code.
+PerspectiveCamera (setViewOffset, updateProjectionMatrix) and Object3D.lookAt; Potree's viewer/View.js; VTK's vtkCamera.h and
+vtkCamera.cxx (WindowCenter, defaults); Shirley's books; Suffern's Ray Tracing from the Ground Up, chapters 8 to 10; PyBullet's
+quickstart guide; PyTorch3D's renderer/cameras.py (degrees of the picture's shorter side, a point of view on a sphere about `at`
+whose pole is y). Rejected: running the code.
 """
 
 import functools
@@ -34,6 +38,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import InputError
+from ..intrinsics import ViewPlane
 from . import axes, own, texts, tokens
 from .camera import Camera, Options, not_a_pinhole
 from .expressions import JOINTS, Degrees, Expressions, Radians, Unknown, numbers
@@ -112,7 +117,7 @@ _ORTHOGRAPHIC = {
 _PYTORCH3D_LOOK = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))  # eye, at and up where they are not given
 _MOVES = {
     "rotatex", "rotatey", "rotatez", "rotateonaxis", "translatex", "translatey", "translatez", "azimuth", "elevation",
-    "dolly", "roll", "yaw", "pitch", "setroll", "orthogonalizeviewup", "applymatrix4", "setviewoffset", "setfocallength",
+    "dolly", "roll", "yaw", "pitch", "setroll", "orthogonalizeviewup", "applymatrix4", "setfocallength",
     "filmoffset", "quaternion", "rotation", "flyto", "setview"
 }  # fmt: skip
 _TURNED = {"rotation", "quaternion", "matrix", "matrixworld", "rotate"}
@@ -130,6 +135,7 @@ _VECTORS = {"eye", "target", "up", "direction"}
 _OF_VTK = re.compile(
     r"SetViewUp|SetFocalPoint|CameraFocalPoint|\bcamera_position\s*=|\bcpos\s*=|\bfocal_point\s*=", re.IGNORECASE
 )
+_OF_POTREE = re.compile(r"\bPotree\b|\bscene\.view\.(?:position|lookAt)\b")
 _LENSES = {"ThinLens", "FishEye", "Fisheye", "Spherical", "Stereo", "StereoCamera", "Orthographic"}
 
 
@@ -144,6 +150,7 @@ class _Said:
     frustum: tuple[float, ...] | None = None
     orthographic: int | None = None
     three: bool = False
+    is_z_up: bool = False  # where no up is said
     is_height_first: bool = False  # in sizes, as in PyTorch3D's
     controls: str | None = None  # of three.js, which turn the camera to their target
 
@@ -340,6 +347,8 @@ class _Code:
             return key
         if sign == "(" and key in _LOOK_AT and not (key == "setlookat" and before):
             return "look_at"
+        if sign == "(" and key in ("setviewoffset", "clearviewoffset"):
+            return key
         if sign == "(" and key in _PERSPECTIVE:
             return "perspective"
         if sign == "(" and key in _FRUSTUM:
@@ -356,7 +365,7 @@ class _Code:
         if bare in _SPECIFIC:
             return _SPECIFIC[bare]
         if self._is_camera(parts[:-1]):
-            if bare in _MOVES:
+            if key in _MOVES or bare in _MOVES:
                 return "moves"
             return _GENERIC.get(bare)
         if bare == "target" and before == "controls":
@@ -408,7 +417,8 @@ class _Code:
     def said(self) -> _Said:
         if len(self.statements) > _MOST_STATEMENTS:
             raise InputError(f"the text says more than {_MOST_STATEMENTS} things of cameras: copy one camera")
-        said = _Said(three=bool(re.search(r"\b(?:THREE|PerspectiveCamera)\b", self.text)))
+        is_potree = bool(_OF_POTREE.search(self.text))
+        said = _Said(three=is_potree or bool(re.search(r"\b(?:THREE|PerspectiveCamera)\b", self.text)), is_z_up=is_potree)
         for at in self._all(*_LENSES):
             if self._words[at + 1] == "*" or self._words[at - 1] == "new":
                 not_a_pinhole("the text's camera", f"a {self._words[at]}")
@@ -472,6 +482,11 @@ class _Code:
                 said.frustum = numbers(tuple(values[:6]), 6) if len(values) >= 6 else None
                 if said.frustum is None:
                     texts.fail(self.text, start, "give six plain numbers for the frustum")
+            elif role == "setviewoffset":
+                values, _, _ = self.reader.arguments(at - 1)
+                self._set(said, "view_offset", numbers(tuple(values), 6) or Unknown(start), start)
+            elif role == "clearviewoffset":
+                said.values.pop("view_offset", None)
             elif role == "orthographic":
                 said.orthographic = start
             elif role == "camera_position":
@@ -755,7 +770,7 @@ def _pose(said: _Said, text: str, options: Options) -> tuple:
             )
     if up is None:
         if said.three or re.search(r"vtk|SetViewAngle|SetFocalPoint|pinhole|set_view_distance", text, re.IGNORECASE):
-            up = (0.0, 1.0, 0.0)
+            up = (0.0, 0.0, 1.0) if said.is_z_up else (0.0, 1.0, 0.0)
         elif base:
             up, notes = base.up, (*notes, "The text does not say which way is up: that of the camera before was taken")
         else:
@@ -841,6 +856,8 @@ def _plane(said: _Said, text: str, options: Options) -> tuple:
         raise InputError(f"the field of view is {math.degrees(radians):g}°: give an angle between 0 and 180")
     if said.three and (zoom := _plain_number(values, "zoom", 1.0, text)) != 1 and zoom > 0:
         radians = 2 * math.atan(math.tan(radians / 2) / zoom)
+    if "view_offset" in values:
+        return _part_of_picture(said, text, options, size, radians)
     film = texts.film(options, what, size, aspect)
     plane = film.plane(radians, axis, name)
     if not film.is_stated and aspect and axis == "x":
@@ -855,6 +872,30 @@ def _plane(said: _Said, text: str, options: Options) -> tuple:
             texts.fail(text, values["window_center"][1], "write the window's centre in numbers")
         c_x, c_top = (1 - shift[0]) / 2 * film.width, (1 + shift[1]) / 2 * film.height
         plane = axes.view_plane(*plane.distance, c_x, c_top, (film.width, film.height))
+    return plane, film.is_stated, film.notes
+
+
+def _part_of_picture(
+    said: _Said, text: str, options: Options, size: tuple[int, int] | None, fov_y: float
+) -> tuple[ViewPlane, bool, tuple[str, ...]]:
+    """The view plane of three.js' setViewOffset(fullWidth, fullHeight, x, y, width, height), x and y from the top left.
+
+    size : of the picture that shows this part; by default its own. fov_y : radians, of the full picture. As of `_plane`.
+    """
+    place = said.values["view_offset"][1]
+    part = _known(said.values, "view_offset", text, "give six plain numbers: fullWidth, fullHeight, x, y, width, height")
+    full_width, full_height, left, top, width, height = map(float, part)
+    if not min(full_width, full_height, width, height) > 0:
+        texts.fail(text, place, "this is an empty part of a picture, give widths and heights above 0")
+    later = said.values.get("aspect", (None, 0))
+    if isinstance(later[0], float) and later[1] > place and abs(later[0] * full_height / full_width - 1) > 1e-6:
+        texts.fail(text, later[1], "setViewOffset has set another aspect before, leave this out")
+    is_whole = width.is_integer() and height.is_integer() and max(width, height) < 2**31
+    film = texts.film(options, "the text", size or ((int(width), int(height)) if is_whole else None))
+    across, along = film.width / width, film.height / height  # pixels of the picture in one of the part's
+    distance = full_height / 2 / math.tan(fov_y / 2)
+    c_x, c_top = (full_width / 2 - left) * across, (full_height / 2 - top) * along
+    plane = axes.view_plane(distance * across, distance * along, c_x, c_top, (film.width, film.height))
     return plane, film.is_stated, film.notes
 
 
