@@ -1,4 +1,4 @@
-"""What `import viewcam_addon as vp` gives: a camera, a picture traced of a scene, and what two pictures differ by.
+"""The functions of `import viewcam_addon as vp`: a camera, a picture traced of a scene, and what two pictures differ by.
 
 Everything here takes what is in memory or the path of a file, and gives what is in memory; the command line is made of the same
 functions. Nothing here needs Blender. Where Blender is a module of this process,
@@ -86,7 +86,7 @@ def label(
     next: Scene | File | None = None,
     threads: int | None = None,
 ) -> "Labels":
-    """What is true of a scene's picture, exact at the centre of each pixel.
+    """The ground truth of a scene's picture, exact at the centre of each pixel.
 
     scene : or the path of a scene file, as the others. labels : some of "depth", "normals", "position", "masks", "amodal",
     "flow" and "coverage"; docs/labels.md says what each brings. previous, next : the frames before and after, for "flow".
@@ -118,7 +118,7 @@ def compare(
     keeper: tracing.Keeper | None = None,
     may_be_empty: bool = False,
 ) -> "GeometryComparison | RadianceComparison":
-    """What a picture differs from the tracer's by, how much, and whether it is explained.
+    """The comparison of a picture with the tracer's: what differs, by how much, and whether it is explained.
 
     reference : the tracer's, of `render` or an EXR. tests : Cycles', say; several of different seeds where there is noise.
     scene : what the reference shows, with which pixels on edges are traced again. Without it none of them is explained.

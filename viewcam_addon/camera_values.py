@@ -132,7 +132,7 @@ class CameraValues:
         return replace(self, distance=distance / self.growth(frame, sensor_fit) / self.zoom)
 
     def rolled(self, angle: float, up_axis: Triple, held: float) -> "CameraValues":
-        """The same view with the roll that `roll_from` says: another up, or where it is held another held roll.
+        """This view with the roll that `roll_from` says: another up, or where it is held another held roll.
 
         Raises
         ------

@@ -69,7 +69,7 @@ def ensure_registered() -> None:
 
 
 def unregister() -> None:
-    """The same, in reverse."""
+    """Take away what `register` added, in reverse."""
     import bpy
 
     for room in reversed(_rooms()):

@@ -544,7 +544,8 @@ def _as_followed(camera_object: bpy.types.Object, eye: Triple, look_at: Triple) 
 
 
 def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use: bool) -> Pinhole:
-    """What `adopt` states, unstated: the camera as it stands, with a look-at point and an up that people would choose.
+    """The pinhole that `adopt` states, unstated: the camera as it stands, with a look-at point and an up that people would
+    choose.
 
     in_use : whether the look-at point has the distance from the eye that the values say, if they say any.
 

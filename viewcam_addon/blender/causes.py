@@ -32,17 +32,17 @@ _DECIDES = {
 
 
 def decided_by(names: Iterable[str]) -> frozenset[str]:
-    """Those of EYE, VIEW and DISTANCE that values, by their names, decide."""
+    """The parts of EYE, VIEW and DISTANCE that values, by their names, decide."""
     return frozenset().union(*(_DECIDES.get(name, frozenset()) for name in names))
 
 
 def decided_by_values(camera_object: bpy.types.Object) -> frozenset[str]:
-    """Those of EYE, VIEW and DISTANCE that keyframes, drivers or targets of the four values decide at every frame."""
+    """The parts of EYE, VIEW and DISTANCE that keyframes, drivers or targets of the four values decide at every frame."""
     return decided_by(datablocks.animated_values(camera_object))
 
 
 def held(camera_object: bpy.types.Object) -> set[str]:
-    """Those of EYE, VIEW, DISTANCE and CENTRE that the values can't follow as the camera is moved.
+    """The parts of EYE, VIEW, DISTANCE and CENTRE that the values can't follow as the camera is moved.
 
     A library's, which would not be saved, and what the animation of the values decides and something else as well.
     """
@@ -56,7 +56,7 @@ def held(camera_object: bpy.types.Object) -> set[str]:
 
 
 def followed(camera_object: bpy.types.Object) -> dict[str, str]:
-    """Those of EYE, VIEW and DISTANCE that something else than the artist places at every frame: the name → one word why.
+    """The parts of EYE, VIEW and DISTANCE that something else than the artist places at every frame: the name → one word why.
 
     The values follow it there, and an edit of them would not last.
     """
@@ -78,7 +78,8 @@ _LIMITING = ("LIMIT_LOCATION", "LIMIT_ROTATION", "LIMIT_SCALE", "LIMIT_DISTANCE"
 
 
 def fed(camera_object: bpy.types.Object) -> frozenset[str]:
-    """Those of EYE and VIEW that a constraint makes of the camera's own channels and adds to: to set them would move it on."""
+    """The parts of EYE and VIEW that a constraint makes of the camera's own channels and adds to: to set them would move it
+    on."""
     adding = [
         constraint
         for constraint in pose.active_constraints(camera_object)
@@ -89,7 +90,7 @@ def fed(camera_object: bpy.types.Object) -> frozenset[str]:
 
 
 def may_move(camera_object: bpy.types.Object, parts: Collection[str]) -> bool:
-    """Whether Blender may move one of these parts of the camera from frame to frame: a quick look, and no verdict."""
+    """True if Blender may move one of these parts of the camera from frame to frame: a quick look, and no verdict."""
     if EYE in parts or VIEW in parts:
         return True
     return DISTANCE in parts and camera_object.data.animation_data is not None
@@ -139,7 +140,7 @@ def _channel(data_path: str) -> tuple[str | None, str]:
 
 
 def _paths(curves: list[bpy.types.FCurve]) -> list[str]:
-    """What the curves that are not muted set."""
+    """The paths of the properties that the curves which are not muted set."""
     return sorted({curve.data_path for curve in curves if not versions.is_muted(curve)})
 
 

@@ -204,7 +204,7 @@ def restored(camera_object: bpy.types.Object, *names: str) -> Iterator[None]:
 
 
 def _as_shown(vector: tuple[float, ...]) -> tuple[float, ...]:
-    """What the property of a vector holds: 0 for what is less than a float32 step of its largest number, and no −0.
+    """The numbers that the property of a vector holds: 0 for what is less than a float32 step of its largest number, and no −0.
 
     Such a remainder of a rotation or of an axis conversion would be shown as −0 m; `exact` keeps it.
     """
@@ -214,7 +214,7 @@ def _as_shown(vector: tuple[float, ...]) -> tuple[float, ...]:
 
 @functools.lru_cache(maxsize=256)
 def _shown_values(numbers: tuple[float, ...]) -> tuple[float, ...]:
-    """What the properties hold where the ten numbers of `exact` are stored."""
+    """The numbers that the properties hold where the ten numbers of `exact` are stored."""
     shown = [*_as_shown(numbers[0:3]), *_as_shown(numbers[3:6]), *_as_shown(numbers[6:9]), numbers[9]]
     with np.errstate(over="ignore"):
         return tuple(np.array(shown, dtype=np.float32).tolist())

@@ -61,7 +61,8 @@ def without_first_sample(samples: int) -> dict[str, object]:
 
 
 def stored_properties(owner: bpy.types.bpy_struct) -> Any:
-    """What the add-on's properties of an owner hold, by name. What is set here calls nothing, and no evaluation follows it."""
+    """The values of the add-on's properties of an owner, by name. What is set here calls nothing, and no evaluation follows
+    it."""
     return owner if bpy.app.version < (5, 0) else owner.bl_system_properties_get(do_create=True)
 
 

@@ -238,7 +238,7 @@ def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
 
 @contextlib.contextmanager
 def _told_of_damage(source: Source, title: str) -> Iterator[None]:
-    """What no reader thought of in the block as a sentence, with its cause."""
+    """A context that turns what no reader thought of into a sentence, with its cause."""
     try:
         yield
     except InputError as error:

@@ -271,7 +271,7 @@ class _Code:
                 end = _end_of(self.text, tokens.token(self.text, end).start)
 
     def _bracket(self, opened: int, depth: int) -> "tuple[list | None, int]":
-        """What stands in brackets: numbers, or rows of them; rows None if one is computed."""
+        """The content of brackets: numbers, or rows of them; rows None if one is computed."""
         close = _end_of(self.text, opened) - 1
         if depth > 3 or close - opened > 4_000:
             return None, close + 1

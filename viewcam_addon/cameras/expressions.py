@@ -56,7 +56,7 @@ _TO_DEGREES = {"degrees", "todegrees", "rad2deg", "radtodeg", "radianstodegrees"
 
 
 class Unknown:
-    """What can't be computed: it shows where it stands, if somebody needs it."""
+    """A value that can't be computed: it shows where it stands, if somebody needs it."""
 
     def __init__(self, at: int) -> None:
         self.at = at
@@ -92,7 +92,7 @@ class Expressions:
             return Unknown(at), at
 
     def arguments(self, opened: int) -> tuple[list, dict[str, object], int]:
-        """What stands in the brackets that open at a place: values, named values, and where the brackets end."""
+        """The content of the brackets that open at a place: values, named values, and where the brackets end."""
         try:
             return self._list(opened, 0)
         except _Failed:
@@ -128,7 +128,7 @@ class Expressions:
         return self._single(first, depth)
 
     def _after_cast(self, first: tokens.Token) -> tokens.Token:
-        """What stands behind (float), if that is there and something stands behind it."""
+        """The token behind (float), if that is there and something stands behind it."""
         if first.text != "(":
             return first
         kind = self._token(first.end)

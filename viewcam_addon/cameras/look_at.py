@@ -141,7 +141,7 @@ _LENSES = {"ThinLens", "FishEye", "Fisheye", "Spherical", "Stereo", "StereoCamer
 
 @dataclass
 class _Said:
-    """What a text says: role → (value, place), and the events whose order counts."""
+    """The statements of a text: role → (value, place), and the events whose order counts."""
 
     values: dict[str, tuple[object, int]] = field(default_factory=dict)
     mirrored: bool = False
@@ -174,7 +174,7 @@ def recognises(source: Source) -> bool:
 
 @functools.lru_cache(maxsize=1)
 def _code(text: str) -> "_Code":
-    """What is recognised is then read."""
+    """The text as code, of which what is recognized is then read."""
     return _Code(text)
 
 
@@ -238,7 +238,7 @@ class _Code:
                 self.assigned.setdefault(parts[-1], []).append(place + (sign == "="))
 
     def _is_set(self, at: int) -> bool:
-        """Whether what stands before a word gets a value by it: =, += …"""
+        """True if what stands before a word gets a value by it: =, += …"""
         return self._words[at] == "=" or (self._words[at] in _CHANGES_BY and self._words[at + 1] == "=")
 
     def _path(self, first: int) -> tuple[list[str], int]:
@@ -322,7 +322,7 @@ class _Code:
         return False
 
     def _role(self, parts: list[str], sign: str) -> str | None:
-        """What a statement says of a camera; None if nothing."""
+        """The role of a statement in placing a camera; None if it has none."""
         key = (sign, *parts)
         if key not in self._roles:
             self._roles[key] = self._found_role(parts, sign)
@@ -378,7 +378,7 @@ class _Code:
         return any(part in self._cameras or called.search(part) for part in parts)
 
     def _name(self, path: str) -> object:
-        """What a name stands for: the one value that it is given."""
+        """The value of a name: the one that it is given."""
         last = re.split(r"\.|->|::", path)[-1]
         if path == "scene.position" and not re.search(r"\bscene\.position\.", self.text):
             return (0.0, 0.0, 0.0)  # three.js
@@ -669,7 +669,7 @@ class _Code:
 
 
 def _only(value: object) -> object:
-    """What stands alone in brackets, as in PyTorch3D's batches of one; else the value itself."""
+    """The value that stands alone in brackets, as in PyTorch3D's batches of one; else the value itself."""
     return value[0] if isinstance(value, tuple) and len(value) == 1 else value
 
 

@@ -170,23 +170,23 @@ def _first(values: Mapping[str, Any], names: Sequence[str]) -> Any:
 
 
 def says_intrinsics(values: Mapping[str, Any]) -> bool:
-    """Whether one of the values is K, whether its numbers are known or not."""
+    """True if one of the values is K, whether its numbers are known or not."""
     k = _first(values, _K)
     return k is not None and (not isinstance(k, list | dict) or _is_camera(values))
 
 
 def is_of_pose(name: str) -> bool:
-    """Whether a plain name is that of a pose, or of a part of one."""
+    """True if a plain name is that of a pose, or of a part of one."""
     return name in (*_R, *_RVEC, *_T, *_EXTRINSIC, *_OTHER_POSE)
 
 
 def is_size(name: str) -> bool:
-    """Whether a plain name is that of the picture's size, or of one side."""
+    """True if a plain name is that of the picture's size, or of one side."""
     return name in (*_WIDTH, *_HEIGHT, *_SIZE)
 
 
 def is_known(name: str) -> bool:
-    """Whether a plain name is that of anything that a camera has."""
+    """True if a plain name is that of anything that a camera has."""
     return is_of_pose(name) or is_size(name) or name in (*_K, *_DISTORTION)
 
 
@@ -472,7 +472,7 @@ def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.nd
 
 
 def _is_whole(name: str, values: Mapping[str, Any]) -> bool:
-    """Whether a name has a whole pose, if it may have, and not a translation alone."""
+    """True if a name has a whole pose, if it may have, and not a translation alone."""
     if name not in _T:
         return name in values
     value = values.get(name)

@@ -37,7 +37,7 @@ _ENCODINGS = {  # as Python calls them
     *("shift_jis", "cp932", "euc_jp", "euc_kr", "cp949", "gb2312", "gbk", "gb18030", "big5"),
 }
 _UTF_16 = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"<\0?\0": "utf-16-le", b"\0<\0?": "utf-16-be"}
-"""What a text in UTF-16 begins with: a byte order mark, or XML's declaration without one."""
+"""The beginnings of texts in UTF-16: a byte order mark, or XML's declaration without one."""
 
 
 class Source:

@@ -59,7 +59,7 @@ def number(word: str) -> float | None:
 
 
 def string(text: str, at: int) -> tuple[str, int] | None:
-    """What stands between the quotes of which the first is at a place, and where it ends; None if its line has no second."""
+    """The text between the quotes of which the first is at a place, and where it ends; None if its line has no second."""
     found = _STRING[text[at]].match(text, at)
     return (found[1], found.end()) if found and found[2] else None
 

@@ -254,7 +254,7 @@ def _job(options: argparse.Namespace) -> Any:
 
 
 def ledger_lines(ledger: Sequence[dict[str, str]]) -> list[str]:
-    """What of a scene is modelled, for a terminal. ledger : as --json has it."""
+    """The ledger of a scene, for a terminal. ledger : as --json has it."""
     exported = sum(entry["status"] == "exported" for entry in ledger)
     rest = [f"  {entry['status']}: {entry['object']}: {entry['reason']}" for entry in ledger if entry["status"] != "exported"]
     return [f"{exported} of {len(ledger)} objects exported whole", *rest] if ledger else []

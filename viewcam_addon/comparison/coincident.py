@@ -21,7 +21,7 @@ from .sides import Sides, values_of
 from .tolerances import Array
 
 SAMPLES = 64
-"""Of each pixel: what they leave uncertain counts as noise of the reference."""
+"""The samples of each pixel: what they leave uncertain counts as noise of the reference."""
 
 # Of a pixel's light, from which on the pixel says nothing of the rest. Less is a tolerance. Chosen: with a smaller share more
 # pixels are taken out that could still tell larger faults, with a larger one some stay that can tell nothing else.
@@ -46,7 +46,7 @@ class CoincidentLight:
         return np.maximum(values, noise.mean_around(values)).max(axis=-1)
 
     def rest(self, combined: Sides) -> "Rest":
-        """What is left of a comparison without the pixels of which this light is a share to speak of."""
+        """The rest of a comparison without the pixels of which this light is a share to speak of."""
         light = self.of(combined)
         return Rest(self, (light > 0.0) & (light >= _SHARE * combined.reference.max(axis=-1)))
 
@@ -76,7 +76,7 @@ MakeCoincidentLight = Callable[[], CoincidentLight]
 
 @dataclass(frozen=True, eq=False)
 class TakenOut:
-    """What was taken out of a comparison of light.
+    """The pixels that were taken out of a comparison of light.
 
     pixels : (height, width) bool, that show surfaces in one place, or are lit by them. pairs : as of CoincidentLight.
     """

@@ -119,7 +119,7 @@ class SurfaceAgreement:
         return replace(self, across=self.across[chosen], slopes=slopes)
 
     def slope(self, expected: Seen, name: str) -> Array:
-        """That of a pass: the surface's own, where it is known."""
+        """The slope of a pass: the surface's own, where it is known."""
         own = expected.get(f"{name} Slope")
         return self.slopes[name] if own is None else own[..., 0]
 
@@ -256,8 +256,8 @@ NOWHERE = InOnePlace(np.empty(0, np.intp), np.empty(0, np.intp), np.empty((0, 2)
 def settle(
     kinds: NDArray, expected: Seen, seen: Seen, agreement: SurfaceAgreement, lonely: NDArray[np.bool_], surfaces_at: SurfacesAt
 ) -> tuple[NDArray, Seen, SurfaceAgreement, InOnePlace]:
-    """What the scene tells of pixels that differ, at their centres: how steep the surface itself is, and what else is in its
-    place.
+    """Settle pixels that differ by what the scene tells at their centers: how steep the surface itself is, and what else is in
+    its place.
 
     kinds : of all pixels, as `kinds_of` has them. lonely : those whose slopes the picture does not tell.
 

@@ -23,7 +23,7 @@ _WHOLE = ("frame", "samples", "seed", "threads")
 
 @dataclass(frozen=True)
 class Check:
-    """What `check` has found, or a comparison of files.
+    """The result of `check`, or of a comparison of files.
 
     passed : whether Cycles renders the camera, or the pictures are the same. sentence : by how much. figures : all that --json
     writes. answer : one of "same", "same_but" (the same, but for objects that are not modelled) and "different".
@@ -46,7 +46,7 @@ def check(
     difference: File | None = None,
     **options: Any,
 ) -> Check:
-    """Whether Cycles renders what a .blend file says: `check("shot.blend", camera="Camera", frame=24, level="direct")`.
+    """Check that Cycles renders what a .blend file says: `check("shot.blend", camera="Camera", frame=24, level="direct")`.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def compare(
     difference: File | None = None,
     strict: bool = False,
 ) -> Check:
-    """Whether EXRs of one camera are the same picture, in a process of its own; see tracing.compare_files.
+    """Compare EXRs of one camera, in a process of its own; see tracing.compare_files.
 
     channels : by pass, or as the command line has them. report : a folder for the HTML page. difference : a PNG.
     strict : whether pictures that are the same but for what is not modelled fail.

@@ -254,7 +254,7 @@ class _Flight:
             raise _LostError("all workers are gone: start some, and continue with --resume")
 
     def _outcome(self, future: Any, shot: Job) -> Outcome | None:
-        """What became of the shot; None if it flies on."""
+        """The outcome of the shot; None if it flies on."""
         with _scheduler_asked():
             try:
                 said = future.result(timeout=_ANSWER_WITHIN)
@@ -282,7 +282,7 @@ class _Flight:
         return None
 
     def _refused(self, error: Exception, future: Any, shot: Job) -> Outcome | None:
-        """What an error means that is Dask's."""
+        """The outcome of an error that is Dask's."""
         if isinstance(error, ImportError):
             raise _LostError(f"a worker can't load viewcam ({error}): pip install virtual-pinhole there") from error
         if type(error).__name__ != "KilledWorker":
@@ -325,7 +325,7 @@ def _distributed() -> Any:
 
 
 def _credentials(distributed: Any) -> Any:
-    """Of this cluster alone, made anew."""
+    """The credentials of this cluster alone, made anew."""
     try:
         return distributed.Security.temporary()
     except ImportError:

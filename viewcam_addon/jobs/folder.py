@@ -26,7 +26,7 @@ _TEMPORARY = re.compile(r"\.(.+)-[0-9a-f]{8}\.(?:exr|png|json|html|txt|labels)")
 
 @dataclass(frozen=True)
 class Outputs:
-    """What a batch makes of each shot, beside its sidecar.
+    """The files that a batch makes of each shot, beside its sidecar.
 
     picture : EXR and preview. check : whether it is compared with the tracer: of a picture its geometry, else the job's engine
     at its level. labels : kinds of labels.KINDS. depth_steps : of the labels' 16-bit depth, in a scene unit. report : whether a
@@ -119,7 +119,7 @@ class Folder:
         return record if _is_sidecar(record, name) else None
 
     def _sizes(self, name: str, record: Mapping[str, Any]) -> dict[str, int]:
-        """Of the files that a sidecar tells of, by what `bytes` calls them."""
+        """The sizes of the files that a sidecar tells of, by what `bytes` calls them."""
         paths = {"image": self.image(name), "preview": self.preview(name)} if "image" in record else {}
         paths |= {file: self.path / file for file in _files_beside(record)}
         return {key: path.stat().st_size for key, path in paths.items()}
@@ -182,7 +182,7 @@ def _are_labels(told: Any, name: str) -> bool:
 
 
 def _are_files(told: Any, name: str) -> bool:
-    """Whether a list of a sidecar is of files of its shot, which no other folder has."""
+    """True if a list of a sidecar is of files of its shot, which no other folder has."""
     return isinstance(told, list) and all(
         isinstance(file, str) and file.startswith(f"{name}.") and _is_file_name(file) for file in told
     )

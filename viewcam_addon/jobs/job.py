@@ -1,4 +1,5 @@
-"""What is to be rendered or checked, and how: one record, which command line, panel, Python, tests and workers make alike.
+"""The job: what is to be rendered or checked, and how, one record, which command line, panel, Python, tests and workers make
+alike.
 
 `FIELDS` has the check of each value alone, `conflicts` what values can't be together. A Job raises the first problem; a list
 of jobs (rows.py) asks both for all problems there are, with the place of each. To JSON and back is here and nowhere else.
@@ -122,7 +123,7 @@ class Job:
 
     @property
     def is_of_scenes_camera(self) -> bool:
-        """Whether the scene's own camera takes the picture."""
+        """True if the scene's own camera takes the picture."""
         return self.camera is None and self.eye is None
 
     def refuse_unchecked(self) -> None:
@@ -163,7 +164,7 @@ class Job:
 
 
 def conflicts(values: Mapping[str, object], in_list: bool = False) -> list[tuple[tuple[str, ...], str]]:
-    """What the values of one job can't be together: (fields, sentence) of each problem.
+    """The conflicts among the values of one job: (fields, sentence) of each problem.
 
     values : what is stated, by field; None where it is wrong already, and no more is to be told of it. in_list : whether it is
     one of several, which needs a name, and a camera that is not the scene's own.

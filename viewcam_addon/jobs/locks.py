@@ -32,7 +32,7 @@ _UNKNOWN = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.E
 
 
 class Claims:
-    """What a batch has claimed in its folder, a context manager.
+    """The claims of a batch in its folder, a context manager.
 
     One at a time for each folder in a process: locks of this kind are the process's, and end with the first to be closed.
 

@@ -170,5 +170,5 @@ def _count(count: int) -> int:
 
 
 def _digits(largest: int) -> int:
-    """Of the numbers in names, so that files sort as these do."""
+    """The digits of the numbers in names, so that files sort as these do."""
     return max(3, len(str(largest)))

@@ -1,4 +1,4 @@
-"""What a shot may be called: its name is that of its files, on Linux, Windows and macOS alike.
+"""The names that shots may have: a name is that of its files, on Linux, Windows and macOS alike.
 
 A batch may be listed on one system and rendered on another, so the rules of all three hold everywhere. Rejected: replacing
 what is not allowed (two shots could become one file, and nobody finds the picture by the name that he gave).
@@ -14,7 +14,7 @@ from ..errors import InputError
 LONGEST = 200
 
 OWN = ("summary", "contact-sheet", "transforms")
-"""What a batch calls its own files; a part of one adds to each which part it is."""
+"""The names of a batch's own files; a part of one adds to each which part it is."""
 
 _PART = re.compile(r"-\d+-of-\d+$", re.ASCII)
 
@@ -52,7 +52,7 @@ def made_fit(name: str) -> str:
 
 
 def one_file(name: str) -> str:
-    """The same text for all names that are one file on Windows or macOS: upper and lower case, letters composed or not."""
+    """One text for all names that are one file on Windows or macOS: upper and lower case, letters composed or not."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFD", name).casefold())
 
 

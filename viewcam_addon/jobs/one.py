@@ -25,7 +25,7 @@ and ask again.
 
 _MOMENT = 0.2  # seconds
 _KEPT = ("passed", "answer", "verdict", "figures", "not_modelled", "ledger", "level")
-"""What a sidecar keeps of a check."""
+"""The keys of a check that a sidecar keeps."""
 
 
 class Renderer(Protocol):
@@ -140,7 +140,7 @@ def render_one(shot: Job, folder: Folder, renderer: Renderer, settings: str, out
 
 
 def _checked(job: Job, renderer: Renderer, has_picture: bool, folder: Path | None) -> dict[str, Any]:
-    """What a sidecar keeps of a check. folder : receives its page and a thumbnail, NAME.html and NAME.test.png."""
+    """The part of a check that a sidecar keeps. folder : receives its page and a thumbnail, NAME.html and NAME.test.png."""
     if folder is None:
         found = renderer.check(job, has_picture)
         return {"check": {key: found[key] for key in _KEPT if key in found}}

@@ -26,7 +26,7 @@ class ShotsError(InputError):
 
 
 class Problems:
-    """What was found so far, each sentence once."""
+    """The problems found so far, each sentence once."""
 
     def __init__(self, source: str) -> None:
         self._source = source

@@ -150,7 +150,7 @@ class ServedRenderer:
 
 
 def _blender() -> tuple[str, list[str], Mapping[str, str]]:
-    """What sentences call the Blender, the command that makes it serve, and its variables."""
+    """The name of the Blender in sentences, the command that makes it serve, and its variables."""
     program = os.environ.get(BLENDER)
     if program:
         return program, [program, "-b", "--disable-autoexec", "--command", "viewcam", "serve"], os.environ

@@ -48,7 +48,7 @@ class Row:
     excused: frozenset[str] = frozenset()
 
     def place_of(self, fields: Iterable[str]) -> str:
-        """What a sentence calls these fields of the row."""
+        """The name in sentences of these fields of the row."""
         columns = [column for name in fields for column in self._columns_of(name)]
         return f"{self.place}, {self.kind}{'s' if len(columns) > 1 else ''} {', '.join(columns)}"
 

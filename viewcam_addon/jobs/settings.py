@@ -1,4 +1,4 @@
-"""What a picture was made from, as one number: the same settings give the same hash, on every machine and in every version.
+"""A hash of what a picture was made from: the same settings give the same hash, on every machine and in every version.
 
 Rejected: Python's hash (another in each process), pickle (another in each version), and floats of so many digits, of which
 two may be one.

@@ -40,7 +40,7 @@ def picture(result: Result) -> str:
 
 
 def facts(record: Mapping[str, Any]) -> list[str]:
-    """What a shot's sidecar says of it, a few words each: file, camera, frame, size, lens and angle of view."""
+    """The facts of a shot's sidecar, a few words each: file, camera, frame, size, lens and angle of view."""
     rendered, camera, blender = (_part(record, name) for name in ("rendered", "camera", "blender"))
     told = [str(rendered["file"])] if rendered.get("file") else []
     name = rendered.get("camera")
@@ -62,7 +62,7 @@ def facts(record: Mapping[str, Any]) -> list[str]:
 
 
 def verdict(result: Result) -> str:
-    """What became of a shot's check, in the words of the panel's proof."""
+    """The verdict of a shot's check, in the words of the panel's proof."""
     check = result.check
     if not check:
         return "not checked"
@@ -103,7 +103,7 @@ def write(path: Path, pictures: Sequence[str], counts: Mapping[str, int]) -> Non
 
 
 def _answer(counts: Mapping[str, int]) -> str | None:
-    """What the page's head shows: the worst of all answers, or none where nothing went wrong and nothing was checked."""
+    """The answer at the page's head: the worst of all answers, or none where nothing went wrong and nothing was checked."""
     if counts["done"] < counts["shots"] or counts["checks_failed"]:
         return DIFFERENT
     if counts["not_all_modelled"]:

@@ -1,4 +1,4 @@
-"""What a batch came to: each shot as the folder has it at the end, the counts, the exit status."""
+"""The summary of a batch: each shot as the folder has it at the end, the counts, the exit status."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -24,12 +24,12 @@ class Result:
 
     @property
     def check(self) -> Mapping[str, Any] | None:
-        """What the check found; None where there was none."""
+        """The result of the check; None where there was none."""
         return self.record.get("check") if self.record else None
 
     @property
     def answer(self) -> str | None:
-        """What the check came to, one of comparison/answer.py's; None where there was none. Older sidecars have none."""
+        """The answer of the check, one of comparison/answer.py's; None where there was none. Older sidecars have none."""
         if not self.check:
             return None
         answer = self.check.get("answer")
@@ -72,8 +72,8 @@ class Summary:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Of the shots: all, done, failed, left, those that were checked, those whose check failed, and those of which it says
-        that not all in the picture is modelled."""
+        """The numbers of shots: all, done, failed, left, those that were checked, those whose check failed, and those of which
+        it says that not all in the picture is modelled."""
         states = Counter(shot["state"] for shot in self.shots)
         answers = Counter(shot["answer"] for shot in self.shots if "answer" in shot)
         return {

@@ -92,7 +92,7 @@ def _cells(line: _Line, separator: str, problems: Problems) -> list[str] | None:
 
 
 def _value(column: str, text: str) -> object:
-    """What a cell says: text, a number or a list of them; what is no number stays text, and is refused as such."""
+    """The value of a cell: text, a number or a list of them; what is no number stays text, and is refused as such."""
     if column in rows.TEXTS:
         return text
     if column in rows.LISTS:

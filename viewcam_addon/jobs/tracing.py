@@ -52,7 +52,7 @@ class Written:
 
 
 def lacking() -> str | None:
-    """What a check or a label needs and does not find here, as a sentence; its search path is ours."""
+    """The package that a check or a label needs and does not find here, as a sentence; its search path is ours."""
     if importlib.util.find_spec("OpenEXR") is None:
         return "checks and labels need OpenEXR: install the extension from its zip, or pip install OpenEXR"
     return None
@@ -128,7 +128,8 @@ class Tracing(child_process.ServerOnDemand):
 
     @staticmethod
     def frame(scene: Path, camera: Pinhole, clip: tuple[float, float]) -> dict[str, Any]:
-        """What is seen at a frame. scene : a file; the same path is the same scene. camera, clip : whatever the file's are."""
+        """The frame as the camera sees it. scene : a file; the same path is the same scene. camera, clip : whatever the file's
+        are."""
         return {"scene": str(scene), "camera": dataclasses.asdict(camera), "clip": list(clip)}
 
     def label(
@@ -195,7 +196,7 @@ def compare_files(
 
 
 class _Server:
-    """What the process keeps from question to question."""
+    """The state that the process keeps from request to request."""
 
     def __init__(self) -> None:
         from ..labels.surfaces import Keepers
@@ -302,7 +303,7 @@ def _told(
     written: Written,
     everything: str | None = None,
 ) -> dict[str, Any]:
-    """What is told of a comparison, once its files are written."""
+    """The answer about a comparison, once its files are written."""
     from .. import image
     from ..comparison import difference, light_report, report
     from ..comparison.light_verdict import RadianceComparison

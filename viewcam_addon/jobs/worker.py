@@ -1,4 +1,5 @@
-"""What a worker of the cluster runs: one shot at a time, by a Blender that it keeps open from shot to shot and batch to batch.
+"""The function that a worker of the cluster runs: one shot at a time, by a Blender that it keeps open from shot to shot and
+batch to batch.
 
 A worker's process is Python's alone, so that it goes on when Blender crashes, and so that Blender ends when it is killed. It
 tells what it did in words that both sides have; the shot itself stands in the folder, which both sides see.

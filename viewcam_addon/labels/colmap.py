@@ -120,7 +120,7 @@ def _planes(path: Path, told: Document, states: dict[str, int]) -> tuple[Array, 
 
 
 def _has_no_points(folder: Path) -> bool:
-    """Whether a folder holds a text model that lacks nothing but points, and nothing else."""
+    """True if a folder holds a text model that lacks nothing but points, and nothing else."""
     if {path.name for path in folder.iterdir()} != {*colmap.TEXTS}:
         return False
     with open(folder / "points3D.txt", encoding="utf-8", errors="replace") as lines:

@@ -31,9 +31,10 @@ MOST_SAMPLES = 2**24
 CENTRES = ("Depth", "Object Index")
 """The passes that tell what is at the pixels' centres, at the levels of light."""
 SLOPES = ("UV Slope", "Normal Slope")
-"""What `Tracer.surfaces_at` has beside the passes of level `geometry`."""
+"""The passes that `Tracer.surfaces_at` has beside the passes of level `geometry`."""
 WITHIN = 1e-3
-"""Of a depth: as far as float32's roundings carry a surface in any picture that is worth comparing."""
+"""The part of a depth within which surfaces are listed: as far as float32's roundings carry a surface in any picture that is
+worth comparing."""
 PASSES = {name: len(CHANNELS[name]) for name in GEOMETRY_PASSES}
 """The passes of level `geometry` and their numbers of channels."""
 
@@ -203,7 +204,7 @@ class Tracer:
 
     @functools.cached_property
     def _names(self) -> NDArray[np.object_]:
-        """Of each placed object, and "" last."""
+        """The name of each placed object, and "" last."""
         names = [placed.name for placed in self._scene.objects for _ in placed.matrices]
         return np.array([*names, ""], dtype=object)
 

@@ -180,7 +180,8 @@ class Checker:
 
 
 def _numbered(scene_path: str | None) -> tuple[str, ...]:
-    """What of a .blend must be numbered for its picture to be an approved scene's: what has numbers there, else all."""
+    """The kinds of blocks of a .blend that must be numbered for its picture to be an approved scene's: what has numbers there,
+    else all."""
     if scene_path is None:
         return "objects", "materials"
     objects = scene_file.read(Path(scene_path)).objects
@@ -192,7 +193,7 @@ def _numbered(scene_path: str | None) -> tuple[str, ...]:
 
 
 def _brief(found: dict[str, Any], ledger: Sequence[LedgerEntry]) -> dict[str, Any]:
-    """What a sidecar keeps of a comparison."""
+    """The part of a comparison that a sidecar keeps."""
     lacking = [f"{entry.object}: {entry.reason}" for entry in ledger if not entry.is_modelled]
     more = [f"and {len(lacking) - _MOST_TOLD} more, which viewcam check tells"] if len(lacking) > _MOST_TOLD else []
     told = {key: found[key] for key in ("passed", "answer", "not_modelled", "figures")}

@@ -1,4 +1,4 @@
-"""What of the file's settings jobs change for their time, and why.
+"""The settings of the file that jobs change for their time, and why.
 
 **For all of it.** One camera must be had: stereoscopy and the sequencer's strips would choose others, and markers are bound to
 cameras only while the scene's own is wanted, which Blender then chooses as it does in an animation.
@@ -133,7 +133,7 @@ class JobSettings:
             persistent_data.drop(self._scene)
 
     def _said(self, shot: Job) -> Iterator[tuple[tuple[bpy.types.bpy_struct, str], object]]:
-        """What a shot sets, by owner and name of the property."""
+        """The values that a shot sets, by owner and name of the property."""
         scene, render = self._scene, self._scene.render
         engine = self.engine_of(shot)
         yield (render, "engine"), engine
@@ -165,7 +165,7 @@ class JobSettings:
         yield scene.virtual_pinhole_reference, "level"
 
     def rendered(self, by_engine: bool = True) -> dict[str, object]:
-        """What the scene is set to, as a sidecar says it; None where the engine has no such thing.
+        """The settings of the scene, as a sidecar says them; None where the engine has no such thing.
 
         by_engine : whether there is a picture, of which the engine knows more.
         """
@@ -197,7 +197,7 @@ def _samples(scene: bpy.types.Scene) -> dict[str, tuple[bpy.types.bpy_struct, st
 
 
 def _seeds(scene: bpy.types.Scene) -> dict[str, bpy.types.bpy_struct]:
-    """What has the seed, by engine. EEVEE has none."""
+    """The block that has the seed, by engine. EEVEE has none."""
     found = {"VIEWCAM": scene.virtual_pinhole_reference}
     return found | ({"CYCLES": scene.cycles} if hasattr(scene, "cycles") else {})
 

@@ -62,7 +62,7 @@ class ShotLabels:
         return self._tracing.label(frames, picture, kinds, depth_steps, job.threads)
 
     def _seen(self, scene: bpy.types.Scene, camera_object: bpy.types.Object, pinhole: Pinhole | None) -> dict[str, Any]:
-        """What the tracer's process is told of the scene at its frame."""
+        """The request of the tracer's process about the scene at its frame."""
         with staged(Job(), scene, camera_object, whole=True) as stage:
             export = self._files.exported(stage)
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data

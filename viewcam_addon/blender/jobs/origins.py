@@ -1,4 +1,4 @@
-"""What a batch's pictures are made from: the .blend, every file that it links and the colours' configuration, by content, and
+"""The origins of a batch's pictures: the .blend, every file that it links and the colours' configuration, by content, and
 the versions that render it.
 
 Times and places of files say nothing: a farm copies them about. But which file is which counts, so they are in the order of
@@ -82,7 +82,7 @@ def unknown() -> tuple[str, ...]:
 
 
 def versions() -> dict[str, str]:
-    """Of Blender and of this add-on."""
+    """The versions of Blender and of this add-on."""
     return {"blender": bpy.app.version_string, "viewcam": _version()}
 
 
@@ -277,7 +277,7 @@ def _with_usd_layers(files: set[Path]) -> set[Path]:
 
 
 def _usd_layers(path: Path) -> list[Path] | None:
-    """What a USD file names; None where it is binary."""
+    """The layers that a USD file names; None where it is binary."""
     try:
         with open(path, "rb") if path.is_file() else io.BytesIO() as file:
             if file.read(len(_USD_BINARY)) == _USD_BINARY:

@@ -1,4 +1,4 @@
-"""What Blender keeps from one render to the next (`use_persistent_data`), and where it must not.
+"""The data that Blender keeps from one render to the next (`use_persistent_data`), and where it must not.
 
 With it Cycles and our engine keep what they have built, and Blender keeps the evaluated scene. Each picture must be the same
 to the bit as in a process of its own. Measured on 4.2, 4.5, 5.0 and 5.2: with other cameras, engines and sizes between the

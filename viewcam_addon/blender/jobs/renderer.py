@@ -117,7 +117,7 @@ class BlenderRenderer:
         return found.cropped(-column, -row, *picture.size)
 
     def made_from(self) -> dict[str, Any]:
-        """What the pictures are made from, beside the jobs: hashes of the .blend and of all that it links; versions.
+        """The origins of the pictures, beside the jobs: hashes of the .blend and of all that it links; versions.
 
         Raises
         ------

@@ -50,7 +50,7 @@ class Stage:
         return self.level != LEVELS[0]
 
     def entries(self, strict: bool) -> tuple[LedgerEntry, ...]:
-        """What is told of the file; NotModelledError if `strict` and anything is approximated or left out."""
+        """The ledger's entries of the file; NotModelledError if `strict` and anything is approximated or left out."""
         ledger = self.ledger
         if self.told:
             self.told.add(self.ledger, self.names)

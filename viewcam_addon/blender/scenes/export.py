@@ -184,7 +184,8 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
 
 
 def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> None:
-    """What lies exactly where something else does: which of the two a ray of Cycles meets or leaves is its rounding's choice.
+    """Note what lies exactly where something else does: which of the two a ray of Cycles meets or leaves is its rounding's
+    choice.
 
     Triangles of what stands in the scene once are sought in the world; those of instances, and points, among their own;
     and instances of one geometry by their matrices. What overlaps otherwise is found where pictures differ.
@@ -233,7 +234,7 @@ def _keys(geometry: Mesh | Spheres, matrix: Matrix | None = None) -> NDArray[np.
 
 
 def _bits(values: NDArray[np.float64]) -> NDArray[np.uint64]:
-    """Those of the numbers as float32 has them, 0 for −0."""
+    """The bits of the numbers as float32 has them, 0 for −0."""
     return (values.astype(np.float32) + np.float32(0)).view(np.uint32).astype(np.uint64)
 
 
