@@ -326,6 +326,44 @@ def sidecar() -> Feed:
     return feed
 
 
+def labels() -> Feed:
+    """A folder of two pictures' labels, of which one file is changed, as every dataset."""
+    kinds = "depth,normals,position,masks,amodal,flow"
+    with tempfile.TemporaryDirectory() as temporary:
+        made = Path(temporary)
+        (made / "scene.json").write_text(json.dumps(SCENE))
+        (made / "scene.npz").write_bytes(packed(**arrays()))
+        for name in ("a", "b"):
+            words = ["--size", "16x12", "--labels", kinds, "--next", made / "scene.json", "--threads", 1]
+            viewcam("render", made / "scene.json", made / f"{name}.exr", *words)
+        whole = {path.name: path.read_bytes() for path in made.iterdir() if path.name.startswith(("a.", "b."))}
+    whole["b.png"] = whole["b.instances.png"]  # a picture that stands beside its labels
+    documents = [json.loads(whole[f"{name}.labels.json"]) for name in ("a", "b")]
+    ways = (("coco",), ("coco", "--amodal"), ("panoptic",), ("bop",), ("colmap",), ("colmap", "--points", 5), ("kitti",))
+
+    def feed(chance: random.Random, folder: Path) -> None:
+        shots = folder / "shots"
+        shots.mkdir()
+        for name, data in whole.items():
+            (shots / name).write_bytes(data)
+        changed = chance.choice((*["a.labels.json"] * 5, "a.labels.exr", "a.labels.exr", "b.png"))
+        if changed == "a.labels.json":
+            data = mutants.of_json(*documents, chance)
+        else:
+            data = mutants.of_bytes(whole[changed], whole["b.labels.exr"], chance, chance.choice((1200, None)))
+        (shots / changed).write_bytes(data)
+        way = chance.choice(ways)
+        viewcam("labels", shots, folder / "out", "--to", *way)
+        if way[0] in ("coco", "panoptic") and (folder / "out").exists():
+            json.loads((folder / "out").read_text("utf-8"), parse_constant=partial(_is_no_json, way[0]))
+
+    return feed
+
+
+def _is_no_json(kind: str, constant: str) -> None:
+    raise Said(f"{kind} holds {constant}, which is no JSON")
+
+
 def cameras_of(name: str) -> Feed:
     """A file of cameras, read with whatever may be chosen, and written again in some format."""
     import camera_files
@@ -461,7 +499,7 @@ def command(folder: Path) -> None:
         judge(ran.stderr.strip())
 
 
-KINDS = {"scene": scene, "exr": exr, "shots": shots, "sidecar": sidecar, "blend": blend}
+KINDS = {"scene": scene, "exr": exr, "shots": shots, "sidecar": sidecar, "labels": labels, "blend": blend}
 IN_A_PROCESS = ("cameras-usd", "cameras-usdc", "cameras-usdz")
 CAMERAS = (
     *("transforms", "transforms_applied", "colmap", "colmap_binary", "bop", "gltf", "glb", "usd", "usdc", "usdz", "sidecar"),

@@ -1,5 +1,5 @@
-"""Files of strangers, by the thousand: each is read, or refused in a sentence, within 20 s and 4 GiB; files of cameras within
-5 s and 1 GiB.
+"""Files of strangers, by the thousand: each is read, or refused in a sentence, within 20 s and 4 GiB; files of cameras and
+labels within 5 s and 1 GiB.
 
 A few of each kind with every run, all of them with `make test-exhaustive`, and of each format of cameras MUTANTS
 (MUTANTS=850 are 40,000 of all). One that fails is made again by its number: `python tests/fuzz/targets.py KIND NUMBER 1 FOLDER
@@ -61,9 +61,9 @@ def assert_met(kind: str, count: int, folder: Path) -> None:
     assert not found, f"{len(found)} of {count} mutants:\n" + "\n".join(found[:20])
 
 
-SAMPLE = {"scene": 60, "exr": 40, "shots": 200, "sidecar": 40, "cameras-all": 225}
+SAMPLE = {"scene": 60, "exr": 40, "shots": 200, "sidecar": 40, "labels": 60, "cameras-all": 225}
 MUTANTS = int(os.environ.get("MUTANTS", "500"))
-ALL = {"scene": 4000, "exr": 2500, "shots": 2500, "sidecar": 1000, "blend": 120}
+ALL = {"scene": 4000, "exr": 2500, "shots": 2500, "sidecar": 1000, "labels": 500, "blend": 120}
 
 
 @pytest.mark.parametrize("kind", SAMPLE)

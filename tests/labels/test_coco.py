@@ -103,15 +103,45 @@ def test_an_instance_has_one_id_in_all_pictures(pictures, tmp_path):
             [],
             "is of another version",
         ),
+        *(
+            (change, way, "a.labels.json is no label file")
+            for change in (
+                {"counts": [10**17, 0]},
+                {"counts": ["1" * 400]},
+                {"counts": [float("inf")]},
+                {"counts": [-1, 64 * 48 + 1]},
+                {"size": [2**31, 2**31]},
+                {"bbox": [0, 0, 65, 1]},
+                {"area": 10**400},
+                {"camera": {}},
+                {"id": 2**24},
+                {"name": "\ud800"},
+                {"object_to_camera": [[1e999] * 4] * 4},
+                {"object_to_world": 1},
+                {"box": {"min": [0, 0], "max": [1, 1]}},
+                {"depth_png_steps": 0},
+                {"picture": "../../a.exr"},
+            )
+            for way in ([], ["--to", "bop"])
+        ),
         ("MASKS", ["--amodal"], "has no amodal masks: render it with --labels amodal"),
         ("MASKS", ["--amodal", "--to", "panoptic"], "--amodal is for COCO's instances"),
     ],
 )
 def test_what_can_not_be_gathered_is_one_sentence_and_nothing_is_written(tmp_path, capfd, content, words, sentence):
+    """Run lengths of 10¹⁷ pixels asked for 888 PiB."""
     folder = tmp_path / "shots"
     folder.mkdir()
     if content == "MASKS":
         files.write(folder / "a.exr", vp.label(room(CAMERA), ("masks",)))
+    elif isinstance(content, dict):
+        told_in = files.write(folder / "a.exr", vp.label(room(CAMERA), ("depth", "masks", "amodal")))[-1]
+        told = json.loads(told_in.read_text())
+        instance = next(each for each in told["instances"] if each["visible"])
+        for key, value in content.items():
+            owners = (told, instance, instance["visible"], instance["visible"]["segmentation"])
+            next(owner for owner in owners if key in owner)[key] = value
+        told_in.write_text(json.dumps(told))
     elif content:
         (folder / "a.labels.json").write_text(content)
     assert run(folder, tmp_path / "out.json", *words) == 2

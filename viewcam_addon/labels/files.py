@@ -6,10 +6,10 @@ Each appears whole, and the JSON last: where it stands, so do the others. An old
 import contextlib
 import json
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, Never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,23 @@ from ..cameras.source import image_size
 from ..errors import InputError
 from ..files import check_writable, is_replaced, read_bytes, written_whole
 from ..image import BACKGROUND_DEPTH
+from ..pinhole import Pinhole
 from ..png import encoded
 from . import DEPTH_STEPS, FILES, endings
 from .scene_labels import Labels
 
 _FORMAT, _VERSION = "virtual-pinhole-labels", 1
+
+_LARGEST = 1e100
+"""Of a label file's numbers: with larger ones nobody can compute. It lies far beyond what Blender's float32 can hold."""
+
+_LARGEST_ID = 2**24 - 1
+
+_ARE_VALUES: dict[str, Callable[[NDArray[np.float32]], NDArray[np.bool_]]] = {
+    "Depth": lambda depth: depth > 0,
+    "Instance": lambda ids: (ids >= 0) & (ids <= _LARGEST_ID) & (ids == np.rint(ids)),
+}
+"""Which numbers a pass may hold, of those that would be an index or a divisor; nan is none."""
 
 _UNKNOWN_FLOW = 1e10
 """The mark of Middlebury's format where no flow is known; everything above 1e9 counts as that."""
@@ -86,18 +98,67 @@ def read(path: Path) -> dict[str, Any]:
         if it can't be read, or is no such file.
     """
     try:
-        told = json.loads(read_bytes(path))
+        told = json.loads(read_bytes(path), parse_constant=_refused)
         is_one = (told["format"], told["version"]) == (_FORMAT, _VERSION)
-        whole = [told["camera"]["width"], told["camera"]["height"], *(each["id"] for each in told["instances"])]
-        texts = [told["picture"], *(each["name"] for each in told["instances"])]
-        is_whole = all(type(each) is int for each in whole) and all(isinstance(each, str) for each in texts)
+        if is_one:
+            _check(told)
     except OSError as error:
         raise InputError(f"{path} can't be read ({error.strerror or error}): give the folder of label files") from error
-    except (ValueError, LookupError, TypeError, RecursionError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path} is no label file that can be read: write it again with viewcam render --labels") from error
-    if not (is_one and is_whole):
+    if not is_one:
         raise InputError(f"{path} is of another version or format: write it again with viewcam render --labels")
     return told
+
+
+def _refused(constant: str) -> Never:
+    raise ValueError(f"{constant} is no number of JSON")
+
+
+def _check(told: dict[str, Any]) -> None:
+    """Raise ValueError, LookupError, TypeError or AttributeError for what the writers of datasets could not use.
+
+    So that they ask for no more memory than the picture has pixels, and write no file that nobody can read.
+    """
+    camera = Pinhole(**told["camera"])
+    size = camera.height, camera.width
+    texts = [told["picture"], *told.get("passes", ())]
+    if len({each["id"] for each in told["instances"]}) < len(told["instances"]):
+        raise ValueError("two instances have one id")
+    for each in told["instances"]:
+        texts.append(each["name"])
+        if type(each["id"]) is not int or not 0 < each["id"] <= _LARGEST_ID:
+            raise ValueError("an id is none")
+        for name in ("object_to_world", "object_to_camera"):
+            _check_numbers(each[name], (4, 4))
+        for name in ("min", "max"):
+            _check_numbers(each["box"][name], (3,))
+        _check_numbers(each.get("visible_fraction", 0.0), ())
+        for kind in ("visible", "amodal"):
+            if (mask := each.get(kind)) is not None:
+                _check_mask(mask, size)
+    _check_numbers(steps := told["depth_png_steps"], ())
+    if steps <= 0 or told["picture"] != Path(told["picture"]).name:
+        raise ValueError("steps of depth are above 0, and the picture is beside its labels")
+    for text in texts:
+        text.encode("utf-8")
+
+
+def _check_numbers(values: Any, shape: tuple[int, ...]) -> None:
+    array = np.array(values)
+    if array.shape != shape or array.dtype.kind not in "if" or not (np.abs(array) <= _LARGEST).all():
+        raise ValueError(f"no {shape} numbers")
+
+
+def _check_mask(mask: dict[str, Any], size: tuple[int, int]) -> None:
+    counts, box = mask["segmentation"]["counts"], mask["bbox"]
+    whole = [*box, mask["area"], *counts]
+    if {*map(type, whole)} != {int} or min(whole) < 0 or len(box) != 4 or tuple(mask["segmentation"]["size"]) != size:
+        raise ValueError("a mask is no mask of the picture")
+    if sum(counts) != size[0] * size[1] or sum(counts[1::2]) != mask["area"] or mask["area"] == 0:
+        raise ValueError("a mask's runs don't fill the picture")
+    if box[0] + box[2] > size[1] or box[1] + box[3] > size[0]:
+        raise ValueError("a mask's box is not within the picture")
 
 
 @contextlib.contextmanager
@@ -152,6 +213,9 @@ def passes(path: Path, told: dict[str, Any], wanted: Sequence[str]) -> dict[str,
     found = image.read(path.with_name(f"{name(path)}.labels.exr"), chosen)
     if found.size != (told["camera"]["width"], told["camera"]["height"]):
         raise InputError(f"{path} is of another picture than {found.source}: write both again with viewcam render --labels")
+    for each, is_one in _ARE_VALUES.items():
+        if each in chosen and not is_one(found[each]).all():
+            raise InputError(f"{found.source} has numbers in {each} that are none of it: write it with viewcam render --labels")
     return {each: found[each][::-1] for each in chosen}
 
 
