@@ -63,6 +63,8 @@ def assert_met(kind: str, count: int, folder: Path) -> None:
 
 SAMPLE = {"scene": 60, "exr": 40, "shots": 200, "sidecar": 40, "labels": 60, "cameras-all": 225}
 MUTANTS = int(os.environ.get("MUTANTS", "500"))
+USD_MUTANTS = MUTANTS // 5
+"""Each is read in a process of its own, which takes a second."""
 ALL = {"scene": 4000, "exr": 2500, "shots": 2500, "sidecar": 1000, "labels": 500, "blend": 120}
 
 
@@ -84,9 +86,10 @@ def test_every_hostile_file_is_read_or_refused_in_a_sentence(kind, tmp_path):
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", targets.CAMERAS)
 def test_every_hostile_file_of_cameras_is_read_or_refused_in_a_sentence(name, tmp_path):
-    if name.startswith("usd"):
+    is_usd = name.startswith("usd")
+    if is_usd:
         pytest.importorskip("pxr")
-    assert_met(f"cameras-{name}", MUTANTS, tmp_path)
+    assert_met(f"cameras-{name}", USD_MUTANTS if is_usd else MUTANTS, tmp_path)
 
 
 @pytest.mark.parametrize(
