@@ -1,4 +1,4 @@
-"""What goes on beside Blender while the artist works on: at most one of its kind, and what the last one came to.
+"""Background jobs beside Blender while the artist works on: at most one of its kind, and what the last one came to.
 
 That belongs to this session of Blender and to this file. Cancel, another file, turning the add-on off and leaving Blender end
 it.
@@ -41,7 +41,7 @@ class Background:
         self._look, self.on_load = look, on_load
 
     def begin(self, operator: bpy.types.Operator, start: Callable[[], Any]) -> set[str]:
-        """What an operator returns that starts one; for scripts, in a Blender without a window, it waits for it.
+        """Start a job, and return what its operator returns; for scripts, in a Blender without a window, it waits for it.
 
         start : makes what runs, or raises InputError. What it came to is then (whether all went well, a sentence).
         """
@@ -58,7 +58,7 @@ class Background:
         return {"FINISHED" if well else "CANCELLED"}
 
     def poll(self) -> Any:
-        """What that on its way has come to; None while it runs."""
+        """The result of the job on its way; None while it runs."""
         outcome = self.running.poll()
         if outcome:
             self._forget()
@@ -66,7 +66,7 @@ class Background:
         return outcome
 
     def wait(self) -> Any:
-        """What it comes to."""
+        """The result, waited for."""
         try:
             self.running.wait()
             return self.poll()

@@ -39,7 +39,7 @@ _SHARE_OF_ROUNDING = 2.0
 
 @dataclass
 class _Flight:
-    """What a camera did.
+    """The flight of a camera.
 
     live : how it stood at every time, and how far away its look-at point was.
     at, keys, growth : for each keyframe its place on the curves, the numbers of each channel, and by how much the sensor grew.

@@ -212,7 +212,7 @@ class VIEWCAM_OT_export_cameras(WorldOptions, ExportHelper, bpy.types.Operator):
 
 
 class VIEWCAM_FH_cameras(bpy.types.FileHandler):
-    """What Blender does with a file of cameras that is dropped on a viewport."""
+    """The handler of a file of cameras that is dropped on a viewport."""
 
     bl_idname = "VIEWCAM_FH_cameras"
     bl_label = "Cameras"

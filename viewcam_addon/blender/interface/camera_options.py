@@ -1,4 +1,4 @@
-"""What is chosen as other programs' cameras are read or written (cameras.Options), as an operator's properties.
+"""The options with which other programs' cameras are read or written (cameras.Options), as an operator's properties.
 
 Blender remembers axes and scale from one use to the next where they are on show before it; so not in Paste, a single click.
 Its floats are float32; a scale of up to seven digits is meant as it is shown.
@@ -52,12 +52,12 @@ class WorldOptions:
     scale: scale()
 
     def chosen(self, **more: Any) -> Options:
-        """What is chosen. more : of Options, what the scene says."""
+        """The options that are chosen. more : of Options, what the scene says."""
         return Options(axes=self.axes, scale=float(f"{self.scale:.7g}"), **more)
 
 
 class ReadingOptions(WorldOptions):
-    """What can be chosen as cameras are read, beside axes and scale."""
+    """The options with which cameras are read, beside axes and scale."""
 
     unmirrored: bpy.props.BoolProperty(
         name="Unmirrored",

@@ -258,7 +258,7 @@ def _present(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole
 
 
 def _said(pinhole: Pinhole, before: Pinhole) -> str:
-    """What differs now."""
+    """The differences of the new camera, in words."""
     names = [name for key, name in _NAMES.items() if getattr(pinhole, key) != getattr(before, key)]
     names += ["distance"] if pinhole.distance != before.distance else []
     shift = math.dist(pinhole.plane.principal_point, (pinhole.width / 2, pinhole.height / 2))

@@ -44,7 +44,7 @@ _COMPRESSED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a comparison has come to.
+    """The outcome of a comparison.
 
     what : of what it was: camera, frame and level. camera : the camera's name. seen : the camera then, None if it was none.
     answer : one of comparison/answer.py's, None where there is none. verdict : one sentence. headline : a few words of it.
@@ -167,7 +167,7 @@ class RunningComparison:
         self._process.wait()
 
     def poll(self) -> Outcome | None:
-        """What it has come to, None while it runs. What is left of it then is the outcome's folder."""
+        """The outcome, None while it runs. What is left of it then is the outcome's folder."""
         status = self._process.status()
         if status is None:
             return None
@@ -216,7 +216,7 @@ def _step(event: Mapping[str, Any], pictures: int) -> tuple[int, str]:
 
 
 def report_name(camera: str, frame: int) -> str:
-    """What a report's folder is called: by file, camera, frame and the time now."""
+    """The name of a report's folder: by file, camera, frame and the time now."""
     name = made_fit(f"{Path(_file_name()).stem} {camera} {frame:04d}")
     return f"{name} {datetime.now():%Y-%m-%d %H.%M.%S}"
 
@@ -384,7 +384,7 @@ def _remove(path: Path) -> None:
 
 
 def _percentiles(row: dict[str, Any], unit: str) -> list[tuple[str, str]]:
-    """Of a row of a table that has any, as JSON has it."""
+    """The percentiles of a row of a table that has any, as JSON has it."""
     names = (("Median", "p50"), ("99.9 % within", "p99.9"))
     found = row["percentiles"]
     return [(label, f"{plain(found[name]['value'])} {unit}") for label, name in names if name in found]

@@ -78,7 +78,7 @@ class Drag:
         self._follow()
 
     def type(self, text: str) -> None:
-        """What is typed so far."""
+        """Show what is typed so far."""
         self.text = text
         self._follow()
 

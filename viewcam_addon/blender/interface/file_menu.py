@@ -120,7 +120,7 @@ class VIEWCAM_OT_import_scene(IntoScene, bpy.types.Operator):
 
 
 class VIEWCAM_FH_scene(bpy.types.FileHandler):
-    """What Blender does with a scene file that is dropped on a viewport."""
+    """The handler of a scene file that is dropped on a viewport."""
 
     bl_idname = "VIEWCAM_FH_scene"
     bl_label = "Virtual Pinhole Scene"
@@ -151,7 +151,7 @@ def _tell(
 
 
 def text(name: str) -> str:
-    """What Blender can show of a file's name, whose bytes may be no text."""
+    """The part of a file's name that Blender can show, whose bytes may be no text."""
     return name.encode("utf-8", "replace").decode()
 
 

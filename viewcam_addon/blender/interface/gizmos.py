@@ -109,7 +109,8 @@ def _end_if_over() -> float | None:
 
 
 def end_drag() -> None:
-    """What was dragged becomes a keyframe, where auto keying asks for one, and a step of undo; what was cancelled does not."""
+    """End a drag: what was dragged becomes a keyframe, where auto keying asks for one, and a step of undo; what was cancelled
+    does not."""
     global _drag
     ended, _drag = _drag, None
     camera_object = bpy.data.objects.get((ended.camera_name, None)) if ended else None

@@ -43,7 +43,7 @@ def _looked(_: object) -> None:
 
 
 background = Background(0.2, _looked)
-"""What it comes to: the folder of the labels (None where there are none), and a sentence."""
+"""The background job of labels, whose result is the folder of the labels (None where there are none), and a sentence."""
 
 
 class LabelSettings(bpy.types.PropertyGroup):
@@ -67,7 +67,7 @@ class LabelSettings(bpy.types.PropertyGroup):
     )
 
     def chosen(self) -> list[str]:
-        """Of labels.KINDS, in order."""
+        """The chosen ones of labels.KINDS, in order."""
         return [kind for kind in KINDS if kind.upper() in self.kinds]
 
     def into(self) -> Path:
@@ -78,7 +78,7 @@ class LabelSettings(bpy.types.PropertyGroup):
 
 
 def file_names(camera_object: bpy.types.Object, kinds: list[str]) -> list[str]:
-    """Of what a click writes, but for the batch's own: the camera first."""
+    """The names of the files that a click writes, but for the batch's own: the camera first."""
     name = made_fit(camera_object.name)
     passes = [each for kind in kinds for each in PASSES[kind]]
     return [f"{name}.json", *(f"{name}.{ending}" for ending in endings(passes))]

@@ -37,7 +37,7 @@ class NamesCamera:
 
 
 class CameraOperator(NamesCamera):
-    """What all of them share. A subclass says in `work(camera_object, scene)` what it does."""
+    """The base of all operators of a camera. A subclass says in `work(camera_object, scene)` what it does."""
 
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 

@@ -70,7 +70,7 @@ def _cameras(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 
 def _figures(context: bpy.types.Context) -> Iterator[tuple[Pinhole, Triple, float]]:
-    """What `diagrams.diagram` is to draw in the context's viewport; values that make no camera have no diagram."""
+    """The cameras that `diagrams.diagram` is to draw in the context's viewport; values that make no camera have no diagram."""
     for camera_object in _cameras(context):
         group = camera_object.virtual_pinhole
         try:
@@ -186,7 +186,8 @@ def _draw_letters() -> None:
 
 
 def _clearest(lines: list[Vector]) -> Vector:
-    """Of eight directions on the screen the one farthest from where lines go, of the same the first, to the lower right."""
+    """The one of eight directions on the screen that is farthest from where lines go, of the same the first, to the lower
+    right."""
     directions = [Vector((math.cos(angle), math.sin(angle))) for angle in np.arange(8) * (math.pi / 4) - math.pi / 4]
     return min(directions, key=lambda way: max((round(way.dot(line.normalized()), 6) for line in lines), default=0.0))
 

@@ -138,7 +138,7 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
 
 
 def _draw_why(column: bpy.types.UILayout, word: str | None) -> None:
-    """What a value that can't be edited follows, if it does."""
+    """Draw what a value that can't be edited follows, if it does."""
     if word:
         row = column.row()
         row.alignment = "RIGHT"
@@ -239,7 +239,7 @@ class _ReadOutsPanel(SubPanel):
 
 
 def notices(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[Notice]:
-    """What the panel warns of."""
+    """The warnings of the panel."""
     try:
         stated = cameras.stated(camera_object, scene)
         if stated is None:
@@ -262,7 +262,7 @@ def _notice(finding: findings.Finding) -> Notice:
 
 
 def _doubts(camera_object: bpy.types.Object, stated: Pinhole) -> list[Notice]:
-    """What is to be said of the values, wherever the camera is."""
+    """The warnings about the values, wherever the camera is."""
     found = []
     if sentence := readouts.roll_warning(stated, camera_object.virtual_pinhole.precision()):
         up = readouts.vector(readouts.certain_up(stated))

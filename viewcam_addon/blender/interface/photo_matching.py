@@ -43,7 +43,7 @@ _drawn = None  # what the viewport shows of the match that goes on
 
 @dataclass
 class Drawing:
-    """What is drawn on a picture.
+    """The drawing on a picture.
 
     like : the camera as it was, whose picture it is. kind : EDGES, RECTANGLE or POINTS. axes : of the rectangle's sides.
     sides : their lengths. origin : of the rectangle, world space. places : of the points, world space.
@@ -117,7 +117,7 @@ class Drawing:
 
 
 def told(match: photo_match.Match, lens: float) -> list[str]:
-    """What the viewport says of a match. lens : millimetres."""
+    """The lines of the viewport about a match. lens : millimetres."""
     low, high = match.distance_between
     d = match.pinhole.distance[0]
     share = (high - low) / 2 / d

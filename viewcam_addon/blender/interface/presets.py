@@ -38,7 +38,7 @@ SHIPPED = {
     "Z Up, Looking Down": "eye=(0, 0, 10) look_at=(0, 0, 0) up=(1, 0, 0)",
     "Z Up, Looking Up": "eye=(0, 0, -10) look_at=(0, 0, 0) up=(0, -1, 0)",
 }
-"""What comes along, by the name that is shown."""
+"""The presets that come along, by the name that is shown."""
 
 
 class VIEWCAM_PT_presets(PresetPanel, bpy.types.Panel):
@@ -105,7 +105,7 @@ class VIEWCAM_OT_add_preset(AddPresetBase, bpy.types.Operator):
             return {"CANCELLED"}
 
     def add(self, _context: bpy.types.Context, path: str) -> None:
-        """What Blender calls to write the preset."""
+        """Write the preset, as Blender calls it."""
         with written_whole(path) as temporary:
             temporary.write_text(
                 f"import bpy\n\nbpy.ops.viewcam.paste_camera(text={self._text!r})\n", encoding="utf-8", newline="\n"

@@ -30,7 +30,7 @@ VIEWS = (
     ("EVERYTHING", "Everything", "The scene as Cycles renders it with everything in it, without any stand-in"),
 )
 _SIDES = {"everything": "Cycles, everything", "cycles": "Cycles", "tracer": "Tracer", "difference": "Difference"}
-"""What each picture is called, in the order in which they stand."""
+"""The name of each picture, in the order in which they stand."""
 _DIFFERENCE = _SIDES["difference"]
 _GAP = 8  # pixels between two pictures
 _MARGIN, _LETTERS, _STRIP = 10, 12, (240, 12)  # points: around a label, its size, and the legend's strip
@@ -66,7 +66,7 @@ def _shown_in(view: str, sides: Collection[str]) -> list[str]:
 
 
 def labels(view: str, sides: Collection[str]) -> list[str]:
-    """What the pictures of a view are called, from left to right."""
+    """The names of the pictures of a view, from left to right."""
     stand_ins = " with stand-ins" if "everything" in sides else ""
     return [_SIDES[name] + (stand_ins if name in ("cycles", "tracer") else "") for name in _shown_in(view, sides)]
 
@@ -196,7 +196,7 @@ def draw_view(row: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 def _draw_labels() -> None:
-    """What each picture is, the line of the swipe, and the legend, in the pixels of the context's Image Editor."""
+    """Draw each picture's name, the line of the swipe, and the legend, in the pixels of the context's Image Editor."""
     context = bpy.context
     if _shown is None or not _is_shown_in(context.space_data):
         return

@@ -1,4 +1,4 @@
-"""What the panel says, as text. Pure: a test calls it without drawing."""
+"""The readouts of the panel, as text. Pure: a test calls it without drawing."""
 
 import math
 import textwrap

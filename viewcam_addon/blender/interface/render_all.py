@@ -38,7 +38,7 @@ def _looked(outcome: tuple[bool, str] | None) -> None:
 
 
 background = Background(0.5, _looked)
-"""What it comes to: whether all went well, and a sentence."""
+"""The background job of all cameras, whose result is whether all went well, and a sentence."""
 
 
 def shots(scene: bpy.types.Scene, animation: bool) -> list[Job]:

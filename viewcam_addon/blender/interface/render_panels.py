@@ -50,7 +50,7 @@ class VIEWCAM_RENDER_PT_sampling(_Panel, bpy.types.Panel):
 
 
 class _CyclesSettingsPanel(_Panel):
-    """What Cycles has a setting for is Cycles' own."""
+    """A panel of Cycles' own, for what Cycles has a setting for."""
 
     bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
 
@@ -124,7 +124,7 @@ class VIEWCAM_LIGHT_PT_light(_Panel, bpy.types.Panel):
 
 
 def lamp_settings(lamp: bpy.types.Light) -> Iterator[str]:
-    """Those that count in the picture; some versions know fewer of them."""
+    """The settings that count in the picture; some versions know fewer of them."""
     yield "color"
     if hasattr(lamp, "use_temperature"):
         yield from ("use_temperature", "temperature") if lamp.use_temperature else ("use_temperature",)

@@ -24,7 +24,7 @@ _BOXED = ("ARMATURE", "LATTICE", "GREASEPENCIL", "GPENCIL", "VOLUME")
 
 
 def objects(context: bpy.types.Context, camera_object: bpy.types.Object | None) -> list[bpy.types.Object]:
-    """What is selected, or edited in a mode that selects parts, without the camera itself."""
+    """The objects that are selected, or edited in a mode that selects parts, without the camera itself."""
     blocks = context.objects_in_mode if context.mode in _PARTS else context.selected_objects
     return [block for block in blocks if block != camera_object]
 
