@@ -221,3 +221,47 @@ def _when_it_is_read(pipe):
         yield
     finally:
         os.close(handle)
+
+
+HELD = """
+import os, signal, sys
+from viewcam_addon.files import temporary_folder
+
+with temporary_folder() as folder:
+    (folder / "scene.npz").write_bytes(b"large")
+    os.utime(folder, (0, 0))  # as if it were old
+    print(folder, flush=True)
+    if sys.argv[1] == "killed":
+        os.kill(os.getpid(), signal.SIGKILL)
+    sys.stdin.read()
+"""
+
+
+@posix
+def test_what_killed_processes_left_among_the_temporary_files_goes_and_what_others_hold_stays(tmp_path):
+    """kill -9 left exported scenes there for ever."""
+    environment = os.environ | {"TMPDIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[1])}
+
+    def held(end):
+        command = [sys.executable, "-c", HELD, end]
+        process = subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        return process, Path(process.stdout.readline().strip())
+
+    killed, left = held("killed")
+    killed.communicate()
+    assert killed.returncode == -9 and (left / "scene.npz").exists(), "the test wants something that is left"
+    young, link = (left.with_name(f"{left.name}{what}") for what in ("young", "link"))
+    others = [tmp_path / name for name in ("viewcam-another_machine-1", "viewcam", "else")]
+    for folder in (young, *others):
+        folder.mkdir()
+    for other in others:
+        os.utime(other, (0, 0))
+    link.symlink_to(others[-1])
+    alive, kept = held("alive")
+    assert not left.exists() and kept.exists()
+    second, also = held("alive")
+    assert (kept / "scene.npz").exists() and also.exists(), "a folder of a process that lives was removed"
+    for process in (alive, second):
+        process.communicate("")
+        assert process.returncode == 0
+    assert {*tmp_path.iterdir()} == {young, link, *others}

@@ -36,7 +36,7 @@ ROOMS = {
     "junit": "checks files",
     "png": "",
     "child_process": "errors events",
-    "usd_stage": "errors child_process",
+    "usd_stage": "errors child_process files",
     "crashes": "",
     "exact": "",
     "pinhole": "errors checks exact",

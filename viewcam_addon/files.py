@@ -11,12 +11,16 @@ another user has put in a folder that all may write to.
 
 import contextlib
 import errno
+import functools
 import os
+import re
 import secrets
 import shutil
+import socket
 import stat
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -25,6 +29,9 @@ from .errors import FullDiskError, InputError
 
 # What a system says when no more fits: on the disk, into a user's share of it, into the largest file that it allows.
 _FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG}
+
+_UNLOCKED_AT_MOST = 60.0
+"""Seconds that a process may take from making a temporary folder to locking it."""
 
 
 @contextlib.contextmanager
@@ -48,8 +55,7 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
             temporary = _beside(file, file.parent)
             ends.callback(_removed, temporary)
         else:
-            folder = ends.enter_context(tempfile.TemporaryDirectory(prefix="viewcam-", ignore_cleanup_errors=True))
-            temporary = Path(folder, path.name)
+            temporary = ends.enter_context(temporary_folder()) / path.name
         yield temporary
         with open(temporary, "rb+") as written:
             os.fsync(written.fileno())
@@ -58,6 +64,65 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
                     shutil.copyfileobj(written, there)
         if file:
             os.replace(temporary, file)
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A folder among the system's temporary ones, gone at the end of the block.
+
+    Its process holds a lock on it, which ends with the process, however that ends. So the first one that a process makes also
+    removes those that killed processes of this user and machine have left. On Windows, which has no such locks, they stay.
+
+    Raises
+    ------
+    OSError
+        if it can't be made.
+    """
+    _remove_abandoned()
+    with tempfile.TemporaryDirectory(prefix=_prefix(), ignore_cleanup_errors=True) as name, contextlib.ExitStack() as ends:
+        with contextlib.suppress(OSError):  # where there are no locks nothing is removed either
+            ends.enter_context(_locked(Path(name)))
+        yield Path(name)
+
+
+def _prefix() -> str:
+    """The beginning of temporary folders' names on this machine: of a folder that machines share, none sees another's locks."""
+    return f"viewcam-{re.sub(r'[^A-Za-z0-9]', '_', socket.gethostname())[:40]}-"
+
+
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """A context in which this process holds the folder's lock.
+
+    Raises
+    ------
+    OSError
+        if another does, or there are no locks.
+    """
+    if sys.platform == "win32":
+        raise OSError(errno.ENOSYS, "folders have no locks")
+    import fcntl
+
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(handle)
+
+
+@functools.cache
+def _remove_abandoned() -> None:
+    """Remove the temporary folders that killed processes have left, once in a process. Nothing is said of those that stay."""
+    if sys.platform == "win32":
+        return
+    for folder in Path(tempfile.gettempdir()).glob(f"{_prefix()}*"):
+        with contextlib.suppress(OSError):
+            there = os.lstat(folder)
+            is_ours = stat.S_ISDIR(there.st_mode) and there.st_uid == os.geteuid()
+            if is_ours and time.time() - there.st_mtime > _UNLOCKED_AT_MOST:
+                with _locked(folder):
+                    shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextlib.contextmanager

@@ -16,7 +16,6 @@ import importlib.util
 import os
 import stat
 import sys
-import tempfile
 import time
 import zipfile
 from collections.abc import Callable, Iterator
@@ -26,6 +25,7 @@ from typing import Any
 
 from . import child_process
 from .errors import InputError
+from .files import temporary_folder
 
 _SECONDS = 2
 """The seconds of computing, and one more for each `_BYTES_A_SECOND` of the file."""
@@ -74,11 +74,11 @@ def read(name: str, path: Path | None, text: str, size: str, values: str) -> dic
     seconds = _SECONDS + length / _BYTES_A_SECOND
     variables = child_process.environment(apart_from=child_process.blender_scripts(), PXR_WORK_THREAD_LIMIT="1")
     with (
-        tempfile.TemporaryDirectory(prefix="viewcam-usd-", ignore_cleanup_errors=True) as folder,
+        temporary_folder() as folder,
         child_process.ServerProcess("OpenUSD", child_process.module("usd_stage"), variables) as server,
     ):
         request: dict[str, Any] = {"size": size, "values": values, "seconds": seconds, "memory": _MEMORY + _TIMES * length}
-        request |= {"path": str(path.absolute()), "unpacked": folder} if path else {"text": text}
+        request |= {"path": str(path.absolute()), "unpacked": str(folder)} if path else {"text": text}
         try:
             server.ask({"start": True})
             found: dict[str, Any] = server.ask(request, ends=time.monotonic() + _WALL * seconds)

@@ -11,13 +11,13 @@ import os
 import shlex
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, NotModelledError
+from ..files import temporary_folder
 from ..terminal import say, silent_libraries
 from . import Result, blender_room
 
@@ -155,9 +155,9 @@ def _check_many(options: argparse.Namespace, job: Any) -> Result:
         stated = {"camera": shot.camera, "name": shot.name} | ({} if shot.frame is None else {"frame": shot.frame})
         return dataclasses.replace(job, **stated)
 
-    with tempfile.TemporaryDirectory(prefix="viewcam-") as temporary:
+    with temporary_folder() as temporary:
         plan = Plan(
-            out=options.report or Path(temporary),
+            out=options.report or temporary,
             outputs=outputs,
             blend=options.blend,
             trust=options.trust,

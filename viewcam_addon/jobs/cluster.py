@@ -18,7 +18,6 @@ import pkgutil
 import queue
 import signal
 import sys
-import tempfile
 import threading
 import time
 import uuid
@@ -28,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FullDiskError, InputError, bug
+from ..files import temporary_folder
 from . import render_client
 from .folder import Folder, Outputs
 from .job import Job
@@ -75,7 +75,7 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
                 yield Cluster(client, None)
             return
         count = workers or min(2, _cores())
-        with tempfile.TemporaryDirectory(prefix="viewcam-") as scratch, _processes_of_this_package():
+        with temporary_folder() as scratch, _processes_of_this_package():
             local = distributed.LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
@@ -84,7 +84,7 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
                 security=_credentials(distributed),
                 dashboard_address="127.0.0.1:0",
                 scheduler_kwargs={"dashboard": False},
-                local_directory=scratch,
+                local_directory=str(scratch),
                 silence_logs=logging.CRITICAL,
                 preload=[_WORKER],
                 env={render_client.BLENDER: os.environ.get(render_client.BLENDER) or blender or ""},

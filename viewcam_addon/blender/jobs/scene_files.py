@@ -6,10 +6,10 @@ nothing else does. It is written when other things are in it than in those that 
 
 import contextlib
 import functools
-import tempfile
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
+from ...files import temporary_folder
 from ...tracer.scene import Scene, scene_file
 from ...tracer.scene.sameness import same
 from .. import datablocks
@@ -74,8 +74,7 @@ class SceneFiles:
     @functools.cached_property
     def folder(self) -> Path:
         """A temporary one, made when it is first needed: most batches need none."""
-        made = tempfile.TemporaryDirectory(prefix="viewcam-", ignore_cleanup_errors=True)
-        return Path(self._ends.enter_context(made))
+        return self._ends.enter_context(temporary_folder())
 
     @functools.cached_property
     def _changes(self) -> bool:

@@ -6,13 +6,12 @@ the places that a formula gives each face (charts.py). What is baked is what a s
 
 import json
 import subprocess
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 import numpy as np
 
+from ...files import temporary_folder
 from ...tracer.scene.materials import Picture
 from .. import another_blender, versions
 from . import baker, export_geometry, features, nodes, shaders
@@ -62,8 +61,8 @@ def baked_in(depsgraph: bpy.types.Depsgraph) -> dict[str, dict[tuple[str, str], 
                 jobs.append(_Job(*place, unknown, material))
     if not jobs:
         return found
-    with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
-        library, faces, out = (Path(folder, name) for name in ("scene.blend", "faces.npz", "baked.npz"))
+    with temporary_folder() as folder:
+        library, faces, out = (folder / name for name in ("scene.blend", "faces.npz", "baked.npz"))
         scene = depsgraph.scene
         bpy.data.libraries.write(str(library), {scene.original}, path_remap="ABSOLUTE", fake_user=True)
         np.savez(faces, **{name: values for number, job in enumerate(jobs) for name, values in _faces(job, number).items()})

@@ -5,14 +5,13 @@ renders. Both sides of a comparison are then shown the image and the lamps.
 """
 
 import subprocess
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...files import temporary_folder
 from ...tracer.scene.colours import LARGEST_RADIANCE
 from ...tracer.scene.lamps import RAYS, Sun, World
 from ...tracer.scene.materials import Picture
@@ -70,8 +69,8 @@ def _feeding(world: bpy.types.World) -> set[Output]:
 
 def rendered(world: bpy.types.World, scene: bpy.types.Scene) -> Rendered | None:
     """The image that another Blender renders of a world without an obstacle at a scene's frame; None if it can't."""
-    with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
-        library, out = Path(folder, "world.blend"), Path(folder, "world.npz")
+    with temporary_folder() as folder:
+        library, out = folder / "world.blend", folder / "world.npz"
         bpy.data.libraries.write(str(library), {world.original}, path_remap="ABSOLUTE", fake_user=True)
         arguments = [str(library), world.original.name, str(out), str(width(world)), str(scene.frame_current)]
         try:
