@@ -175,6 +175,17 @@ def test_adopting_a_camera_says_everything_too(held_camera, scene):
     np.testing.assert_allclose(np.column_stack(cameras.stated(held_camera, scene).basis()), before, atol=TURN)
 
 
+def test_a_held_roll_outlasts_its_camera_being_off(held_camera):
+    """Nobody asked for another up; adopting a camera that is on does."""
+    group = held_camera.virtual_pinhole
+    group.held_roll = 1.0
+    before = axes(held_camera)
+    group.enabled = False
+    group.enabled = True
+    assert (tuple(group.up), group.held_roll) == (UP, 1.0)
+    np.testing.assert_array_equal(axes(held_camera), before)
+
+
 def test_applying_again_keeps_up_and_roll(held_camera):
     group = held_camera.virtual_pinhole
     group.held_roll = 1.0

@@ -199,7 +199,9 @@ class CameraSync:
         camera_object = self.camera_object
         was_in_use = storage.load(camera_object).set_for is not None and not keep
         standing = as_it_stands(camera_object, scene, in_use=was_in_use)
-        if was_in_use and _agrees(camera_object, scene):
+        values = storage.load(camera_object)
+        is_said_by_roll = values.enabled and values.pole == HOLD and values.held_roll != 0
+        if was_in_use and not is_said_by_roll and _agrees(camera_object, scene):
             storage.enable(camera_object)
             return
         storage.begin(camera_object)
@@ -257,7 +259,9 @@ class CameraSync:
         values, level = _level(evaluated, scene)
         is_asked = bool(storage.asked_of(camera_object))
         stood = values
-        if causes.may_move(camera_object, conversion.PARTS - decided):
+        # A render's graph writes nothing back to the camera, so that its state says nothing of how it stands there.
+        may_have_moved = is_render or not self.is_untouched(by_values=True)
+        if may_have_moved and causes.may_move(camera_object, conversion.PARTS - decided):
             values, level = self._carried(evaluated, values, level, decided, scene, depsgraph)
         self._place(rolls.turned(level, hold.roll(evaluated, values, scene)), scene, depsgraph, decided)
         if is_render:
@@ -443,7 +447,8 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
 def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
     """State the four values that make the camera as it stands, and enable them. The camera does not move.
 
-    Values that say so already keep every digit. The look-at point keeps its distance to the eye if values have ever been in
+    Values that say so already keep every digit. If it takes a held roll as well, that goes into up, unless they were off: then it
+    stays. The look-at point keeps its distance to the eye if values have ever been in
     use; else it lies in the plane of focus (that of the focus object, if it stands before the camera, or the focus distance,
     10 m in a new camera). Up is the world's Z where this gives the same picture, else v.
 

@@ -169,5 +169,7 @@ def _pixels(data: bytes, path: Path) -> np.ndarray:
                 return np.asarray(picture)
     except InputError:
         raise
+    except Image.DecompressionBombError:
+        raise InputError(f"{path} has far too many pixels: give depth in the pictures' size") from None
     except Exception as error:  # of each decoder its own
         raise ValueError(error) from error

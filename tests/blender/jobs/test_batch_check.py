@@ -15,6 +15,7 @@ from viewcam_addon.blender import datablocks, versions
 from viewcam_addon.blender.jobs import checking, scene_files
 from viewcam_addon.blender.jobs import renderer as renderers
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
+from viewcam_addon.blender.temporary_settings import cameras_unbound, overridden
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import makers
 from viewcam_addon.jobs.job import Job
@@ -331,19 +332,61 @@ def test_the_camera_of_a_shot_by_eevee_is_checked_with_cycles(stage, tracing):
     assert stage.render.engine == versions.EEVEE
 
 
-def test_a_frame_taken_by_another_camera_than_its_markers_is_caught(stage, batch, monkeypatch):
-    """Cycles and tracer took the same wrong camera, and the check passed."""
+@pytest.fixture
+def other(stage):
+    """A second camera, which a marker binds from frame 8 on; the stage's own is bound from frame 1 on."""
     other = bpy.data.objects.new("Other", stage.camera.data)
     stage.collection.objects.link(other)
     other.location, other.rotation_euler = (1, -7, 2), (math.radians(80), 0, 0.1)
     for frame, camera_object in ((1, stage.camera), (8, other)):
         stage.timeline_markers.new(camera_object.name, frame=frame).camera = camera_object
+    return other
+
+
+# Both answer for frame 8 with the camera of frame 1, or of the file.
+WRONG_CAMERAS = [lambda bindings, _: bindings[0][1], lambda *_: None]
+
+
+@pytest.mark.parametrize("wrong", WRONG_CAMERAS)
+def test_a_check_through_another_camera_than_its_markers_fails(stage, other, monkeypatch, wrong):
+    """Cycles and tracer took the same wrong camera, and the check passed."""
     shots = makers.frames("7..8")
-    assert all(check["passed"] for check in verdicts(batch(*shots)).values())
-    for wrong in (lambda bindings, _: bindings[0][1], lambda *_: None):
-        monkeypatch.setattr(datablocks, "bound_camera", wrong)
-        found = verdicts(batch(*shots))
-        assert found["frame_007"]["passed"] and not found["frame_008"]["passed"], found
+
+    def passed():
+        with BlenderRenderer() as renderer:
+            without_picture = [renderer.check(shot, has_picture=False)["passed"] for shot in shots]
+            of_sidecar = [renderer.render(shot, None, None) and renderer.check(shot)["passed"] for shot in shots]
+            return without_picture, of_sidecar
+
+    assert passed() == ([True, True], [True, True])
+    monkeypatch.setattr(datablocks, "bound_camera", wrong)
+    assert passed() == ([True, False], [True, False])
+
+
+@pytest.mark.parametrize("wrong", WRONG_CAMERAS)
+def test_blender_itself_chooses_the_camera_of_a_frames_picture_and_the_sidecar_names_it(other, batch, monkeypatch, wrong):
+    shots = makers.frames("7..8")
+    right = batch(*shots, check=False)
+    monkeypatch.setattr(datablocks, "bound_camera", wrong)
+    done = batch(*shots, check=False)
+    for name, camera_name in (("frame_007", "Camera"), ("frame_008", "Other")):
+        assert done[name] == right[name]
+        assert done[name][0]["rendered"]["camera"] == camera_name
+
+
+def test_a_frame_taken_by_another_camera_than_its_markers_is_caught(stage, other, batch, monkeypatch):
+    camera_object, render_still = stage.camera, renderers.render_still
+
+    def through_one_camera(scene):
+        with overridden() as overrides:
+            cameras_unbound(overrides, scene)
+            scene.camera = camera_object
+            render_still(scene)
+        scene.camera = camera_object
+
+    monkeypatch.setattr(renderers, "render_still", through_one_camera)
+    found = verdicts(batch(*makers.frames("7..8")))
+    assert found["frame_007"]["passed"] and not found["frame_008"]["passed"], found
 
 
 def test_a_failed_check_is_exit_status_1_and_one_that_passes_after_it_is_0(stage, spoil, monkeypatch, tmp_path, capfd):
