@@ -260,8 +260,8 @@ class CameraSync:
         is_asked = bool(storage.asked_of(camera_object))
         stood = values
         # A render's graph writes nothing back to the camera, so that its state says nothing of how it stands there.
-        may_have_moved = is_render or not self.is_untouched(by_values=True)
-        if may_have_moved and causes.may_move(camera_object, conversion.PARTS - decided):
+        others = conversion.PARTS - decided
+        if causes.may_move(camera_object, others) and (is_render or not self.is_untouched(by_values=True)):
             values, level = self._carried(evaluated, values, level, decided, scene, depsgraph)
         self._place(rolls.turned(level, hold.roll(evaluated, values, scene)), scene, depsgraph, decided)
         if is_render:
@@ -447,10 +447,10 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
 def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
     """State the four values that make the camera as it stands, and enable them. The camera does not move.
 
-    Values that say so already keep every digit. If it takes a held roll as well, that goes into up, unless they were off: then it
-    stays. The look-at point keeps its distance to the eye if values have ever been in
-    use; else it lies in the plane of focus (that of the focus object, if it stands before the camera, or the focus distance,
-    10 m in a new camera). Up is the world's Z where this gives the same picture, else v.
+    Values that say so already keep every digit. If it takes a held roll as well, that goes into up, unless they were off: then
+    it stays. The look-at point keeps its distance to the eye if values have ever been in use; else it lies in the plane of
+    focus (that of the focus object, if it stands before the camera, or the focus distance, 10 m in a new camera). Up is the
+    world's Z where this gives the same picture, else v.
 
     Raises
     ------
