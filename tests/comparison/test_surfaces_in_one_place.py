@@ -122,8 +122,8 @@ def test_any_of_several_surfaces_in_one_place_is_right_and_the_objects_are_named
 def test_leaves_of_a_pixel_are_seen(reference):
     """Else the other tests prove nothing of them."""
     shown = reference["Object Index"][..., 0] == 4
-    lonely = tolerances.lonely(np.where(shown, 4, -1))
-    assert lonely.sum() > 0.5 * shown.sum() > 60
+    alone = tolerances.at_borders(np.where(shown, 4, -1))
+    assert alone.sum() > 0.5 * shown.sum() > 60
 
 
 def test_nothing_is_explained_without_the_scene(tracer, reference):

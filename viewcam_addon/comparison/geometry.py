@@ -83,8 +83,8 @@ def compare(
     kinds, in_one_place = kinds_of(expected, seen, agreement), NOWHERE
     if surfaces_at is not None:
         _check_reference(reference.source, expected, np.flatnonzero(kinds >= 0), agreement, surfaces_at)
-        lonely = tolerances.lonely(np.where(hit, expected["Object Index"][:, 0], -1).reshape(size)).ravel()
-        kinds, expected, agreement, in_one_place = settle(kinds, expected, seen, agreement, lonely, surfaces_at)
+        borders = tolerances.at_borders(np.where(hit, expected["Object Index"][:, 0], -1).reshape(size)).ravel()
+        kinds, expected, agreement, in_one_place = settle(kinds, expected, seen, agreement, borders, surfaces_at)
     # At an edge the ray may meet either surface, so a re-traced one is judged by the steepest slope around.
     steepest = {name: largest_around(slope.reshape(size)).ravel() for name, slope in agreement.slopes.items()}
     # Where an edge has moved, a pixel shows the surface's plane beyond it: as far as edges move, and its slope's worth.

@@ -254,18 +254,18 @@ NOWHERE = InOnePlace(np.empty(0, np.intp), np.empty(0, np.intp), np.empty((0, 2)
 
 
 def settle(
-    kinds: NDArray, expected: Seen, seen: Seen, agreement: SurfaceAgreement, lonely: NDArray[np.bool_], surfaces_at: SurfacesAt
+    kinds: NDArray, expected: Seen, seen: Seen, agreement: SurfaceAgreement, borders: NDArray[np.bool_], surfaces_at: SurfacesAt
 ) -> tuple[NDArray, Seen, SurfaceAgreement, InOnePlace]:
     """Settle pixels that differ by what the scene tells at their centers: how steep the surface itself is, and what else is in
     its place.
 
-    kinds : of all pixels, as `kinds_of` has them. lonely : those whose slopes the picture does not tell.
+    kinds : of all pixels, as `kinds_of` has them. borders : those where the picture does not tell all of their slopes.
 
     Returns the kinds and the reference's passes, in which pixels that show another surface in the same place show that; the
     agreement with their slopes; and which pixels these are.
     """
     width, differs = agreement.pinhole.width, (kinds >= 0) & (kinds != KINDS.index("not a number"))
-    asked = np.flatnonzero((lonely | differs) & tolerances.is_hit(expected))
+    asked = np.flatnonzero((borders | differs) & tolerances.is_hit(expected))
     kinds, expected = kinds.copy(), {name: values.copy() for name, values in expected.items()}
     agreement = replace(agreement, slopes={name: slope.copy() for name, slope in agreement.slopes.items()})
     pixels, objects = [NOWHERE.columns], [NOWHERE.objects]

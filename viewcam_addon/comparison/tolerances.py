@@ -185,20 +185,17 @@ def slopes(values: NDArray, belongs: NDArray) -> Array:
     return slope
 
 
-def lonely(belongs: NDArray) -> NDArray[np.bool_]:
-    """(height, width): pixels without a neighbour of the same object to the left or right, or above or below.
+def at_borders(belongs: NDArray) -> NDArray[np.bool_]:
+    """(height, width): pixels of an object one of whose four neighbours shows another, or nothing, or is beyond the picture.
 
-    Of these `slopes` knows too little.
+    On that side `slopes` knows nothing, and near its silhouette a round surface turns the faster the nearer it comes.
     """
-    alone = np.zeros(belongs.shape, bool)
+    inside = np.ones(belongs.shape, bool)
     for axis in (0, 1):
-        beside = np.zeros(belongs.shape, bool)
-        here, there = ((*(slice(None),) * axis, side) for side in (slice(None, -1), slice(1, None)))
-        same = belongs[there] == belongs[here]
-        beside[here] |= same
-        beside[there] |= same
-        alone |= ~beside
-    return alone & (belongs >= 0)
+        beside = np.pad(belongs, 1, constant_values=-1).take(range(1, 1 + belongs.shape[1 - axis]), 1 - axis)
+        for first in (0, 2):
+            inside &= beside.take(range(first, first + belongs.shape[axis]), axis) == belongs
+    return ~inside & (belongs >= 0)
 
 
 def angle_between(a: NDArray, b: NDArray) -> Array:

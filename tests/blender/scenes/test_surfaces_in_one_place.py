@@ -1,6 +1,7 @@
 """Surfaces in one place and things of a pixel, rendered by Cycles: either is right, and each has its own slope."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from viewcam_addon.comparison import geometry
 from viewcam_addon.image import Image
 from viewcam_addon.tracer import render
 
+SPHERES = Path(__file__).resolve().parents[3] / "sample_scenes" / "spheres.blend"
 SQUARE = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
 TILTED = (0.3, 0.2, 0.1)
 
@@ -171,3 +173,15 @@ def test_things_of_a_pixel_are_the_same_picture(both_sides, sheet, add, mesh_fro
     flipped = replace(Image(sides.cycles), passes={**sides.cycles, "Normal": sides.cycles["Normal"].copy()})
     flipped["Normal"].reshape(-1, 3)[shown[len(shown) // 2]] *= -1
     assert not geometry.compare(Image(sides.traced), flipped, sides.exported.camera, tracer.surfaces_at).passed
+
+
+@pytest.mark.parametrize(("width", "height"), [(16, 9), (32, 18)])
+def test_thousands_of_spheres_in_a_few_pixels_are_the_same_picture(both_sides, width, height):
+    """Nearly every pixel is at a silhouette, where the neighbors tell too little of how fast the normal turns."""
+    bpy.ops.wm.open_mainfile(filepath=str(SPHERES))
+    sides = both_sides(width=width, height=height)
+    assert sides.comparison.passed, "\n".join(sides.comparison.lines())
+    turned = np.roll(sides.cycles["Normal"], 1, axis=1)  # each pixel has its neighbor's
+    wrong = Image({**sides.cycles, "Normal": turned})
+    tracer = render.Tracer(sides.exported, 1)
+    assert not geometry.compare(Image(sides.traced), wrong, sides.exported.camera, tracer.surfaces_at).passed
