@@ -87,15 +87,14 @@ def by_loop(blender: Blender, shots: list[Job], blend: Path, folder: Path, denoi
     seconds = np.zeros(2)
     for shot in shots:
         image = str(folder / f"{shot.name}_####")
-        script = ONE_SHOT.format(shot=json.dumps(vars(shot)), image=image, denoise=denoise)
+        script = ONE_SHOT.format(shot=json.dumps(shot.to_json()), image=image, denoise=denoise)
         seconds += blender.run("-b", blend, "--python-exit-code", "1", "--python-expr", script, "-f", 1)
     return seconds
 
 
 def by_batch(blender: Blender, shots: list[Job], blend: Path, folder: Path) -> Seconds:
     folder.mkdir(parents=True)
-    rows = [{key: value for key, value in vars(shot).items() if value is not None} for shot in shots]
-    (folder / "shots.json").write_text(json.dumps(rows), encoding="utf-8")
+    (folder / "shots.json").write_text(json.dumps([shot.to_json() for shot in shots]), encoding="utf-8")
     return blender.run("-b", blend, "--command", "viewcam", "batch", folder / "shots.json", "--out", folder)
 
 
@@ -146,7 +145,7 @@ def memory(count: int, engine: str, blender: Blender, folder: Path) -> Iterator[
     """What the batch's process takes, as it goes on."""
     still = STILL.resized(64, 36)
     shots = [replace(shot, engine=engine, samples=1) for shot in orbit(still, count)]
-    (folder / "shots.json").write_text(json.dumps([vars(shot) for shot in shots]), encoding="utf-8")
+    (folder / "shots.json").write_text(json.dumps([shot.to_json() for shot in shots]), encoding="utf-8")
     arguments = ["--command", "viewcam", "batch", folder / "shots.json", "--out", folder / "out", "--log-json"]
     process = blender.start("-b", without_denoising(blender, folder), *arguments)
     done, started = 0, time.perf_counter()

@@ -118,9 +118,8 @@ def measured(shots: Sequence[Job], folder: Path) -> dict[str, Spent]:
 
 def labelled(blend: Path, shots: Sequence[Job], folder: Path) -> Spent:
     """What `viewcam batch` takes, which makes a folder named as the first shot; SystemExit if it fails."""
-    rows = [{key: value for key, value in vars(shot).items() if value is not None} for shot in shots]
     listed = blend.with_name("shots.json")
-    listed.write_text(json.dumps(rows), encoding="utf-8")
+    listed.write_text(json.dumps([shot.to_json() for shot in shots]), encoding="utf-8")
     arguments = ["batch", blend, listed, "--labels", KINDS, "--labels-only", "--out", folder / shots[0].name]
 
     def run() -> None:
@@ -138,7 +137,7 @@ def prepare_passes(blend: Path, shots: Sequence[Job], folder: Path) -> dict[str,
     import bpy
 
     import viewcam_addon
-    from viewcam_addon.blender import camera, opening, versions
+    from viewcam_addon.blender import conversion, opening, versions
     from viewcam_addon.blender.rendering.cycles import override_all
     from viewcam_addon.blender.temporary_settings import overridden
     from viewcam_addon.pinhole import Pinhole
@@ -168,7 +167,7 @@ def prepare_passes(blend: Path, shots: Sequence[Job], folder: Path) -> dict[str,
             scene.collection.objects.link(scene.camera)
             for frame, shot in enumerate(shots, 1):
                 pinhole = Pinhole(shot.eye, shot.look_at, shot.up, shot.d, shot.width, shot.height)
-                camera.place(scene.camera, pinhole, scene)
+                conversion.place(scene.camera, pinhole, scene)
                 for path in ("location", "rotation_euler"):
                     scene.camera.keyframe_insert(path, frame=frame)
             bpy.ops.render.render(animation=True)

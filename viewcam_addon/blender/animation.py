@@ -28,8 +28,7 @@ def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | Non
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
     targets.forget_shapes(depsgraph)
     for block in _evaluated_cameras(depsgraph):
-        if not resolution.is_paused or datablocks.is_animated(block):
-            _at_frame(block, scene, depsgraph)
+        _at_frame(block, scene, depsgraph)
     resolution.on_frame_change(scene, depsgraph)
 
 

@@ -156,7 +156,8 @@ def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
 
 
 def test_a_camera_that_is_not_where_it_was_put_differs_and_then_is_mended(seen):
-    """Twice by the operator: one image, of the second comparison in the end."""
+    """Twice by the operator: one image, of the second comparison in the end. The eye is keyed, so that it does not follow."""
+    seen.camera.virtual_pinhole.keyframe_insert("eye", frame=1)
     limit = seen.camera.constraints.new("LIMIT_LOCATION")
     limit.use_min_x, limit.min_x = True, seen.camera.location.x + 0.01
     bpy.context.view_layer.update()

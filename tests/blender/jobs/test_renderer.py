@@ -3,10 +3,12 @@
 import os
 import shutil
 
+import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon.blender import animation
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import export_geometry, images
 from viewcam_addon.errors import InputError
@@ -109,6 +111,43 @@ def test_another_size_of_a_keyed_zoom_and_distance_shows_the_same(blend, both_si
     exported = both.exported
     assert exported.camera.distance == pytest.approx((225, 225), rel=1e-6)
     assert exported.stated_camera.distance == pytest.approx(exported.camera.distance, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [None, (80, 60)])
+def test_a_camera_that_keyframes_move_and_zoom_is_stated_where_it_is_at_each_frame(blend, size):
+    camera_object = bpy.data.objects["Camera"]
+    lens, (x, _, _) = camera_object.data.lens, camera_object.location
+    for frame, share in ((1, 0), (11, 1)):
+        camera_object.location.x, camera_object.data.lens = x + share, lens * (1 + share)
+        camera_object.keyframe_insert("location", frame=frame)
+        camera_object.data.keyframe_insert("lens", frame=frame)
+    bpy.context.scene.frame_set(1)
+    width, height = size or (None, None)
+    exported = jobs.export(Job(blend=blend(), frame=11, width=width, height=height))
+    camera, stated = exported.camera, exported.stated_camera
+    assert camera.eye[0] == pytest.approx(1) and camera.distance[0] == pytest.approx(2 * 180 * camera.width / 160)
+    assert stated.eye == pytest.approx(camera.eye) and stated.distance == pytest.approx(camera.distance, rel=1e-6)
+    np.testing.assert_allclose(stated.basis(), camera.basis(), atol=1e-6)  # float32 storage, a few times over
+
+
+@pytest.mark.parametrize("way", ["by hand", "by a constraint"])
+def test_a_camera_that_was_moved_where_the_add_on_is_not_is_stated_where_its_values_say(blend, way):
+    """A check is of the values that the file states: to read them off the camera would find nothing."""
+    camera_object = bpy.data.objects["Camera"]
+    bpy.context.view_layer.update()
+    animation.unregister()
+    try:
+        if way == "by hand":
+            camera_object.location.z = 5
+        else:
+            limit = camera_object.constraints.new("LIMIT_LOCATION")
+            limit.use_max_z, limit.max_z = True, 5
+        path = blend()
+    finally:
+        animation.register()
+    for job in (Job(blend=path), Job(blend=path, width=80, height=60)):
+        exported = jobs.export(job)
+        assert exported.camera.eye[2] == 5 and exported.stated_camera.eye == (0, -0.5, 6)
 
 
 def test_another_size_than_the_percentage_of_the_scene(blend, scene):

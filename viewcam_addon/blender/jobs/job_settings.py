@@ -90,7 +90,11 @@ class JobSettings:
         return dataclasses.replace(self._frame_of_file, **said)
 
     def set(self, shot: Job) -> None:
-        """Set the scene to a shot, but for its camera. What stands so already is not touched, so that nothing is built anew."""
+        """Set the scene to a shot, but for its camera. What stands so already is not touched, so that nothing is built anew.
+
+        The frame comes first: a camera's values follow its animation there in the picture that they are set for.
+        """
+        self._go_to(*(self._time_of_file if shot.frame is None else (shot.frame, 0.0)))
         wanted = self._of_file | dict(self._said(shot))
         changed = [(owner, name) for (owner, name), value in wanted.items() if getattr(owner, name) != value]
         for owner, name in changed:
@@ -98,7 +102,6 @@ class JobSettings:
         if _samples(self._scene).get("CYCLES") in changed:
             persistent_data.drop(self._scene)
         self._set_threads(shot.threads)
-        self._go_to(*(self._time_of_file if shot.frame is None else (shot.frame, 0.0)))
 
     def _set_threads(self, threads: int | None) -> None:
         """As many as a job asks for, those of the file where None. Of automatic ones the file's number reads as another."""

@@ -140,14 +140,15 @@ class BlenderRenderer:
         OSError
             if the disk is full.
         """
-        warnings = self._set(shot)
-        if image and preview:
-            with overridden() as overrides:
-                overrides.set(self.scene.render, "use_multiview", False)  # here alone: a check's ledger tells of stereoscopy
+        with overridden() as overrides:
+            overrides.set(self.scene.render, "use_multiview", False)  # here alone: a check's ledger tells of stereoscopy
+            warnings = self._set(shot)
+            if image and preview:
                 if self._settings.engine == "EEVEE" and not self._has_drawn:  # see persistent_data.py
                     render_still(self.scene)
                     self._has_drawn = True
                 render_still(self.scene)
+        if image and preview:
             if self.scene.render.engine == VIEWCAM_RenderEngine.bl_idname:
                 warnings += VIEWCAM_RenderEngine.warnings
             pictures.write(self.scene, image, preview)
