@@ -209,10 +209,11 @@ def test_npz_of_numpy_is_read_and_pickle_is_not(tmp_path):
     rows = np.array(axes.world_to_camera(pinhole))
     k = np.array(axes.intrinsics(pinhole)) - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
     data = {"K": k, "R": rows[:3, :3], "t": rows[:3, 3], "image_size": [640, 360]}
-    np.savez(tmp_path / "pickled.npz", **data, other=np.array([{"a": 1}], dtype=object))
+    pickled = np.array([{"a": 1}], dtype=object)
+    np.savez(tmp_path / "pickled.npz", **(data | {"K": pickled}))
     with pytest.raises(InputError):
         cameras.read(tmp_path / "pickled.npz")
-    np.savez(tmp_path / "camera.npz", **data)
+    np.savez(tmp_path / "camera.npz", **data, other=pickled)  # which is none of the camera's, and is not read
     (back,) = cameras.read(tmp_path / "camera.npz")
     same_picture(back, pinhole)
 

@@ -97,7 +97,7 @@ def test_the_scene_is_not_asked_for_where_it_is_given(paper_scene):
     """No ray explains a pixel without a number, and the sentence said: give the scene too."""
     test = paper_scene.rendered()
     test["Position"][50, 50:60] = np.nan
-    sentence = compare(paper_scene.picture(), test, paper_scene.pinhole, paper_scene.surface_at).sentence
+    sentence = compare(paper_scene.picture(), test, paper_scene.pinhole, paper_scene.surfaces_at).sentence
     assert "give the scene" not in sentence and "holds no number" in sentence
 
 
