@@ -109,7 +109,7 @@ def test_hair_that_is_not_seen_and_casts_a_shadow_into_the_picture_makes_it_ambe
     bpy.context.view_layer.update()
     told = stage("path").figures
     assert told["answer"] == "same_but" and told["not_modelled"]["names"] == ["Ball"], told["sentence"]
-    assert told["not_modelled"]["shown"] == 0.0 and told["not_modelled"]["share"] > 0.01
+    assert told["not_modelled"]["shown"] == 0.0 and told["not_modelled"]["share"] > 0.005, told["not_modelled"]
 
 
 def test_surface_scattering_below_the_skin_is_no_matter_of_geometry(stage):
