@@ -24,7 +24,8 @@ def test_shots_come_out_of_it_and_again_only_those_that_are_missing(real_blender
 
 
 def test_what_stands_in_braces_is_an_event_and_the_last_tells_the_status(real_blender, tmp_path):
-    (tmp_path / "orbit_001.png").mkdir()
+    (tmp_path / "file").touch()
+    (tmp_path / "orbit_001.png").symlink_to(tmp_path / "file" / "picture.png")  # which is no folder
     done = batch(real_blender, *ORBIT, tmp_path, "--log-json")
     told = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     events = [event["event"] for event in told]
