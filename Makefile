@@ -69,7 +69,7 @@ test-sanitizers: test-sanitizer-address test-sanitizer-thread
 
 test-sanitizer-%: .venv/test
 	CXX=g++ .venv/bin/python hatch_build.py --sanitize $(sanitizers-$*) --into build/sanitized/$*
-	env -u BLENDER LD_PRELOAD="$(preload-$*)" ASAN_OPTIONS=detect_leaks=0 TSAN_OPTIONS=halt_on_error=1 PYTHONPATH=build/sanitized/$* \
+	env -u BLENDER LD_PRELOAD="$(preload-$*)" ASAN_OPTIONS=detect_leaks=0 TSAN_OPTIONS="halt_on_error=1 suppressions=tests/tracer/thread_sanitizer.txt" PYTHONPATH=build/sanitized/$* \
 	VIEWCAM_LEAK_RAYS=300 $(calls-$*) .venv/bin/python -m pytest -p no:cacheprovider $(tests-$*)
 
 lint: .venv/test
