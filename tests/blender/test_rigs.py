@@ -281,7 +281,7 @@ def test_a_track_to_that_is_no_look_at_point_is_refused_and_stays(rigged, change
 
 
 def test_an_eye_on_a_keyed_location_and_a_look_at_target_go_together(rigged, scene, empty):
-    """What is animated of the values wins of its part alone."""
+    """An animated value wins of its part alone."""
     camera_object = rigged("keyed")
     versions.remove_curves(camera_object, "rotation_euler")
     before = flight_of(camera_object, scene)

@@ -13,7 +13,7 @@ def findings_after_setting(camera_object, scene):
 
 
 def findings_after_moving(camera_object, scene):
-    """What is told of a camera that is set elsewhere; the values follow afterwards."""
+    """The findings about a camera that is set elsewhere; the values follow afterwards."""
     return cameras.apply(camera_object, Pinhole((7, -6, 5), (0, 0, 1), (0, 0, 1), 1500, 1920, 1080), scene)
 
 

@@ -17,7 +17,7 @@ pytest.importorskip("pxr")
 
 GIVEN = Options(size=(640, 360))
 SECONDS = 20
-"""What a busy machine may take to answer; a stage without bounds takes minutes."""
+"""The time that a busy machine may take to answer; a stage without bounds takes minutes."""
 
 
 def stage(inside="", head='metersPerUnit = 1\n    upAxis = "Z"', name="Cam", at="(3, -1.5, -4.5)"):

@@ -71,7 +71,7 @@ class PaperScene:
         return {name: values.astype(np.float32) for name, values in passes.items()}
 
     def surfaces_at(self, columns, rows, px=0.5, py=0.5):
-        """The same as of a scene where no two surfaces are in one place."""
+        """The surfaces that rays meet, as of a scene where no two are in one place."""
         seen = self.surface_at(columns, rows, px, py)
         names = np.array(["", "ground", *(f"sphere {i}" for i in range(len(self.spheres)))], dtype=object)
         return np.arange(len(columns)), names[seen["Object Index"][:, 0].astype(int)], seen

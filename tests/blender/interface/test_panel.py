@@ -347,7 +347,7 @@ def test_in_the_narrowest_sidebar_no_words_stand_beside_others(posed_camera, eac
 
 
 def test_a_camera_that_is_not_enabled_shows_its_own_values_greyed_and_one_button(posed_camera):
-    """What is stored is stale: its own are where it stands."""
+    """Stored values are stale: its own are where it stands."""
     posed_camera.virtual_pinhole.enabled = False
     posed_camera.location, posed_camera.rotation_euler, posed_camera.data.lens = (0, -8, -1e-8), (math.pi / 2, 0, 0), 50
     bpy.context.view_layer.update()

@@ -273,7 +273,7 @@ def chosen_by_blender(scene, frame):
 
 
 def test_shots_of_frames_are_taken_by_the_camera_that_blender_chooses_at_each(stage, shoot):
-    """Those of the frame at which the file was saved took them all, and a check passed over it."""
+    """The camera of the frame at which the file was saved took them all, and a check passed over it."""
     before = state()
     eyes = {name: tuple(stage.objects[name].location) for name in ("First", "Second")}
     with BlenderRenderer() as renderer:

@@ -1,4 +1,4 @@
-"""What is shown of light goes through the scene's view transform, and the scene stays as it is."""
+"""Pictures of light are shown through the scene's view transform, and the scene stays as it is."""
 
 import numpy as np
 import pytest

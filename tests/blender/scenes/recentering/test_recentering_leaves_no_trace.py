@@ -35,7 +35,7 @@ def file_state():
 
 
 def near_the_origin(entry):
-    """What an entry says but for triangles that far from the origin, in float32, lie exactly where others do."""
+    """An entry as a tuple, but for triangles that far from the origin, in float32, lie exactly where others do."""
     return entry.object, entry.status, "" if "lie exactly where" in entry.reason else entry.reason
 
 
