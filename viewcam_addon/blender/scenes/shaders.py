@@ -126,8 +126,9 @@ _MOST_DEEP = 100
 class Reading:
     """A Blender material as the tracer has it.
 
-    images : key in `Colour.image` → the image. texts : of IES files, where nodes are made that show them. renamed : what
-    attributes of these names are called there. reasons : why it is approximated, one clause each, about the material.
+    images : key in `Colour.image` → the image.
+    texts : of IES files, where nodes are made that show them.
+    reasons : why it is approximated, one clause each, about the material.
     """
 
     material: Material = PLAIN
@@ -135,7 +136,6 @@ class Reading:
     alphas: set[str] = field(default_factory=set)
     tables: dict[str, Picture] = field(default_factory=dict)
     texts: dict[str, bpy.types.Text] = field(default_factory=dict)
-    renamed: dict[str, str] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
 
     @functools.cached_property
