@@ -1,6 +1,7 @@
 """The tour: the proof in one click, scene files, presets, preferences."""
 
 import os
+import shutil
 import tempfile
 from pathlib import Path
 
