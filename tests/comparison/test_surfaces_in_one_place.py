@@ -123,7 +123,9 @@ def test_a_twin_whose_normals_are_a_little_off_is_told_from_the_one_that_is_seen
     """As after a subdivision of doubled faces: any pixel of it would pass by itself, and a tenth of the picture does not."""
     floor = square(2.0)
     scene = a_scene()
-    turn = 12 * np.median(tolerances.position_shift(CAMERA, Tracer(scene, 1).surface_at(*np.mgrid[50:70, 30:50].reshape(2, -1))))
+    turn = 12 * np.median(
+        tolerances.position_shift(CAMERA, Tracer(scene, 1).surface_at(*np.mgrid[50:70, 30:50].reshape(2, -1)))
+    )
     normals = [np.tile(np.array([np.sin(angle), 0, np.cos(angle)], np.float32), (2, 3, 1)) for angle in (0.0, turn)]
     geometries = {name: replace(floor, corner_normals=each) for name, each in zip(("floor", "twin"), normals, strict=True)}
     objects = tuple(Object(name, name.lower(), tilted(np.eye(4)), 1) for name in ("Floor", "Twin"))
