@@ -89,7 +89,7 @@ def test_wrong_usage_is_an_event_and_a_sentence_too(capfd, words, command, said)
 
 def test_a_check_s_child_processes_tell_as_if_they_were_none(tmp_path, capfd):
     pytest.importorskip("bpy")
-    from viewcam_addon.commands.verification import DEMO_SCENE
+    from viewcam_addon.commands.demo import SCENE as DEMO_SCENE
 
     words = ["check", str(DEMO_SCENE), "--size", "64x36", "--json", str(tmp_path / "result.json"), "--log-json"]
     status = main(words)

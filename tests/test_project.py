@@ -63,7 +63,7 @@ ROOMS = {
         "intrinsics camera_values cameras comparison tracer labels jobs"
     ),
     "commands": ("errors files terminal argument_types events crashes pinhole image cameras comparison tracer labels api jobs"),
-    "cli": "errors checks files junit events argument_types tracer jobs commands",
+    "cli": "errors checks files junit events argument_types commands",
 }
 BLENDER_ROOMS = {
     "versions": "",

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("bpy")
 
 from viewcam_addon.cli import main
-from viewcam_addon.commands.verification import DEMO_SCENE
+from viewcam_addon.commands.demo import SCENE as DEMO_SCENE
 
 ROOT = Path(__file__).parents[2]
 CORNELL = DEMO_SCENE.with_name("cornell.blend")

@@ -14,9 +14,10 @@ import pytest
 pytest.importorskip("bpy")
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from batch_folders import assert_same
+from walks import walk
 
 from viewcam_addon.cli import main
-from viewcam_addon.commands.verification import DEMO_SCENE
+from viewcam_addon.commands.demo import SCENE as DEMO_SCENE
 
 ROOT = Path(__file__).parents[2]
 FLIGHT = DEMO_SCENE.with_name("flight.blend")
@@ -122,3 +123,48 @@ def test_killed_in_its_middle_and_continued_by_two_workers_it_is_the_same_byte_f
     (alone / ".viewcam.lock").unlink(missing_ok=True)
     assert_same(out, alone)
     assert len(list(ElementTree.parse(junit).getroot().iter("testcase"))) == 4
+
+
+ROOMS = ("tracer", "comparison", "jobs", "blender", "commands")
+STATIONS = ["commands/check.py run", "blender/jobs/renderer.py BlenderRenderer.check", "blender/jobs/checking.py Checker.check"]
+STATIONS_OF_THE_TRACER = ["jobs/tracing.py _Server._compare", "tracer/render.py render", "comparison/geometry.py compare"]
+
+# The tracer's process, which reads its request and tells its answer and its walk. It is no part of Blender's.
+TRACER = """
+import json, sys
+from viewcam_addon.jobs import tracing
+from walks import walk
+
+answers, server = [], tracing._Server()
+request = json.load(sys.stdin)
+entered, upward = walk(lambda: answers.append(server.answer(request, lambda *_, **__: None)), tuple(sys.argv[1:]))
+json.dump([answers[0], entered, upward], sys.stdout)
+"""
+
+
+def test_the_walk_of_a_check_enters_each_station_once_and_never_calls_upward(monkeypatch):
+    """As CONTRIBUTING draws it: commands, Blender, jobs, tracer, comparison."""
+    from viewcam_addon.jobs.render_client import BLENDER
+    from viewcam_addon.jobs.tracing import Tracing
+
+    monkeypatch.delenv(BLENDER, raising=False)
+    asked = []
+
+    def ask(_self, request):
+        variables = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])}
+        words = [sys.executable, "-c", TRACER, *ROOMS]
+        done = subprocess.run(words, env=variables, input=json.dumps(request), capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        answer, *walked = json.loads(done.stdout)
+        asked.append(walked)
+        return answer
+
+    monkeypatch.setattr(Tracing, "ask", ask)
+    results = []
+    entered, upward = walk(lambda: results.append(check(CORNELL, *SMALL)), ROOMS)
+    assert results == [0]
+    ((entered_there, upward_there),) = asked
+    assert upward == [] == upward_there
+    assert [each for each in entered if each in STATIONS] == STATIONS
+    assert [each for each in entered_there if each in STATIONS_OF_THE_TRACER] == STATIONS_OF_THE_TRACER
+    assert not [each for each in entered_there if each.startswith(("blender/", "commands/"))]

@@ -149,10 +149,10 @@ def test_an_engine_is_checked_by_what_it_can_show():
 
 
 def test_the_words_of_a_check_are_the_job(monkeypatch):
-    from viewcam_addon.commands import verification
+    from viewcam_addon.commands import check
 
     asked = []
-    monkeypatch.setattr(verification, "check_one", lambda each, *_, **__: asked.append(each) or (0, {}))
+    monkeypatch.setattr(check, "check_one", lambda each, *_, **__: asked.append(each) or (0, {}))
     wanted = Job(camera="Left eye", frame=-3, engine="CYCLES", **{**OTHERS, "threads": None})
     assert cli.main(shlex.split(wanted.check_words())) == 0
     assert asked == [wanted]

@@ -8,7 +8,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from viewcam_addon.commands.verification import DEMO_SCENE
+from viewcam_addon.commands.demo import SCENE as DEMO_SCENE
 
 CORNELL = DEMO_SCENE.with_name("cornell.blend")
 ORBIT = ("--orbit", "3", "--size", "16x16", "--samples", "1", "--out")

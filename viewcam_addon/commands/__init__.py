@@ -1,4 +1,8 @@
-"""The sub-commands of `viewcam`. Each returns the exit status and what --json writes."""
+"""The sub-commands of `viewcam`, a module each, of the command's name.
+
+`add_options(parser, blend_is_open)` adds its options to a parser that has those of every command already; `run(options)`
+returns the exit status and what --json writes. options.py has the options of several.
+"""
 
 import importlib
 import importlib.util

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from .. import argument_types as types
 from .. import cameras
 from ..cameras import Camera, Options
 from ..cameras.audit import Depths, Tracks, audit, tracks_through
@@ -14,6 +15,20 @@ from ..cameras.evidence import depths, tracks
 from ..errors import InputError
 from ..terminal import say, silent_libraries
 from . import Result, blender_room
+from . import options as shared
+
+
+def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
+    added.add_argument(
+        "dataset", metavar="DATASET", type=types.path, help="transforms.json, a COLMAP model, or the folder of one"
+    )
+    by = added.add_mutually_exclusive_group()
+    by.add_argument("--points", metavar="COLMAP", type=types.path, help="a COLMAP model of the same pictures and world")
+    by.add_argument("--against", metavar="CAMERAS", type=types.path, help="true cameras of the same pictures, in any format")
+    text = "the file that was rendered, whose cameras are called as the pictures, or whose frames end their names"
+    by.add_argument("--blend", metavar="FILE.blend", type=types.path, help=text)
+    shared.add_of_job(added, "trust")
+    added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
 
 
 def run(options: argparse.Namespace) -> Result:

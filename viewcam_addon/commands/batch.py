@@ -15,6 +15,7 @@ from ..jobs.job import ENGINES, LEVELS, Job
 from ..jobs.plan import Plan
 from ..labels import KINDS
 from . import Result
+from . import options as shared
 from .camera import add_reading_options, options_of
 from .carry_out import add_machines, carry_out
 
@@ -44,7 +45,7 @@ exit status:
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
-    """Add the command's options to its parser, which has those of every command already."""
+    shared.add_blend(added, blend_is_open)
     added.formatter_class = argparse.RawDescriptionHelpFormatter
     command, file = ("blender -b FILE.blend --command viewcam batch", "") if blend_is_open else ("viewcam batch", " FILE.blend")
     added.usage = f"{command}{file} (SHOTS | --orbit N | --frames A..B | --cameras GLOB) --out DIR [OPTION …]"

@@ -20,8 +20,7 @@ from . import Result
 _MOST_CHARACTERS = 100_000_000
 
 
-def add_options(added: argparse.ArgumentParser) -> None:
-    """Add the command's options to its parser, which has those of every command already."""
+def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     added.add_argument("file", metavar="FILE", help="a file or folder with cameras; - for standard input")
     added.add_argument("--list", action="store_true", help="a line for each camera, and what is to be said of them")
     added.add_argument("--camera", metavar="NAME", help="only this one of them")

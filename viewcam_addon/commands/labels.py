@@ -3,6 +3,7 @@
 import argparse
 import json
 
+from .. import argument_types as types
 from ..errors import InputError
 from ..files import written_whole
 from ..labels import bop, coco, colmap, kitti
@@ -10,6 +11,17 @@ from ..terminal import say
 from . import Result
 
 _FOLDERS = {"bop": bop, "kitti": kitti}
+
+
+def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
+    added.set_defaults(writes=("output",))
+    added.add_argument("folder", metavar="FOLDER", type=types.path, help="where viewcam render --labels has written")
+    added.add_argument("output", metavar="OUT", type=types.path, help="a file of COCO's; of another format a new folder")
+    words = "COCO's instances (default) or panoptic format; BOP's scene; COLMAP's points and tracks; KITTI's depth and flow"
+    added.add_argument("--to", choices=["coco", "panoptic", "colmap", *_FOLDERS], default="coco", help=words)
+    added.add_argument("--amodal", action="store_true", help="whole objects, in place of what is visible of them")
+    words = "for COLMAP: points that are sampled in each picture (default: 1000)"
+    added.add_argument("--points", type=types.positive, metavar="N", help=words)
 
 
 def run(options: argparse.Namespace) -> Result:

@@ -4,8 +4,13 @@ import argparse
 from pathlib import Path
 
 from ..jobs import plan, render_server
-from . import Result, blender_room, verification
+from . import Result, blender_room, check
 from .carry_out import carry_out
+
+
+def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
+    added.add_argument("what")
+    added.set_defaults(json=None, log_json=True, writes=(), blend=None)
 
 
 def run(options: argparse.Namespace) -> Result:
@@ -20,6 +25,6 @@ def run(options: argparse.Namespace) -> Result:
     jobs, how, files = plan.read(Path(options.what))
     if how is None:
         options.json = plan.result_of(Path(options.what))
-        return verification.check_one(jobs[0], options, **files)
+        return check.check_one(jobs[0], options, **files)
     summary = carry_out(how, lambda _: jobs, options.events)
     return summary.exit_status, summary.to_json()

@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
-from .. import checks
+from .. import argument_types, checks
 from ..errors import InputError
 from ..pinhole import Triple, check_distance
 from ..tracer.scene import film
@@ -37,8 +37,16 @@ _THREADS = (1, 1024)
 _ASPECTS = (1 / 200, 200.0)
 _LARGEST_FLOAT32, _SMALLEST_FLOAT32 = (2.0 - 2.0**-23) * 2.0**127, 2.0**-126
 
+_STRICT = "exit with 3 if anything is not modelled: of the picture where one is compared, else of the file"
+_SCENE = "the scene that Cycles must show, as viewcam export wrote it (default: what the file holds now)"
+
 FOUR_VALUES = ("eye", "look_at", "up", "d")
 BESIDE_THEM = ("principal_point", "pixel_aspect", "mirrored")
+
+
+def _option(words: str, default: Any = None, **how: Any) -> Any:
+    """A field that commands have an option for. words : its help. how : more of what argparse's add_argument takes."""
+    return dataclasses.field(default=default, metadata={"help": words, **how})
 
 
 @dataclass(frozen=True)
@@ -87,26 +95,26 @@ class Job:
     look_at: Triple | None = None
     up: Triple | None = None
     d: float | None = None
-    camera: str | None = None
+    camera: str | None = _option("the camera object (default: the scene's)", metavar="NAME")
     width: int | None = None
     height: int | None = None
-    frame: int | None = None
-    engine: str | None = None
+    frame: int | None = _option("the frame (default: the file's current one)", type=int, metavar="N")
+    engine: str | None = _option("who renders; all but Cycles at level geometry (default: CYCLES)", choices=TESTED)
     samples: int | None = None
     level: str | None = None
     principal_point: tuple[float, float] | None = None
     pixel_aspect: float | None = None
     mirrored: bool | None = None
     blend: str | None = None
-    trust: bool = False
+    trust: bool = _option("let what is in the file run and write: Python, shaders, caches", False)
     seed: int | None = None
     threads: int | None = None
     error: float | None = None
-    device: str = "CPU"
-    clay: bool = False
-    recenter: bool = False
-    strict: bool = False
-    scene: str | None = None
+    device: str = _option("what Cycles renders on, all of that kind (default: %(default)s)", "CPU", choices=DEVICES)
+    clay: bool = _option("the same matte material on everything, on both sides", False)
+    recenter: bool = _option("put the origin at the eye: for scenes far from it", False)
+    strict: bool = _option(_STRICT, False)
+    scene: str | None = _option(_SCENE, type=argument_types.path, metavar="SCENE.json")
 
     def __post_init__(self) -> None:
         for field, check in (FIELDS | _MORE).items():
@@ -143,12 +151,13 @@ class Job:
 
     def check_words(self) -> str:
         """The words of the command line that check this job alone, by the file's name and no more of its path."""
-        flags = [f"--{name}" for name in ("clay", "recenter", "strict", "trust") if getattr(self, name)]
-        size = ["--size", f"{self.width}x{self.height}"] if self.size else []
+        words = ["--size", f"{self.width}x{self.height}"] if self.size else []
         stated = self.to_json()
-        for name in ("camera", "frame", "engine", "device", "level", "samples", "error", "seed", "scene"):
-            size += [f"--{name}", str(stated[name])] if name in stated else []
-        return shlex.join(["check", Path(self.blend or "FILE.blend").name, *size, *flags])
+        optional = [field.name for field in dataclasses.fields(self) if field.metadata]
+        for name in (*optional, "level", "samples", "error", "seed"):
+            if name in stated:
+                words += [f"--{name}"] if stated[name] is True else [f"--{name}", str(stated[name])]
+        return shlex.join(["check", Path(self.blend or "FILE.blend").name, *words])
 
     def to_json(self) -> dict[str, Any]:
         """The fields that are not as they are by default, as JSON can hold them."""
