@@ -71,4 +71,4 @@ def _lens(
     width, height = size or options.size_or_refuse(name)
     plane = axes.view_plane(f, f, width / 2, height / 2, (width, height))
     lens = distortion.opencv({"k1": k1, "k2": k2})
-    return plane, size is not None, *distortion.settle(lens, plane, name, options)
+    return plane, size is not None, *distortion.settle(lens, plane, name, options.without_distortion)

@@ -3,14 +3,12 @@
 import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 from .. import checks
 from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
-
-if TYPE_CHECKING:
-    from .distortion import Lens
+from .distortion import Lens
 
 AXES = {
     "as_is": "As they are: the numbers stay those of the file",
@@ -50,7 +48,7 @@ class Camera:
     picture: bytes | None = field(default=None, repr=False)
     time: float | None = None
     left_out: tuple[tuple[str, str], ...] = field(default=(), repr=False)
-    lens: "Lens | None" = None
+    lens: Lens | None = None
 
     def noted(self, *notes: str) -> "Camera":
         """This camera with more notes, each of them once."""

@@ -185,7 +185,9 @@ def _plane(intrinsic: _Intrinsics, what: str, options: Options) -> tuple[ViewPla
         raise InputError(f"{what} has the focal length {min(f_x, f_y):g}: give one above 0")
     plane = axes.view_plane(f_x, f_y, values["cx"], values["cy"], (intrinsic.width, intrinsic.height))
     bent = {name: value for name, value in values.items() if name not in _STRAIGHT}
-    return plane, *distortion.settle(_lens(intrinsic.model, bent), plane, f"{what} ({intrinsic.model})", options)
+    return plane, *distortion.settle(
+        _lens(intrinsic.model, bent), plane, f"{what} ({intrinsic.model})", options.without_distortion
+    )
 
 
 def _lens(model: str, values: dict[str, float]) -> distortion.Lens:

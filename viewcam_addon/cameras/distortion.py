@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..pinhole import ViewPlane
-from .camera import NoPinholeError, Options
 
 _UNSEEN = 1e-3  # pixels: what this project calls the same camera
 _STEPS = 100  # of Newton's method, which takes five or so where there is an answer
@@ -193,16 +192,16 @@ def _tilted(tau_x: float, tau_y: float) -> np.ndarray:
     return np.array([[turn[2, 2], 0, -turn[0, 2]], [0, turn[2, 2], -turn[1, 2]], [0, 0, 1]]) @ turn
 
 
-def settle(lens: Lens, plane: ViewPlane, what: str, options: Options) -> tuple[Lens | None, tuple[str, ...]]:
-    """The lens that a camera has, None where that is none that a picture shows or the options leave it out; and notes.
+def settle(lens: Lens, plane: ViewPlane, what: str, left_out: bool) -> tuple[Lens | None, tuple[str, ...]]:
+    """The lens that a camera has, None where that is none that a picture shows; and notes.
 
-    what : whose, as a sentence names it.
+    what : whose, as a sentence names it. left_out : whether it is not wanted.
     """
     if lens.projection == "pinhole" and not any(value for _, value in lens.terms):
         return None, ()
     pixels = displacement(lens, plane)
     said = f"The lens distortion of {what} ({_listed(lens)})"
-    if options.without_distortion or pixels < _UNSEEN:
+    if left_out or pixels < _UNSEEN:
         return None, (f"{said} was left out: it {_moves(pixels)}",)
     return lens, (f"{said} {_moves(pixels)}: the camera is the pinhole of the undistorted picture",)
 
@@ -214,22 +213,6 @@ def refuse(lens: Lens | None, plane: ViewPlane, what: str, place: str) -> None:
             f"{what} has lens distortion ({_listed(lens)}) that {_moves(displacement(lens, plane))}, which {place} can't say: "
             "undistort the pictures, or choose to take it without distortion"
         )
-
-
-def unknown(what: str, model: str, options: Options) -> tuple[None, tuple[str, ...]]:
-    """The notes of a lens whose model nobody here knows, if it may be left out.
-
-    Raises
-    ------
-    NoPinholeError
-        if not.
-    """
-    if options.without_distortion:
-        return None, (f"The lens distortion of {what}, of the unknown model {model}, was left out",)
-    raise NoPinholeError(
-        f"{what} has lens distortion of the unknown model {model}, which no pinhole has: undistort the pictures, or choose to "
-        "take it without distortion"
-    )
 
 
 def displacement(lens: Lens, plane: ViewPlane) -> float:

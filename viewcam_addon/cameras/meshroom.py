@@ -13,7 +13,7 @@ from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming
-from .camera import Camera, LeftOut, Options, not_a_pinhole
+from .camera import Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
 from .source import Record, Source, number
 
 TITLE = "Meshroom and AliceVision .sfm"
@@ -126,6 +126,9 @@ def _of_lens(
         return None, ()
     model = str(intrinsic.get("distortionType") or kind)
     if model not in _LENSES:
-        return distortion.unknown(intrinsic.place, checks.shown(model), options)
+        said = f"{intrinsic.place} has lens distortion of the unknown model {checks.shown(model)}"
+        if options.without_distortion:
+            return None, (f"{said}, which was left out",)
+        raise NoPinholeError(f"{said}, which no pinhole has: undistort the pictures, or choose to take it without distortion")
     values = dict(zip(_LENSES[model], numbers, strict=False))
-    return distortion.settle(distortion.opencv(values), plane, intrinsic.place, options)
+    return distortion.settle(distortion.opencv(values), plane, intrinsic.place, options.without_distortion)

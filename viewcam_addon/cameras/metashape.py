@@ -164,4 +164,4 @@ def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, di
     )
     if sensor.get("type") == "fisheye":
         lens = dataclasses.replace(lens, projection="equidistant")
-    return plane, *distortion.settle(lens, plane, what, options)
+    return plane, *distortion.settle(lens, plane, what, options.without_distortion)

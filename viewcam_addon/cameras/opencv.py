@@ -364,7 +364,7 @@ def settled(
     if is_fisheye and not numbers.keys() <= {"k1", "k2", "k3", "k4"}:
         raise InputError(f"{what} has {', '.join(numbers)}: OpenCV's fisheye has k1, k2, k3 and k4")
     lens = distortion.fisheye(numbers) if is_fisheye else distortion.opencv(numbers)
-    return distortion.settle(lens, plane, what, options)
+    return distortion.settle(lens, plane, what, options.without_distortion)
 
 
 def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:

@@ -80,9 +80,9 @@ def _plane(data: Record, kind: str, options: Options) -> tuple[ViewPlane, distor
     plane = axes.view_plane(f, f, c_x + half, c_y + half, (inner.size("width"), inner.size("height")))
     if kind == "fisheye":
         lens = distortion.fisheye(dict(zip(_FISHEYE, data.numbers("fisheye", len(_FISHEYE)), strict=True)))
-        return plane, *distortion.settle(lens, plane, data.place, options)
+        return plane, *distortion.settle(lens, plane, data.place, options.without_distortion)
     key = next((key for key in _LENSES if key in data), None)
     if key is None:
         return plane, None, ()
     numbers = dict(zip(_LENSES[key], data.numbers(key, len(_LENSES[key])), strict=True))
-    return plane, *distortion.settle(distortion.opencv(numbers), plane, data.place, options)
+    return plane, *distortion.settle(distortion.opencv(numbers), plane, data.place, options.without_distortion)

@@ -215,7 +215,7 @@ def _plane(
         numbers = dict(zip(_LENS, both.numbers("distortion_params", 6), strict=True))
     brown = numbers | {"k4": 0.0, "r8": numbers["k4"]}
     lens = distortion.fisheye(numbers) if is_fisheye else distortion.opencv(brown, numbers)
-    return plane, stated, *distortion.settle(lens, plane, both.place, options)
+    return plane, stated, *distortion.settle(lens, plane, both.place, options.without_distortion)
 
 
 def _size(both: Record, source: Source, path: str, options: Options) -> tuple[tuple[int, int], bool]:
