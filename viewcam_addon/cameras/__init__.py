@@ -9,6 +9,7 @@
     axes.py         the one place of conventions: axes, pixels, world
     source.py       what is read from: text, file, folder; JSON and XML without their dangers
     distortion.py   lenses: what they do with a pinhole's picture
+    undistortion.py photographs without their lens
     and a module for each format
 
 A format is a module in `FORMATS` with

@@ -369,6 +369,27 @@ def _points(tracks: Tracks | None, images: int) -> tuple[list[str], str]:
     )
 
 
+def points_without_tracks(source: Source) -> str:
+    """The lines of points3D.txt of a model's points, for pictures in which they are elsewhere; empty where there are none."""
+    if (found := model(source)) is None:
+        return ""
+    folder, suffix = found
+    file = source.file(*folder, f"points3D{suffix}")
+    if file is None:
+        return ""
+    if suffix == ".txt":
+        rows = [line.split()[:8] for line in _lines(file) if line.strip() and not line.startswith("#")]
+        if any(len(row) < 8 for row in rows):
+            raise InputError(f"{file.name} has a line that is not POINT3D_ID X Y Z R G B ERROR …: export it again")
+        return "".join(f"{' '.join(row)}\n" for row in rows)
+    reader, lines = _Reader(file), []
+    for _ in range(reader.numbers("Q")[0]):
+        number, x, y, z, *colour, error, tracked = reader.numbers("Q3d3BdQ")
+        reader.skip(8 * tracked)
+        lines.append(f"{number} {_spaced(x, y, z, *colour, error)}\n")
+    return "".join(lines)
+
+
 def comments(cameras: Iterable[Camera]) -> str:
     """A comment for each camera: its values."""
     return "".join(f"# {own.comment(camera.pinhole)}\n" for camera in cameras)
