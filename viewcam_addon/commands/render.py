@@ -3,6 +3,7 @@
 import argparse
 import dataclasses
 import time
+from typing import Any
 
 from .. import argument_types as types
 from ..errors import InputError
@@ -49,7 +50,7 @@ def run(options: argparse.Namespace) -> Result:
         )
         others = dict(zip(others, resized, strict=True))
     labels = api.label(scene, options.labels, **others, threads=options.threads) if options.labels else None
-    result = shared.say_level(scene) if options.level == "auto" else {}
+    result: dict[str, Any] = shared.say_level(scene) if options.level == "auto" else {}
     level = result.get("level", options.level)
     progress = Progress(options.events.tell, scene.camera.height)
     started = time.perf_counter()

@@ -3,6 +3,7 @@
 // A path takes one lobe only, chosen in proportion to the lobes' colours, and its weight is divided by that share: where there
 // is one lobe, it is taken and nothing is random. Glass is two lobes, shared out by Fresnel's equations.
 #pragma once
+#include <concepts>
 #include <cstddef>
 #include <new>
 #include <variant>
@@ -22,6 +23,20 @@ namespace viewcam::VIEWCAM_ISA {
 // bounces are counted), DELTA (whether its direction is no matter of chance), IS_DIFFUSE (whether passes count it so), eval, pdf
 // and sample; `importance` where what it scatters is not its colour.
 using Lobe = std::variant<Lambert, SpecularReflection, SpecularTransmission, OrenNayar, Translucent, MicrofacetReflection, MicrofacetTransmission, SheenLobe, VelvetLobe>;
+template <class Kind>
+concept IsLobe = requires(const Kind& lobe, Vec3 to_light, Vec2 u) {
+    { Kind::KIND } -> std::convertible_to<RayKind>;
+    { Kind::DELTA } -> std::convertible_to<bool>;
+    { Kind::IS_DIFFUSE } -> std::convertible_to<bool>;
+    { lobe.eval(to_light) } -> std::same_as<Vec3>;
+    { lobe.pdf(to_light) } -> std::convertible_to<double>;
+    { lobe.sample(u) } -> std::same_as<LobeSample>;
+    requires requires { lobe.frame.n; } || requires { lobe.normal; };
+    requires requires { { lobe.importance() } -> std::same_as<double>; } || requires { { lobe.color } -> std::convertible_to<Vec3>; };
+};
+template <class Kinds> constexpr bool ALL_ARE_LOBES = false;
+template <class... Kinds> constexpr bool ALL_ARE_LOBES<std::variant<Kinds...>> = (IsLobe<Kinds> && ...);
+static_assert(ALL_ARE_LOBES<Lobe>);
 
 // Light that lobes send on, by the passes that count it.
 struct ScatteredLight {

@@ -1,5 +1,8 @@
 // Closures: the simple ones, and at the end the list of all.
 #pragma once
+#include <concepts>
+#include <string_view>
+
 #include "principled.h"
 
 namespace viewcam::VIEWCAM_ISA {
@@ -107,5 +110,15 @@ struct SheenClosure {
 // `mean_emission` and `shines_evenly` where it shines, `lets_through` where light may go straight through it.
 using Closure = std::variant<DiffuseClosure, GlossyClosure, GlassClosure, RefractionClosure, EmissionClosure, TranslucentClosure, MetallicClosure,
                              PrincipledClosure, SheenClosure, TransparentClosure>;
+template <class Kind>
+concept IsClosure = std::constructible_from<Kind, const Inputs&> && requires(const Kind& closure, BSDF& bsdf, const ShadingPoint& at, const std::vector<Texture>& textures) {
+    { Kind::NAME } -> std::convertible_to<std::string_view>;
+    { Kind::KINDS } -> std::convertible_to<uint32_t>;
+    closure.add_to(bsdf, at, Vec3{});
+    requires requires { { closure.mean_emission(textures) } -> std::same_as<Vec3>; } == requires { { closure.shines_evenly() } -> std::same_as<bool>; };
+};
+template <class Kinds> constexpr bool ALL_ARE_CLOSURES = false;
+template <class... Kinds> constexpr bool ALL_ARE_CLOSURES<std::variant<Kinds...>> = (IsClosure<Kinds> && ...);
+static_assert(ALL_ARE_CLOSURES<Closure>);
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -1,5 +1,6 @@
 // A light of any kind.
 #pragma once
+#include <concepts>
 #include <optional>
 #include <variant>
 
@@ -121,6 +122,21 @@ class Light {
     Vec3 middle_;
     const Scene* scene_ = nullptr;
 };
+
+// What each kind of light has. What rays run into has the density of being sampled there, or nothing would weigh the two against
+// each other; what lies at infinity has an irradiance everywhere, and all else bounds.
+template <class Kind>
+concept IsLight = requires(const Kind& light, const Interaction& from, Vec3 v) {
+    { light.estimate(v, v) } -> std::same_as<double>;
+    { light.is_sized() } -> std::same_as<bool>;
+    requires requires(Vec2 u) { { light.sample_li(from, u) } -> std::same_as<LightSample>; } ||
+                 requires(double part, Vec2 u) { { light.sample_li(from, part, u) } -> std::same_as<LightSample>; };
+    requires !requires(const LightRay& ray, double& distance) { light.le(ray, distance); } || requires { { light.pdf_li(from, v) } -> std::same_as<double>; };
+    requires requires { { light.irradiance() } -> std::same_as<double>; } != requires { { light.bounds() } -> std::same_as<LightBounds>; };
+};
+template <class Kinds> constexpr bool ALL_ARE_LIGHTS = false;
+template <class... Kinds> constexpr bool ALL_ARE_LIGHTS<std::variant<Kinds...>> = (IsLight<Kinds> && ...);
+static_assert(ALL_ARE_LIGHTS<Light::Kind>);
 
 // scene: whose nodes the lamp's emission is made by.
 inline Light light_of(const Lamp& lamp, const Scene* scene = nullptr) {

@@ -4,6 +4,7 @@
 // Evaluated at each hit, from the input back: what no input needs is never computed. A node whose inputs are all constant becomes
 // its value when it is made, so that constants cost nothing. Rejected: a stack machine (Cycles' SVM), whose order must be compiled.
 #pragma once
+#include <concepts>
 #include <variant>
 
 #include "bump.h"
@@ -35,6 +36,16 @@ using ValueNode = std::variant<ConstantNode, ImageNode, EnvironmentImageNode, Te
                                RGBCurvesNode, VectorCurvesNode, FloatCurveNode, BlackbodyNode, WavelengthNode, GammaNode,
                                BrightContrastNode, HueSaturationNode, InvertNode, LuminanceNode, NoiseNode, WhiteNoiseNode, CheckerNode,
                                GradientNode, WaveNode, MagicNode, BrickNode, VoronoiNode, IESNode>;
+template <class Kind>
+concept IsValueNode = requires(const Kind& node, const ShadingPoint& at) {
+    { Kind::NAME } -> std::convertible_to<std::string_view>;
+    { Kind::GIVES } -> std::convertible_to<Gives>;
+    { node.eval(at) } -> std::same_as<Vec3>;
+    requires !(requires { Kind::VARIES; } && requires { node.varies(); });
+};
+template <class Kinds> constexpr bool ALL_ARE_VALUE_NODES = false;
+template <class... Kinds> constexpr bool ALL_ARE_VALUE_NODES<std::variant<Kinds...>> = (IsValueNode<Kinds> && ...);
+static_assert(ALL_ARE_VALUE_NODES<ValueNode>);
 
 // A number of a value that is of some sort: a colour's luminance, a vector's mean.
 inline double number_of(Vec3 value, Gives sort) {
