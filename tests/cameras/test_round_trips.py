@@ -297,6 +297,15 @@ def test_of_several_codes_one_that_is_changed_counts_as_it_stands(tmp_path):
             cameras.choose([first, second])
 
 
+@pytest.mark.parametrize("form", [form for form in WRITTEN if getattr(cameras.FORMATS[form], "SEVERAL", "") == "a text"])
+def test_of_several_codes_one_that_is_cut_off_after_its_name_is_told_by_it(form):
+    text = cameras.write([Camera(name, CAMERAS["plain"]) for name in ("a", "b")], form)
+    cut = text[: text.index("\n", text.index('of "b"'))]
+    with pytest.raises(InputError, match="the text names the camera 'b' and has no such camera") as refused:
+        cameras.read(cut)
+    assert refused.value.__cause__ is None
+
+
 def test_a_folder_with_files_of_others_says_which_were_not_read(tmp_path):
     cameras.save([Camera(name, CAMERAS["plain"]) for name in ("left", "right")], tmp_path, "ros")
     (tmp_path / "settings.yaml").write_text("rate: 30\n")

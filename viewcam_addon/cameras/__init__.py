@@ -182,12 +182,12 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
         if not parts:
             return _read(source, module, options)
         sources = [source] if len(parts) == 1 else [Source(text) for _, text in parts]
-        names = [name for name, _ in parts]
-        return [
-            replace(camera, name=name)
-            for part, name in zip(sources, names, strict=True)
-            for camera in _read(part, module, options)
-        ]
+        cameras = []
+        for (name, _), part in zip(parts, sources, strict=True):
+            if not module.recognises(part):
+                raise InputError(f"{source.name} names the camera {checks.shown(name)} and has no such camera: export it again")
+            cameras += [replace(camera, name=name) for camera in _read(part, module, options)]
+        return cameras
 
 
 def _recognises(module: ModuleType, source: Source) -> bool:
