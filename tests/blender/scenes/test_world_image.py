@@ -1,6 +1,7 @@
 """Worlds that are not modelled as they are: the image that another Blender renders of them, and their suns."""
 
 import math
+import subprocess
 
 import numpy as np
 import pytest
@@ -29,6 +30,19 @@ def export(camera_object, monkeypatch):
         return exported, "; ".join(entry.reason for entry in exported.ledger if entry.object == "World")
 
     return make
+
+
+@pytest.fixture(params=["time", "no such program", "an error there"])
+def other_blender_fails(request, monkeypatch):
+    """The Blender that another one would start makes nothing, in each of the ways in which it may fail."""
+
+    def fail(*arguments):
+        if request.param == "time":
+            raise subprocess.TimeoutExpired("blender", 1.0)
+        if request.param == "no such program":
+            raise FileNotFoundError
+
+    monkeypatch.setattr(another_blender, "call", fail)
 
 
 @pytest.fixture

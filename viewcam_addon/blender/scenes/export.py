@@ -26,7 +26,7 @@ from ...tracer.scene.levels import level_of
 from ...tracer.scene.materials import PLAIN, Picture
 from .. import camera as cameras
 from .. import versions
-from . import baked_inputs, cycles_attributes, export_geometry, features, film, lamps, linking, materials, world
+from . import cycles_attributes, export_geometry, features, film, lamps, linking, materials, world
 from .depsgraph import visit_still
 from .ledger import Ledger
 from .shading import Shading
@@ -112,7 +112,7 @@ def survey(
     """Fill the ledger as `export_scene` does, without reading any geometry; returns the light of the scene, if wanted."""
 
     def look(depsgraph: bpy.types.Depsgraph) -> Lighting | None:
-        placements(depsgraph, ledger, Shading(baked_inputs.baked_in(depsgraph)) if lit else None)
+        placements(depsgraph, ledger, Shading() if lit else None)
         return light_in(depsgraph, ledger) if lit else None
 
     features.note_render(scene, view_layer, camera_object, ledger, lit)
@@ -156,7 +156,7 @@ def light_in(
 
 def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False) -> Scene:
     """The scene in the depsgraph that a render engine is given. lit : as in `export_scene`."""
-    shading = Shading(baked_inputs.baked_in(depsgraph)) if lit else None
+    shading = Shading() if lit else None
     names: dict[tuple[int, int], str] = {}
     geometries: dict[str, Mesh | Spheres] = {}
     objects = []

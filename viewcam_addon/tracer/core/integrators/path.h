@@ -46,14 +46,15 @@ inline Ray shadow_ray(const Interaction& point, const LightSample& sample) {
     return {origin, sample.direction, 0, larger(sample.distance - slack, 0.0)};
 }
 
-// A sample of a pixel, row · width + column.
-struct CameraSample {
-    uint32_t pixel, number;
+// Samples of pixels, row · width + column, with the keys of these and the rays from the eye.
+struct CameraSamples {
+    uint32_t pixel[PACKET], number[PACKET], key[PACKET];
+    Rays rays;
 };
 
 class PathIntegrator {
    public:
-    static constexpr int MOST = 64;  // paths at a time
+    static constexpr int MOST = PACKET;  // paths at a time
 
     // bounces: of the scene, or none at level `direct`. coincident: 0 for all light, or how many of float32's roundings apart
     // surfaces are in one place, for what comes by these alone.
@@ -99,17 +100,17 @@ class PathIntegrator {
         return lit_ && random;
     }
 
-    // The light of up to 64 paths, each with its ray from the eye.
-    void trace(const CameraSample* samples, const Ray* rays, int count, PathLight* light) const {
+    // The light of up to 64 paths.
+    void trace(const CameraSamples& samples, int count, PathLight* light) const {
         Block& block = of_this_thread<Block>();
-        block.light = light;
+        block.samples = &samples, block.light = light;
         block.live = 0;
-        std::fill_n(light, count, PathLight{});
-        start(samples, rays, count, block);
+        for (int i = 0; i < count; i++) light[i].clear();
+        start(count, block);
         for (int depth = 1; block.live > 0; depth++) {
-            scatter(samples, depth, block);
+            scatter(depth, block);
             gather(depth, block);
-            arrive(samples, depth, block);
+            arrive(depth, block);
         }
     }
 
@@ -146,12 +147,14 @@ class PathIntegrator {
         Vec3 light, other;  // other: of what is not diffuse where the eye sees it
     };
     struct Block {
+        const CameraSamples* samples;
         PathLight *light, ignored;
         int live = 0, lit[LightSampler::ASKED] = {};
         Path paths[MOST], onwards[MOST];
         Interaction tables[2][MOST], *points = tables[0], *next_points = tables[1];
         Shadowed shadowed[LightSampler::ASKED][MOST];  // by the light that was asked
-        Ray shadow_rays[LightSampler::ASKED][MOST];
+        Rays shadow_rays[LightSampler::ASKED];
+        Hits hits;
     };
 
     static int row(RayKind kind) { return kind == DIFFUSE ? 0 : kind == GLOSSY ? 1 : 2; }
@@ -172,7 +175,7 @@ class PathIntegrator {
         return coincident_ * FLOAT32 * size / larger(cosine, GRAZED);
     }
     // Where several surfaces lie in the place of what a path has met: one of them, by chance, in the place of all.
-    [[gnu::noinline]] void meet_coincident(Path& path, const Ray& ray, Hit& hit, Interaction& point, const CameraSample& sample, int depth) const {
+    [[gnu::noinline]] void meet_coincident(Path& path, const Ray& ray, Hit& hit, Interaction& point, int depth, const Block& block) const {
         constexpr double PARALLEL = 0.1;
         static thread_local std::vector<Hit> hits;
         const Ray* met_by = &ray;
@@ -190,7 +193,7 @@ class PathIntegrator {
             for (size_t i = 1; i < hits.size(); i++) pairs_[std::minmax(hits[0].object, hits[i].object)]++;
         }
         // Any number does that the sampler does not use for anything else.
-        uint32_t chosen = ((sample.pixel * 0x9e3779b9u ^ sample.number) * 0x85ebca6bu ^ uint32_t(depth)) * 0xc2b2ae35u >> 16;
+        uint32_t chosen = ((block.samples->pixel[path.sample] * 0x9e3779b9u ^ block.samples->number[path.sample]) * 0x85ebca6bu ^ uint32_t(depth)) * 0xc2b2ae35u >> 16;
         hit = hits[chosen % hits.size()];
         point = scene_.interaction(ray, hit);
         point.offset = larger(point.offset, 2 * reach * larger(point.cosine, 0.0));
@@ -232,15 +235,19 @@ class PathIntegrator {
         return path.weight * material(at.point).emission(at) * share;
     }
 
+    // A path's number in [0, 1) of a dimension.
+    double number(const Path& path, int dimension, const Block& block) const {
+        return sampler_.number(block.samples->key[path.sample], block.samples->number[path.sample], dimension);
+    }
     bool has_ended(const Path& path) const { return path.passed > 0 && path.passed >= ended_after_; }
 
     // Whether a path goes straight through a surface; what it brings from now on is weighted by the chance of that. u: a number in
     // [0, 1) that chooses, or −1 where none has been made yet.
-    bool passes(Path& path, const BSDF& bsdf, const CameraSample& sample, int depth, double& u) const {
+    bool passes(Path& path, const BSDF& bsdf, int depth, double& u, const Block& block) const {
         double chance = path.last ? !is_black(bsdf.transparency()) : bsdf.chance_through();
         if (!(chance > 0)) return false;
         if (chance < 1) {
-            if (u < 0) u = sampler_.number(sampler_.key(sample.pixel), sample.number, SobolSampler::dimension(depth + 1, SobolSampler::THROUGH));
+            if (u < 0) u = number(path, SobolSampler::dimension(depth + 1, SobolSampler::THROUGH), block);
             if (u >= chance) {
                 path.weight = min(path.weight / (1 - chance), MOST_WEIGHT);
                 u = (u - chance) / (1 - chance);
@@ -254,9 +261,9 @@ class PathIntegrator {
     }
     // Takes a path from the first surface that its ray meets through all that lets it through, and adds what shines there. Whether it
     // is scattered at `point`, where it then is. depth: how often it has been scattered.
-    bool follow(Path& path, Ray ray, Hit hit, Interaction& point, const CameraSample& sample, int depth, Block& block) const {
+    bool follow(Path& path, Ray ray, Hit hit, Interaction& point, int depth, Block& block) const {
         for (double u = -1;;) {
-            if (coincident_ > 0) meet_coincident(path, ray, hit, point, sample, depth + path.passed);
+            if (coincident_ > 0) meet_coincident(path, ray, hit, point, depth + path.passed, block);
             PathLight& light = light_of(path, block);
             const Material& made_of = material(point);
             ShadingPoint at = arriving(point, path, depth);
@@ -266,7 +273,7 @@ class PathIntegrator {
             if (!made_of.is_transparent()) return made_of.scatters() && !path.last;
             BSDF bsdf = made_of.bsdf(at);
             if (path.kind == CAMERA) block.light[path.sample].add(COLOR, path.weight * bsdf.diffuse_color());
-            if (!passes(path, bsdf, sample, depth, u)) return made_of.scatters() && !path.last;
+            if (!passes(path, bsdf, depth, u, block)) return made_of.scatters() && !path.last;
             ray.t_min = hit.t;
             hit = scene_.closest(ray, path.kind);
             meet_lamps(path, ray, hit, depth, block);
@@ -342,36 +349,39 @@ class PathIntegrator {
     }
 
     // What the eye's rays come to, and the light that is of this alone.
-    void start(const CameraSample* samples, const Ray* rays, int count, Block& block) const {
+    void start(int count, Block& block) const {
+        Ray rays[MOST];
         Hit hits[MOST];
         const Ray* met_by[MOST];
-        int from[MOST], met = 0;
-        scene_.closest(rays, count, CAMERA, hits);
+        int met = 0;
+        scene_.closest(block.samples->rays, count, CAMERA, block.hits);
         for (int i = 0; i < count; i++) {
+            Ray& ray = rays[met] = block.samples->rays.ray(i);
+            Hit& hit = hits[met] = block.hits.hit(i);
             Path& path = block.paths[met];  // the rest is known when it is scattered
             path.sample = i, path.from = met;
             path.category = COLOR, path.kind = CAMERA, path.last = path.diffuse = false, path.pdf = INFINITE, path.passed = 0;
             path.scattered = {}, path.inside = NONE, path.touches = path.coincident = false;
             path.weight = {1, 1, 1};
-            meet_lamps(path, rays[i], hits[i], 0, block);
-            if (!hits[i]) {
-                leave(path, rays[i], 0, block);
+            meet_lamps(path, ray, hit, 0, block);
+            if (!hit) {
+                leave(path, ray, 0, block);
                 continue;
             }
             block.light[i].covered = 1;
-            from[met] = i, met_by[met] = &rays[i], hits[met++] = hits[i];
+            met_by[met++] = &ray;
         }
         scene_.interactions(met_by, hits, met, block.points);
         for (int k = 0; k < met; k++) {
             Path& path = block.paths[block.live];
             if (block.live < k) path = block.paths[k];
             path.ray.direction = normalize(met_by[k]->direction);
-            if (follow(path, *met_by[k], hits[k], block.points[k], samples[from[k]], 0, block)) block.live++;
+            if (follow(path, *met_by[k], hits[k], block.points[k], 0, block)) block.live++;
         }
     }
 
     // Adds what lights may bring to all points where paths are, and finds the rays on which they go on.
-    void scatter(const CameraSample* samples, int depth, Block& block) const {
+    void scatter(int depth, Block& block) const {
         int onwards = 0;
         for (int& lit : block.lit) lit = 0;
         for (int i = 0; i < block.live; i++) {
@@ -382,13 +392,10 @@ class PathIntegrator {
             BSDF bsdf = made_of.bsdf(at);
             if (depth == 1 && !made_of.is_transparent()) block.light[path.sample].add(COLOR, path.weight * bsdf.diffuse_color());
             if (bsdf.is_black() || !lit_) continue;
-            const CameraSample& sample = samples[path.sample];
-            uint32_t key = sampler_.key(sample.pixel);
-            auto number = [&](SobolSampler::Purpose purpose) {
-                return sampler_.number(key, sample.number, SobolSampler::dimension(depth, purpose));
-            };
+            auto number = [&](SobolSampler::Purpose purpose) { return this->number(path, SobolSampler::dimension(depth, purpose), block); };
             auto pair = [&](SobolSampler::Purpose purpose) {
-                return sampler_.pair(key, sample.number, SobolSampler::dimension(depth, purpose));
+                int dimension = SobolSampler::dimension(depth, purpose);
+                return Vec2{this->number(path, dimension, block), this->number(path, dimension + 1, block)};
             };
             bool total_used = depth >= most_;
             uint32_t leading = 0, last = 0;  // kinds of rays that can bring anything, and those on which the path ends
@@ -472,8 +479,9 @@ class PathIntegrator {
                                               light.diffuse * path.weight / choice.chance, light.other * path.weight / choice.chance};
         if (has_pixels_) block.shadowed[choice.slot][place].ray.width = at.footprint();
         if (!traced) return;
-        Ray& ray = block.shadow_rays[choice.slot][place] = shadow_ray(point, sample);
+        Ray ray = shadow_ray(point, sample);
         if (end > 0) ray.t_max = larger(smaller(ray.t_max, sample.distance - end), 0.0);
+        block.shadow_rays[choice.slot].set(place, ray);
     }
 
     // Sends the shadow rays, and adds the light that nothing hides.
@@ -481,20 +489,22 @@ class PathIntegrator {
         for (int slot = 0; slot < LightSampler::ASKED; slot++) {
             int count = block.lit[slot];
             bool hidden[MOST];
-            const Ray* rays = block.shadow_rays[slot];
+            Rays& rays = block.shadow_rays[slot];
             const Shadowed* shadowed = block.shadowed[slot];
             auto is_plain = [](const Shadowed& one) { return one.traced && one.shadow_rays == SHADOW; };
-            if (count > 0 && depth == 1 && std::all_of(shadowed, shadowed + count, is_plain))
+            if (count > 0 && depth == 1 && std::all_of(shadowed, shadowed + count, is_plain)) {
+                rays.fill(count);
                 scene_.occluded(rays, count, hidden);
-            else
-                for (int i = 0; i < count; i++) hidden[i] = shadowed[i].traced && scene_.occluded(rays[i], shadowed[i].shadow_rays);
+            } else {
+                for (int i = 0; i < count; i++) hidden[i] = shadowed[i].traced && scene_.occluded(rays.ray(i), shadowed[i].shadow_rays);
+            }
             for (int i = 0; i < count; i++) {
                 PathLight& light = block.light[shadowed[i].sample];
                 if (!hidden[i]) {
                     light.add(shadowed[i].category, shadowed[i].light);
                     light.add(OTHER, shadowed[i].other);
                 } else if (transparent_) {
-                    Vec3 left = transmittance(rays[i], shadowed[i].shadow_rays, shadowed[i].ray);
+                    Vec3 left = transmittance(rays.ray(i), shadowed[i].shadow_rays, shadowed[i].ray);
                     light.add(shadowed[i].category, shadowed[i].light * left);
                     light.add(OTHER, shadowed[i].other * left);
                 }
@@ -536,7 +546,7 @@ class PathIntegrator {
     }
 
     // Where rays come to; adds what shines there.
-    void arrive(const CameraSample* samples, int depth, Block& block) const {
+    void arrive(int depth, Block& block) const {
         const Ray* met_by[MOST];
         Hit hits[MOST];
         int arrived[MOST], met = 0;
@@ -562,7 +572,7 @@ class PathIntegrator {
         for (int k = 0; k < met; k++) {
             Path& path = block.onwards[arrived[k]];
             if (path.inside != NONE && path.inside != hits[k].object) let_out_first(path, hits[k], block.next_points[k]);
-            if (!follow(path, path.ray, hits[k], block.next_points[k], samples[path.sample], depth, block)) continue;
+            if (!follow(path, path.ray, hits[k], block.next_points[k], depth, block)) continue;
             block.paths[live] = path;
             block.paths[live].from = k;
             live++;
