@@ -222,11 +222,11 @@ def _ours(folder: Path, shot: Job) -> dict[str, NDArray]:
 
 def differences(ours: Mapping[str, NDArray], theirs: Mapping[str, NDArray]) -> dict[str, float]:
     """Of each pass the share of one picture's pixels that differ. What is no number differs."""
-    depth, found = ours["Depth"].astype(float), {}
+    depth, result = ours["Depth"].astype(float), {}
     for name, tolerance in TOLERANCES.items():
         allowed = tolerance * depth if name in ("Depth", "Position") else tolerance
-        found[name] = float((~(np.abs(ours[name].astype(float) - theirs[name]) <= allowed)).any(axis=-1).mean())
-    return found
+        result[name] = float((~(np.abs(ours[name].astype(float) - theirs[name]) <= allowed)).any(axis=-1).mean())
+    return result
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from viewcam_addon import image, memory
+from viewcam_addon import image, machine
 from viewcam_addon.errors import InputError
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
@@ -199,7 +199,7 @@ def test_a_picture_says_the_shape_of_its_cameras_pixels_to_a_rounding_of_float32
 
 def test_what_takes_more_memory_than_there_is_is_refused_by_its_header(tmp_path, monkeypatch):
     """64 MiB of zeros, which are 60 kB as they are packed."""
-    monkeypatch.setattr(memory, "most", lambda: 100 * 2**20)
+    monkeypatch.setattr(machine, "most", lambda: 100 * 2**20)
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     OpenEXR.File(header, {"ViewLayer.Depth.Z": np.zeros((4096, 4096), np.float32)}).write(str(tmp_path / "a.exr"))
     tracemalloc.start()

@@ -26,7 +26,7 @@ PACKAGE = ROOT / "viewcam_addon"
 ROOMS = {
     "errors": "",
     "checks": "errors",
-    "memory": "errors",
+    "machine": "errors",
     "npy": "",
     "files": "errors",
     "terminal": "",
@@ -45,17 +45,18 @@ ROOMS = {
     "moves": "errors checks exact pinhole",
     "diagram": "pinhole",
     "photo_match": "errors checks pinhole",
-    "image": "errors memory files terminal pinhole",
+    "image": "errors machine files terminal pinhole",
     "intrinsics": "errors checks pinhole",
     "camera_values": "errors checks pinhole roll intrinsics",
     "cameras": "errors checks files terminal npy usd_stage pinhole intrinsics",
     "comparison": "errors files html_page pinhole image png",
-    "tracer": "errors checks memory files npy pinhole image",
-    "labels": "errors files png pinhole image cameras tracer",
+    "tracer": "errors checks machine files npy pinhole image",
+    "labels": "errors machine files png pinhole image cameras tracer",
     "api": "errors image comparison tracer labels",
     "pytest_plugin": "errors junit jobs",
     "jobs": (
-        "errors checks files terminal events argument_types html_page child_process pinhole moves image cameras comparison "
+        "errors checks machine files terminal events argument_types html_page child_process pinhole moves image cameras "
+        "comparison "
         "tracer labels api"
     ),
     "blender": (

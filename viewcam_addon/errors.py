@@ -6,6 +6,7 @@ and the like travel up and be translated at the top, where the object and the ke
 """
 
 import traceback
+from collections.abc import Sequence
 from pathlib import Path
 
 
@@ -23,6 +24,11 @@ class NotModelledError(InputError):
     """Something in the scene has no counterpart in the model, and `--strict` does not let it pass."""
 
     exit_status = 3
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a sentence: a, b and c."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def told(error: Exception) -> str:

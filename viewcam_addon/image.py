@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import memory
+from . import machine
 from .errors import InputError
 from .files import written_whole
 from .pinhole import Pinhole
@@ -215,7 +215,7 @@ def _pixels(path: Path) -> tuple[dict[str, NDArray[Any]], Pinhole | None, dict[s
         other = f"{camera.width} × {camera.height}"
         raise InputError(f"{path} has {width} × {height} pixels and its camera {other}: render it again")
     count = sum(len(header["channels"]) for header in headers)
-    memory.check(f"the pixels of {path}", _COPIES * 4 * count * width * height, "render it smaller")
+    machine.check(f"the pixels of {path}", _COPIES * 4 * count * width * height, "render it smaller")
     try:
         with silent_libraries():
             parts = OpenEXR.File(str(path), separate_channels=True).parts
@@ -330,7 +330,7 @@ def write(path: str | os.PathLike[str], image: Image) -> None:
     if image.camera is not None:
         header |= _camera_attributes(image.camera)
     if hasattr(OpenEXR, "set_global_thread_count"):  # which is 0: it would compress in this thread alone
-        OpenEXR.set_global_thread_count(os.cpu_count() or 1)
+        OpenEXR.set_global_thread_count(machine.cores())
     with written_whole(path) as temporary:
         try:
             with silent_libraries():

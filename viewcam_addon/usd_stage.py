@@ -81,12 +81,12 @@ def read(name: str, path: Path | None, text: str, size: str, values: str) -> dic
         request |= {"path": str(path.absolute()), "unpacked": str(folder)} if path else {"text": text}
         try:
             server.ask({"start": True})
-            found: dict[str, Any] = server.ask(request, ends=time.monotonic() + _WALL * seconds)
+            result: dict[str, Any] = server.ask(request, ends=time.monotonic() + _WALL * seconds)
         except (child_process.ProcessEnded, child_process.AnswerTimeout):
             raise InputError(f"{name} is no stage that can be read safely, since {_TOO_MUCH}") from None
         except InputError as error:
             raise InputError(f"{name} is no stage that USD can open ({error}): export it again") from None
-    return found
+    return result
 
 
 # ---- in the process of its own
@@ -135,7 +135,7 @@ def _said(request: dict[str, Any]) -> dict[str, Any]:
             path = _unpacked(path, Path(request["unpacked"]))
         root = layers.of_file(path)
     stage = Usd.Stage.Open(root)
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         "y_up": UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y,
         "metres_per_unit": UsdGeom.GetStageMetersPerUnit(stage),
         "documentation": _text(lambda: root.documentation),
@@ -146,11 +146,11 @@ def _said(request: dict[str, Any]) -> dict[str, Any]:
     samples = 0
     for prim in stage.Traverse():
         if value := _text(partial(prim.GetCustomDataByKey, request["values"])):
-            found["values"].append(value)
+            result["values"].append(value)
         if not prim.IsA(UsdGeom.Camera):
             continue
         camera: dict[str, Any] = {"name": _text(prim.GetDisplayName) or _text(prim.GetName) or "camera"}
-        found["cameras"].append(camera)
+        result["cameras"].append(camera)
         try:
             camera["samples"] = _samples(prim, stage, request["size"], Usd, UsdGeom)
         except Exception as error:
@@ -158,7 +158,7 @@ def _said(request: dict[str, Any]) -> dict[str, Any]:
         samples += len(camera.get("samples", "1"))
         if samples > _MOST_SAMPLES:
             raise InputError(f"its cameras have more than {_MOST_SAMPLES} time samples")
-    return found
+    return result
 
 
 class _Layers:
@@ -247,7 +247,7 @@ def _samples(prim: Any, stage: Any, size: str, usd: Any, usd_geom: Any) -> list[
     attributes = [*_attributes(prim, camera, usd_geom)]
     times = sorted({time for attribute in attributes for time in attribute.GetTimeSamples()[:_MOST_SAMPLES]}) or [0.0]
     is_moving = len(times) > 1
-    found = []
+    result = []
     for moment in times[:_MOST_SAMPLES]:
         code = usd.TimeCode(moment) if is_moving or moment else usd.TimeCode.EarliestTime()
         said = {name: _plain(getattr(camera, f"Get{name}Attr")().Get(code)) for name in _LENS}
@@ -256,8 +256,8 @@ def _samples(prim: Any, stage: Any, size: str, usd: Any, usd_geom: Any) -> list[
         said |= {"time": moment if is_moving else None, "seconds": None}
         if is_moving:
             said["seconds"] = moment / (stage.GetTimeCodesPerSecond() or 24.0)
-        found.append(said)
-    return found
+        result.append(said)
+    return result
 
 
 def _attributes(prim: Any, camera: Any, usd_geom: Any) -> Iterator[Any]:

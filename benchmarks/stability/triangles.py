@@ -165,18 +165,18 @@ class _Fans:
 
     def hits(self, test: Callable[..., Array]) -> Array:
         """How many triangles of its fan a test says that each ray meets."""
-        found = np.zeros(len(self.fan), int)
+        result = np.zeros(len(self.fan), int)
         for number in range(self._TRIANGLES):
             a, b, c = self.corners[:, self.fan * self._TRIANGLES + number].transpose(0, 2, 1)
-            found += test(a, b, c, self.x, self.y)
-        return found
+            result += test(a, b, c, self.x, self.y)
+        return result
 
     def first_hits(self, depth: Callable[..., Array]) -> Array:
         """The same of what reports the first hit only: a scene for the first triangles of the fans, and so on."""
-        found = np.zeros(len(self.fan), int)
+        result = np.zeros(len(self.fan), int)
         for number in range(self._TRIANGLES):
-            found += np.isfinite(depth(self.corners[:, number :: self._TRIANGLES], self.x, self.y))
-        return found
+            result += np.isfinite(depth(self.corners[:, number :: self._TRIANGLES], self.x, self.y))
+        return result
 
 
 def _depth_errors(shape: Callable[..., Array], sweep: Array, count: int, rays: int) -> tuple[Curve, ...]:

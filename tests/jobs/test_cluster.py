@@ -208,7 +208,7 @@ def test_a_worker_without_a_blender_says_so_in_a_sentence(stand_in, blend, tmp_p
 
 @pytest.mark.exhaustive
 def test_threads_are_the_cores_shared_among_the_workers(stand_in, blend, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "_cores", lambda: 7)
+    monkeypatch.setattr(cluster.machine, "cores", lambda: 7)
     with cluster.opened(None, 2) as machines:
         run_on(machines, blend, tmp_path / "out", shots("a"))
     assert [words[2] for words in stand_in.diary("render")] == ["3"]

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import bpy
 
+from ..errors import listed
 from . import datablocks, pose, storage, versions
 from .findings import APPLY_OR_ADOPT, CENTRE, DISTANCE, EYE, LENS, POSE, VIEW, Button, Cause
 
@@ -167,8 +168,7 @@ def _animation(camera_object: bpy.types.Object) -> Iterator[Cause]:
     channels = [_channel(path) for _, path in keyed(camera_object, versions.animation_curves)]
     if channels := [(quantity, words) for quantity, words in channels if quantity in decided]:
         words = list(dict.fromkeys(words for _, words in channels))
-        which = f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
-        clause = f"Keyframes set the {which} of {camera_object.name!r}, and in a render they win over the four values"
+        clause = f"Keyframes set the {listed(words)} of {camera_object.name!r}, and in a render they win over the four values"
         acts_on, remedy = frozenset(quantity for quantity, _ in channels), "delete them, and key the four values instead"
         is_deletable = bool(keyed(camera_object, versions.action_curves))
         yield Cause(clause, acts_on, remedy, always=True, mended_by=Button.DELETE_KEYFRAMES if is_deletable else None)

@@ -107,15 +107,15 @@ def differences(
 
 def explain(differing: dict[str, str], causes: Iterable[Cause]) -> list[Finding]:
     """A finding for each cause that explains a difference, and for each difference that none explains. Pure."""
-    found, unexplained = [], dict(differing)
+    result, unexplained = [], dict(differing)
     for cause in causes:
         explained = [name for name in differing if name in cause.acts_on]
         if explained or cause.always:
-            found.append(Finding(cause=cause, differing=tuple(differing[name] for name in explained)))
+            result.append(Finding(cause=cause, differing=tuple(differing[name] for name in explained)))
         for name in explained:
             unexplained.pop(name, None)
     for cause in (_MOVED, _LENS, _SHIFT):
         left = [name for name in (EYE, VIEW, DISTANCE, CENTRE) if name in cause.acts_on & unexplained.keys()]
         if left:
-            found.append(Finding(cause=cause, differing=tuple(unexplained[name] for name in left)))
-    return found
+            result.append(Finding(cause=cause, differing=tuple(unexplained[name] for name in left)))
+    return result

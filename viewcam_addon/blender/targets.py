@@ -164,15 +164,15 @@ def _depend(driver: bpy.types.Driver, *followed: tuple[bpy.types.Object, str, st
 
 def bound(camera_object: bpy.types.Object) -> set[tuple[str, int]]:
     """(name, index) of the values' numbers that a target or a driver decides. An evaluated camera, or the original."""
-    found = {
+    result = {
         (point, i) for point in POINTS for i in range(3) if target_of(camera_object, point) and place(camera_object, point)
     }
     for curve in versions.drivers(camera_object):
         owner, _, name = curve.data_path.partition(".")
         if owner == "virtual_pinhole" and curve.data_path != _HOOK and not versions.is_muted(curve):
             look = datablocks.LOOKS.get(name)
-            found |= {(look, i) for i in range(3)} if look else {(name, curve.array_index)}
-    return found
+            result |= {(look, i) for i in range(3)} if look else {(name, curve.array_index)}
+    return result
 
 
 def names(camera_object: bpy.types.Object) -> dict[str, str]:

@@ -159,7 +159,7 @@ class _Code:
         return self._numbers[path]
 
     def values(self) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        result: dict[str, Any] = {}
         for name, places in list(self._assigned.items())[:_MOST_ARRAYS]:
             key = opencv.plain(name)
             if not opencv.is_known(key) and key not in _SCALARS:
@@ -175,10 +175,10 @@ class _Code:
                     continue
                 if key == "t" and isinstance(value, list) and len(_flat(value)) in (12, 16):
                     key = "transform"
-                if key in found and found[key] != value:
+                if key in result and result[key] != value:
                     texts.fail(self.text, place, f"{name} is something else before, copy one camera")
-                found[key] = value
-        return found
+                result[key] = value
+        return result
 
     # ---- one array
 

@@ -109,12 +109,12 @@ class _Worlds:
 
     def above(self, index: int) -> list[int]:
         """The node's parents, nearest first."""
-        found = []
+        result = []
         while (index := self._parents.get(index)) is not None:
-            if len(found) > len(self._nodes):
+            if len(result) > len(self._nodes):
                 raise InputError(f"node {index} is its own parent: correct its children")
-            found.append(index)
-        return found
+            result.append(index)
+        return result
 
     def of(self, index: int) -> np.ndarray:
         matrix = np.eye(4)

@@ -152,7 +152,7 @@ def _unit(vector: np.ndarray, kind: str, what: str) -> np.ndarray:
 
 
 def _numbers(values: dict[str, str], key: str, count: int | None, what: str) -> tuple[float, ...]:
-    found = flat(f"{key} of {what}", values[key])
-    if count is not None and len(found) != count:
-        raise InputError(f"{key} of {what} has {len(found)} numbers: it should have {count}")
-    return found
+    result = flat(f"{key} of {what}", values[key])
+    if count is not None and len(result) != count:
+        raise InputError(f"{key} of {what} has {len(result)} numbers: it should have {count}")
+    return result

@@ -228,39 +228,39 @@ def _document(source: Source) -> Mapping[str, Any]:
 
 def _npz(source: Source) -> dict[str, Any]:
     """Arrays of numbers without pickle, and no more of them than a camera has."""
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     try:
         with zipfile.ZipFile(io.BytesIO(source.data)) as archive:
             for name, member in npy.members(archive).items():
-                if member.file_size < _MOST_BYTES and len(found) < _MOST_ARRAYS:
+                if member.file_size < _MOST_BYTES and len(result) < _MOST_ARRAYS:
                     with contextlib.suppress(ValueError), archive.open(member) as file:
-                        found[name] = npy.read(file.read(member.file_size)).tolist()  # and no more, whatever is packed there
+                        result[name] = npy.read(file.read(member.file_size)).tolist()  # and no more, whatever is packed there
     except (ValueError, OSError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error):
         return {}
-    return found
+    return result
 
 
 def _xml(source: Source) -> dict[str, Any]:
     root = source.xml
     if root is None or root.tag != "opencv_storage":
         return {}
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for child in root:
         inner = {each.tag: (each.text or "").strip() for each in child}
-        found[child.tag] = inner if inner else (child.text or "").strip()
-    return found
+        result[child.tag] = inner if inner else (child.text or "").strip()
+    return result
 
 
 def _numbers(name: str, value: Any) -> tuple[float, ...]:
     """The numbers of a matrix: FileStorage's object with rows, cols and data, a list of lists, or a text."""
     if isinstance(value, dict):
         rows, columns = (value.get(key) for key in ("rows", "cols"))
-        found = flat(name, value.get("data", []))
+        result = flat(name, value.get("data", []))
         if rows is not None and columns is not None:
             rows, columns = pixels(f"rows of {name}", rows), pixels(f"cols of {name}", columns)
-            if len(found) != rows * columns:
-                raise InputError(f"{name} has {len(found)} numbers: its rows and cols say {rows} × {columns}")
-        return found
+            if len(result) != rows * columns:
+                raise InputError(f"{name} has {len(result)} numbers: its rows and cols say {rows} × {columns}")
+        return result
     return flat(name, value)
 
 

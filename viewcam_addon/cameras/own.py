@@ -157,11 +157,11 @@ def parts(text: str) -> list[tuple[str, str]]:
 
 def pinholes_in(text: str) -> list[Pinhole]:
     """The cameras whose values stand in a text, under KEY or in a `comment`; what makes none is passed over."""
-    found = []
+    result = []
     for each in _DOCUMENTS.finditer(text):
         with contextlib.suppress(ValueError, InputError, TypeError):
-            found.append(Pinhole(**json.loads(each[1])))
-    return found
+            result.append(Pinhole(**json.loads(each[1])))
+    return result
 
 
 def camera(values: Values, options: Options, what: str) -> Camera:

@@ -205,10 +205,10 @@ class _Block:
     def _vector(self, value: object, at: int, word: str) -> tuple[float, float, float]:
         if isinstance(value, float):
             value = (value,) * 3
-        found = numbers(value, 3)
-        if found is None:
+        result = numbers(value, 3)
+        if result is None:
             texts.fail(self.text, _place(value, at), f"give plain numbers for {word}")
-        return found
+        return result
 
     def _move(self, word: str, at: int) -> int:
         value, end = self.reader.value(at)

@@ -92,9 +92,9 @@ def _lens(model: str, numbers: dict[str, float]) -> distortion.Lens:
 
 def _values(source: Source) -> dict[str, str]:
     """Attributes and child elements by name, wherever in the XMP."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for element in source.xml.iter():
-        found |= element.attrib
+        result |= element.attrib
         if text := (element.text or "").strip():
-            found[element.tag] = text
-    return found
+            result[element.tag] = text
+    return result

@@ -244,10 +244,10 @@ class Record:
 
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
         """So many numbers, in whatever nesting."""
-        found = flat(self.called(key), self.needed(key))
-        if len(found) != count:
-            raise InputError(f"{self.called(key)} has {len(found)} numbers: it should have {count}")
-        return found
+        result = flat(self.called(key), self.needed(key))
+        if len(result) != count:
+            raise InputError(f"{self.called(key)} has {len(result)} numbers: it should have {count}")
+        return result
 
     def record(self, key: str) -> "Record":
         return Record(self.needed(key), self.called(key))
@@ -311,9 +311,11 @@ def table(name: str, lines: Sequence[tuple[int, str]]) -> np.ndarray:
         of the first line that is none.
     """
     try:
-        found = np.loadtxt([line.replace(",", " ") for _, line in lines], comments=None, ndmin=2) if lines else np.zeros((0, 0))
-        if np.isfinite(found).all():
-            return found
+        result = (
+            np.loadtxt([line.replace(",", " ") for _, line in lines], comments=None, ndmin=2) if lines else np.zeros((0, 0))
+        )
+        if np.isfinite(result).all():
+            return result
     except ValueError:
         pass
     rows: list[tuple[float, ...]] = []

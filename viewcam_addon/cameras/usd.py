@@ -144,14 +144,14 @@ def _identifier(name: str, taken: set[str]) -> str:
 
 def read_again(cameras: Sequence[Camera], options: Options) -> list[Camera]:
     """The cameras that `read` makes of these once they are written, without OpenUSD."""
-    found = []
+    result = []
     for camera in cameras:
         lens, pinhole = _lens(camera.pinhole), camera.pinhole
         sample: dict[str, Any] = {key: float(np.float32(value)) for key, value in lens.items()}
         matrix = [number for column in zip(*axes.camera_to_world(pinhole), strict=True) for number in column]
         sample |= {"Projection": "perspective", "FStop": 0.0, "size": [pinhole.width, pinhole.height], "matrix": matrix}
-        found.append(_camera(camera.name, sample | {"time": None, "seconds": None}, options))
-    return found
+        result.append(_camera(camera.name, sample | {"time": None, "seconds": None}, options))
+    return result
 
 
 def _lens(pinhole: Pinhole) -> dict[str, float]:

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import listed
 from ..pinhole import Pinhole
 from .answer import Answer, NotModelled, answered
 from .coincident import TakenOut
@@ -117,7 +118,7 @@ class RadianceComparison:
         combined = self.rows[0]
         worst = [row for row in self.rows if not row.ok]
         if worst:
-            others = f"; {_listed([row.name for row in worst[1:]])} too" if len(worst) > 1 else ""
+            others = f"; {listed([row.name for row in worst[1:]])} too" if len(worst) > 1 else ""
             return answered(
                 False, "Different here", f"{_difference(worst[0])}{_hint(worst[0])}{others}{_without(self)}.", self.not_modelled
             )
@@ -311,8 +312,4 @@ def _few(names: Iterable[str]) -> str:
     """'Sheet', 'Area' and 3 more."""
     quoted = [repr(name) for name in names]
     more = [f"{len(quoted) - _MOST_NAMED:,} more"] if len(quoted) > _MOST_NAMED else []
-    return _listed([*quoted[:_MOST_NAMED], *more])
-
-
-def _listed(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return listed([*quoted[:_MOST_NAMED], *more])

@@ -26,6 +26,7 @@ from concurrent.futures import CancelledError
 from pathlib import Path
 from typing import Any
 
+from .. import machine
 from ..errors import FullDiskError, InputError, bug
 from ..files import temporary_folder
 from . import render_client
@@ -74,7 +75,7 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
             with _connected(distributed, scheduler) as client:
                 yield Cluster(client, None)
             return
-        count = workers or min(2, _cores())
+        count = workers or min(2, machine.cores())
         with temporary_folder() as scratch, _processes_of_this_package():
             local = distributed.LocalCluster(
                 n_workers=count,
@@ -90,7 +91,7 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
                 env={render_client.BLENDER: os.environ.get(render_client.BLENDER) or blender or ""},
             )
             with _ending(local), _ending(distributed.Client(local, set_as_default=False)) as client:
-                yield Cluster(client, max(1, _cores() // count))
+                yield Cluster(client, max(1, machine.cores() // count))
 
 
 class Cluster:
@@ -414,8 +415,3 @@ def _without_logs() -> Iterator[None]:
         yield
     finally:
         logging.disable(before)
-
-
-def _cores() -> int:
-    """How many this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

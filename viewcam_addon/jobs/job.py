@@ -178,23 +178,23 @@ def conflicts(values: Mapping[str, object], in_list: bool = False) -> list[tuple
     values : what is stated, by field; None where it is wrong already, and no more is to be told of it. in_list : whether it is
     one of several, which needs a name, and a camera that is not the scene's own.
     """
-    found = []
+    result = []
     if "name" not in values and in_list:
-        found.append((("name",), "missing, give each shot a name of its own for its files"))
+        result.append((("name",), "missing, give each shot a name of its own for its files"))
     given = tuple(field for field in (*FOUR_VALUES, *BESIDE_THEM) if field in values)
     missing = tuple(field for field in FOUR_VALUES if field not in values)
     if "camera" in values and given:
-        found.append((("camera", *given), "a shot has either a camera of the file or the four values, leave one of them out"))
+        result.append((("camera", *given), "a shot has either a camera of the file or the four values, leave one of them out"))
     elif "camera" not in values and missing and (given or in_list):
-        found.append((missing, "missing, give eye, look_at, up and d, or the name of a camera of the file"))
+        result.append((missing, "missing, give eye, look_at, up and d, or the name of a camera of the file"))
     if "principal_point" in values and "width" not in values:
-        found.append((("width", "height"), "missing, the principal point counts pixels of a picture: give its size"))
+        result.append((("width", "height"), "missing, the principal point counts pixels of a picture: give its size"))
     if values.get("eye") is not None and values.get("eye") == values.get("look_at"):
-        found.append((("eye", "look_at"), "they are the same point, and the view has no direction: move one of them"))
+        result.append((("eye", "look_at"), "they are the same point, and the view has no direction: move one of them"))
     for one, other in (("width", "height"), ("height", "width")):
         if one in values and other not in values:
-            found.append(((other,), f"missing, give {one} and {other}, or neither"))
-    return found
+            result.append(((other,), f"missing, give {one} and {other}, or neither"))
+    return result
 
 
 def _text(place: str, value: object) -> str:

@@ -59,20 +59,20 @@ class Row:
 
 def unusable_columns(columns: Sequence[str]) -> list[tuple[str, str]]:
     """(column, why it can't stand there) for each such: unknown, twice, or in two spellings at once."""
-    found, seen = [], set()
+    result, seen = [], set()
     for column in columns:
         name = _FIELD_OF.get(column)
         others = [each for each in seen if _FIELD_OF[each] == name and not {each, column} <= {*_PARTS.get(name, ())}]
         if name is None:
             close = difflib.get_close_matches(column.strip().lower().replace(" ", "_"), COLUMNS, 1)
-            found.append((column, f"is unknown: {f'write {close[0]}' if close else 'take it out'}"))
+            result.append((column, f"is unknown: {f'write {close[0]}' if close else 'take it out'}"))
         elif column in seen:
-            found.append((column, "is there twice: take one out"))
+            result.append((column, "is there twice: take one out"))
         elif others:
-            found.append((column, f"says the same as {min(others)}: take one out"))
+            result.append((column, f"says the same as {min(others)}: take one out"))
         else:
             seen.add(column)
-    return found
+    return result
 
 
 def missing_fields(columns: Iterable[str]) -> list[str]:

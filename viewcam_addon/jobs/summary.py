@@ -36,16 +36,16 @@ class Result:
         return answer if answer in ANSWERS else SAME if self.check["passed"] else DIFFERENT
 
     def to_json(self) -> dict[str, Any]:
-        told: dict[str, Any] = {"name": self.name, "state": self.state}
+        result: dict[str, Any] = {"name": self.name, "state": self.state}
         if self.check:
-            told |= {"passed": self.check["passed"], "answer": self.answer, "verdict": self.check["verdict"]}
+            result |= {"passed": self.check["passed"], "answer": self.answer, "verdict": self.check["verdict"]}
         if self.error:
-            told["error"] = self.error
+            result["error"] = self.error
         if self.record and self.record.get("warnings"):
-            told["warnings"] = self.record["warnings"]
+            result["warnings"] = self.record["warnings"]
         if self.record:
-            told["timing"] = {"seconds": self.record["timing"]["seconds"]}
-        return told
+            result["timing"] = {"seconds": self.record["timing"]["seconds"]}
+        return result
 
 
 def results(folder: Folder, settings: Mapping[str, str], outputs: Outputs, errors: Mapping[str, str]) -> Iterator[Result]:

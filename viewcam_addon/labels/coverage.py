@@ -63,11 +63,11 @@ def coverage(surfaces: Surfaces) -> Coverage:
 def soft_mask(image: Image, name: str) -> NDArray[np.float32]:
     """(height, width), rows as the image's: the share of each pixel that an instance covers. name : of its `coverage`."""
     mark = _mark(name).view(np.uint32)
-    found = np.zeros(image.size[::-1], np.float32)
+    result = np.zeros(image.size[::-1], np.float32)
     for layer in filter(image.passes.__contains__, COVERAGE_PASSES):
         for i in (0, 2):
-            found += np.where(np.ascontiguousarray(image[layer][..., i]).view(np.uint32) == mark, image[layer][..., i + 1], 0)
-    return found
+            result += np.where(np.ascontiguousarray(image[layer][..., i]).view(np.uint32) == mark, image[layer][..., i + 1], 0)
+    return result
 
 
 def told(found: Coverage, number: int) -> dict[str, Any] | None:
@@ -104,7 +104,7 @@ def _counted(at_samples: NDArray[np.int32]) -> tuple[NDArray[np.intp], NDArray[n
 def _names(instances: list[Instance]) -> list[str]:
     """An object's, and of its further places with their numbers: Tree, Tree #1; each once."""
     taken: set[str] = {each.key[0] for each in instances}
-    found = []
+    result = []
     for name, number in (each.key for each in instances):
         own = name
         if number:
@@ -112,8 +112,8 @@ def _names(instances: list[Instance]) -> list[str]:
             while own in taken:
                 own += "#"
             taken.add(own)
-        found.append(own)
-    return found
+        result.append(own)
+    return result
 
 
 def _header(manifest: dict[str, str]) -> dict[str, str]:
@@ -141,14 +141,14 @@ def _as_float(number: int) -> np.float32:
 def murmur3(text: bytes) -> int:
     """MurmurHash3's 32 bits, with the seed 0."""
     whole = len(text) // 4 * 4
-    found = 0
+    result = 0
     for at in range(0, whole, 4):
-        found ^= _mixed(int.from_bytes(text[at : at + 4], "little"))
-        found = ((found << 13 | found >> 19) * 5 + 0xE6546B64) & _MASK
-    found ^= _mixed(int.from_bytes(text[whole:], "little")) ^ len(text)
+        result ^= _mixed(int.from_bytes(text[at : at + 4], "little"))
+        result = ((result << 13 | result >> 19) * 5 + 0xE6546B64) & _MASK
+    result ^= _mixed(int.from_bytes(text[whole:], "little")) ^ len(text)
     for shift, factor in ((16, 0x85EBCA6B), (13, 0xC2B2AE35), (16, 1)):
-        found = ((found ^ found >> shift) * factor) & _MASK
-    return found
+        result = ((result ^ result >> shift) * factor) & _MASK
+    return result
 
 
 def _mixed(part: int) -> int:

@@ -98,17 +98,17 @@ def read(path: Path) -> dict[str, Any]:
         if it can't be read, or is no such file.
     """
     try:
-        told = json.loads(read_bytes(path), parse_constant=_refused)
-        is_one = (told["format"], told["version"]) == (_FORMAT, _VERSION)
+        result = json.loads(read_bytes(path), parse_constant=_refused)
+        is_one = (result["format"], result["version"]) == (_FORMAT, _VERSION)
         if is_one:
-            _check(told)
+            _check(result)
     except OSError as error:
         raise InputError(f"{path} can't be read ({error.strerror or error}): give the folder of label files") from error
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path} is no label file that can be read: write it again with viewcam render --labels") from error
     if not is_one:
         raise InputError(f"{path} is of another version or format: write it again with viewcam render --labels")
-    return told
+    return result
 
 
 def _refused(constant: str) -> Never:

@@ -65,9 +65,9 @@ def _described(
     owners: NDArray[np.intp], starts: NDArray[np.intp], ends: NDArray[np.intp], shape: tuple[int, int], count: int
 ) -> Masks:
     """The description of runs in order: whose they are, their first places and those after their last."""
-    found: Masks = [None] * count
+    result: Masks = [None] * count
     if not len(owners):
-        return found
+        return result
     height, width = shape
     first = np.flatnonzero(np.diff(owners, prepend=-1))
     last = np.append(first[1:], len(owners)) - 1
@@ -85,5 +85,5 @@ def _described(
     told = zip(owners[first].tolist(), areas, boxes, rests, first.tolist(), last.tolist(), strict=True)
     for owner, area, box, rest, begin, end in told:
         runs = counts[2 * begin : 2 * end + 2] + [rest] * (rest > 0)  # of zeros first: 0 where the first pixel is set
-        found[owner] = {"area": area, "bbox": box, "segmentation": {"size": [height, width], "counts": runs}}
-    return found
+        result[owner] = {"area": area, "bbox": box, "segmentation": {"size": [height, width], "counts": runs}}
+    return result

@@ -107,7 +107,7 @@ def _instances(
     to_camera[:3, 3] = -to_camera[:3, :3] @ np.array(camera.eye)
     matrices = np.stack([each.matrix for each in all_of_them])
     in_world, in_camera = matrices.tolist(), (to_camera @ matrices).tolist()
-    told = []
+    result = []
     for number, (instance, seen, whole) in enumerate(zip(all_of_them, visible, amodal, strict=True)):
         share = coverage.told(covered, number) if covered else None
         if whole is None and share is None:
@@ -129,5 +129,5 @@ def _instances(
             figures["visible_fraction"] = seen["area"] / whole["area"] if seen and whole else 0.0
         if covered:
             figures["coverage"] = share
-        told.append(figures)
-    return told
+        result.append(figures)
+    return result

@@ -2,7 +2,6 @@
 
 import hashlib
 import itertools
-import os
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import machine
 from ..pinhole import Pinhole
 from ..tracer import render
 from ..tracer.native import CoreScene
@@ -57,7 +57,7 @@ def instances(scene: Scene) -> list[Instance]:
     """
     counts: dict[str, itertools.count] = {}
     taken: set[int] = set()
-    found = []
+    result = []
     for placed in scene.objects:
         for matrix, inverse in zip(placed.matrices, _inverses(placed.matrices), strict=True):
             number = next(counts.setdefault(placed.name, itertools.count()))
@@ -66,8 +66,8 @@ def instances(scene: Scene) -> list[Instance]:
             while mark in taken or mark == 0:
                 mark = mark % _MOST_IDS + 1
             taken.add(mark)
-            found.append(Instance((placed.name, number), mark, placed, matrix, inverse))
-    return found
+            result.append(Instance((placed.name, number), mark, placed, matrix, inverse))
+    return result
 
 
 class Keeper:
@@ -78,7 +78,7 @@ class Keeper:
 
     def __init__(self, scene: Scene, threads: int | None = None) -> None:
         self.scene, self.instances, self.tracers = scene, instances(scene), render.Keeper()
-        self.threads = threads or os.cpu_count() or 1
+        self.threads = threads or machine.cores()
         self._alone: dict[tuple[str, bytes], CoreScene] = {}
         self._boxes: dict[str, tuple[Array, Array]] = {}
         self._corners: dict[int, Array] = {}
@@ -117,9 +117,9 @@ class Keepers:
 
     def of(self, scene: Scene) -> Keeper:
         """The store that serves a scene, which is the last one now."""
-        found = next((each for each in self._kept if same_things(scene, each.scene)), None) or Keeper(scene, self._threads)
-        self._kept = [*(each for each in self._kept if each is not found), found][-self._most :]
-        return found
+        result = next((each for each in self._kept if same_things(scene, each.scene)), None) or Keeper(scene, self._threads)
+        self._kept = [*(each for each in self._kept if each is not result), result][-self._most :]
+        return result
 
 
 class Surfaces:
@@ -240,7 +240,7 @@ class Silhouettes:
             first = np.minimum(reaches[number, :2], [columns.min(), rows.min()])
             last = np.maximum(reaches[number, :2] + reaches[number, 2:], [columns.max() + 1, rows.max() + 1])
             reaches[number] = *first, *(last - first)
-        found: list[Window | None] = [None] * len(surfaces.instances)
+        result: list[Window | None] = [None] * len(surfaces.instances)
 
         def trace(numbers: NDArray[np.intp]) -> None:
             for number in numbers.tolist():
@@ -249,7 +249,7 @@ class Silhouettes:
                 if number in shown:
                     rows, columns = np.divmod(shown[number], camera.width)
                     covered[rows - window[1], columns - window[0]] = True
-                found[number] = window[0], window[1], covered
+                result[number] = window[0], window[1], covered
 
         seen = [number for number, each in enumerate(surfaces.instances) if "camera" not in each.placed.hidden_from]
         areas = reaches[seen, 2:].prod(axis=1)
@@ -262,7 +262,7 @@ class Silhouettes:
         pieces = np.split(seen, np.flatnonzero(np.diff(parts)) + 1)
         for _ in over_threads(trace, pieces, self._keeper.threads, lambda: None, lambda: None):
             pass
-        return found
+        return result
 
     def _reaches(self) -> NDArray[np.intp]:
         """(n, 4): the first column and row that instances may have, and how many, by what of their boxes the clip leaves."""

@@ -7,13 +7,13 @@ number of threads.
 
 import functools
 import math
-import os
 from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import machine
 from ..errors import InputError
 from ..image import CHANNELS, GEOMETRY_PASSES, LIGHT_PASSES
 from . import native
@@ -52,7 +52,7 @@ class Tracer:
 
     def __init__(self, scene: Scene, threads: int | None = None, kept: "Tracer | None" = None) -> None:
         self._scene, self._camera = scene, scene.camera
-        self._threads = threads or os.cpu_count() or 1
+        self._threads = threads or machine.cores()
         former = None if kept is None else kept._used_up()
         if former is not None and former[1].serves(scene):
             self._core = former[1]

@@ -9,7 +9,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from viewcam_addon import memory
+from viewcam_addon import machine
 from viewcam_addon.errors import InputError
 from viewcam_addon.tracer.scene import scene_file
 
@@ -119,7 +119,7 @@ def test_a_size_in_the_archive_that_its_packed_bytes_can_not_hold_is_damaged(ref
 
 def test_arrays_that_need_more_memory_than_there_is_are_refused_before_any_is_taken(refused, monkeypatch):
     """16 MiB that are a few kilobytes as they are packed; two are too large together, and one is not."""
-    monkeypatch.setattr(memory, "most", lambda: 40 * MEBI)
+    monkeypatch.setattr(machine, "most", lambda: 40 * MEBI)
     vertices = array(np.zeros((16 * MEBI // 24, 3)))
     geometries = {name: {"type": "mesh", "vertices": {"npz": name}, "triangles": []} for name in "vw"}
     assert "memory" not in refused(document(geometries={"v": geometries["v"]}, objects=1), {"v.npy": vertices})
@@ -134,7 +134,7 @@ def test_arrays_that_need_more_memory_than_there_is_are_refused_before_any_is_ta
 
 def test_an_array_that_many_geometries_name_is_read_once(tmp_path, monkeypatch):
     """Else a file of some kilobytes takes gigabytes."""
-    monkeypatch.setattr(memory, "most", lambda: 3 * 8 * MEBI)
+    monkeypatch.setattr(machine, "most", lambda: 3 * 8 * MEBI)
     np.savez_compressed(tmp_path / "scene.npz", v=np.zeros((8 * MEBI // 24, 3)))
     it = {"type": "mesh", "vertices": {"npz": "v"}, "triangles": []}
     (tmp_path / "scene.json").write_text(json.dumps(document(geometries={str(number): it for number in range(100)})))

@@ -30,10 +30,10 @@ class NamesCamera:
 
     def one(self, context: bpy.types.Context) -> bpy.types.Object:
         """The object that is meant, or InputError."""
-        found = self.found(context)
-        if found is None:
+        result = self.found(context)
+        if result is None:
             raise InputError(f"there is no camera {self.camera!r}: name another")
-        return found
+        return result
 
 
 class CameraOperator(NamesCamera):

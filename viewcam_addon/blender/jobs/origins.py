@@ -268,12 +268,12 @@ def _text_at(socket: bpy.types.NodeSocket, outer: Any) -> str | None:
 
 def _with_usd_layers(files: set[Path]) -> set[Path]:
     """The files, and all that those of USD read besides themselves, as far as that can be known."""
-    found, todo = set(files), [path for path in files if path.suffix.lower() in _USD]
+    result, todo = set(files), [path for path in files if path.suffix.lower() in _USD]
     while todo:
-        further = set(_usd_layers(todo.pop()) or ()) - found
-        found |= further
+        further = set(_usd_layers(todo.pop()) or ()) - result
+        result |= further
         todo += [path for path in further if path.suffix.lower() in _USD]
-    return found
+    return result
 
 
 def _usd_layers(path: Path) -> list[Path] | None:

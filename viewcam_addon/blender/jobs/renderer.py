@@ -212,9 +212,9 @@ class BlenderRenderer:
         self._set(job)
         with staged(job, self.scene, self.scene.camera, self._settings.off) as stage:
             light = survey(stage.scene, stage.view_layer, stage.camera, stage.ledger, stage.is_lit)
-            told = stage.entries(job.strict)
+            result = stage.entries(job.strict)
             stage.render(job, [path], light)
-            return told
+            return result
 
     def both_sides(self, job: Job, paths: Sequence[Path]) -> Scene:
         """The scene of a job and, at these paths, the pictures of its engine, of one state. Raises as `cycles` does."""

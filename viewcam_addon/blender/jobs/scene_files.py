@@ -49,12 +49,12 @@ class SceneFiles:
         state = scene.frame_current, scene.frame_subframe, camera_object.name, datablocks.frame_of(scene)
         if self._changes:
             self._exports.clear()
-        found = next((each for each in self._exports if each.state == state), None)
-        if found is None:
+        result = next((each for each in self._exports if each.state == state), None)
+        if result is None:
             seen = export_scene(scene, stage.view_layer, camera_object, stage.ledger)
-            found = Export(state, seen, stage.ledger)
-            self._exports = [*self._exports[-self._most + 1 :], found] if self._most > 1 else [found]
-        return found
+            result = Export(state, seen, stage.ledger)
+            self._exports = [*self._exports[-self._most + 1 :], result] if self._most > 1 else [result]
+        return result
 
     def file_of(self, scene: Scene) -> Path:
         """A file of the scene, one that is there if the same things are in it; cameras don't count."""

@@ -90,10 +90,10 @@ class LampReader(shaders.Tree):
         return node("vector_math", operation="normalize", a=node("combine_xyz", **dict(zip("xyz", columns, strict=True))))
 
     def _uv_of(self, output: Output) -> Node | None:
-        found = self._uv(self._light, np.linalg.inv(self._matrix))
-        if found is None:
+        result = self._uv(self._light, np.linalg.inv(self._matrix))
+        if result is None:
             self._reason(output, f"says the UV of a {self._light.type.lower()}")
-        return found
+        return result
 
 
 def emission(

@@ -92,12 +92,12 @@ def stand_in(overrides: Overrides, material: bpy.types.Material, reading: shader
 
 def _texts_of(made: Iterable[Node], overrides: Overrides) -> dict[str, bpy.types.Text]:
     """The texts that nodes ask for, in Blender, until the overrides end."""
-    found = {}
+    result = {}
     for text in dict.fromkeys(node["text"] for node in made if "text" in KINDS[node.type].inputs):
-        found[text] = bpy.data.texts.new("IES")
-        found[text].write(text)
-        overrides.afterwards(bpy.data.batch_remove, [found[text]])
-    return found
+        result[text] = bpy.data.texts.new("IES")
+        result[text].write(text)
+        overrides.afterwards(bpy.data.batch_remove, [result[text]])
+    return result
 
 
 def _add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Reading) -> None:

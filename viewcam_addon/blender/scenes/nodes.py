@@ -80,14 +80,14 @@ def _by_identifier(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: t
 
 def feeding(of: Input) -> set[Output]:
     """All outputs that an input is made of."""
-    found: set[Output] = set()
+    result: set[Output] = set()
     left = [of]
     while left:
         output = source(left.pop())
-        if isinstance(output, Output) and output not in found:
-            found.add(output)
+        if isinstance(output, Output) and output not in result:
+            result.add(output)
             left += [Input(socket, output.groups) for socket in output.node.inputs]
-    return found
+    return result
 
 
 def all_of(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree] | None = None) -> Iterator[bpy.types.Node]:

@@ -299,7 +299,7 @@ def _place(overrides: Overrides, temporary: bpy.types.Scene, placed: list[_Place
     objects = [root]
     overrides.afterwards(bpy.data.batch_remove, objects)
     temporary.collection.objects.link(root)
-    shown = {}
+    result = {}
     for each in placed:
         block = bpy.data.objects.new(each.name, each.data)
         objects.append(block)
@@ -309,8 +309,8 @@ def _place(overrides: Overrides, temporary: bpy.types.Scene, placed: list[_Place
         for ray in each.hidden_from:
             setattr(block, f"visible_{ray}", False)
         temporary.collection.objects.link(block)
-        shown[block] = each
-    return shown
+        result[block] = each
+    return result
 
 
 def _camera(overrides: Overrides, temporary: bpy.types.Scene, view: _View) -> bpy.types.Object:

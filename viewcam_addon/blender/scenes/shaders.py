@@ -388,15 +388,15 @@ class Tree:
         return {name: made} if isinstance(made, Node) else {}
 
     def _words(self, output: Output, ours: str) -> dict[str, str]:
-        found = {}
+        result = {}
         for name, theirs in SHADERS[ours].words.items():
             word = getattr(output.node, theirs)
             known = [each for each in KINDS[ours].inputs[name] if word_of(each) == word]
             is_smooth = ours in _CLEAR_OR_MIRRORS and constant_number(output, "Roughness") == 0.0
             if not known and not is_smooth:
                 self._reason(output, f"has the {name} {word}")
-            found |= dict.fromkeys([name] if known else [], *known)
-        return found
+            result |= dict.fromkeys([name] if known else [], *known)
+        return result
 
     def _input(self, output: Output, name: str | int, otherwise: float | None) -> Colour | Node:
         """The value of an input. otherwise : the number where that is not modelled, or None of a colour."""
@@ -404,13 +404,13 @@ class Tree:
         if value is None:
             source = nodes.source(output.input(name))
             told, self.reading.reasons = self.reading.reasons, []
-            made: Colour | Node | None = self._colour(output, name)
+            result: Colour | Node | None = self._colour(output, name)
             if self.reading.reasons and isinstance(source, Output):
                 self.reading.reasons = []
-                made = self._value(source)
+                result = self._value(source)
             why, self.reading.reasons = self.reading.reasons, told
-            if made is not None and not why:
-                return made
+            if result is not None and not why:
+                return result
             told += [reason for reason in why if reason not in told]
             return self.viewport if otherwise is None else Colour((otherwise,) * 3)
         if isinstance(name, str) and name.endswith("Rotation"):
@@ -509,14 +509,14 @@ class Tree:
             elif len(self.reading.reasons) > told:
                 return None
         try:
-            made = Node(ours, tuple(given.items()))
+            result = Node(ours, tuple(given.items()))
         except InputError:
             self._reason(output, f"is computed by more than {MOST_NODES} others")
             return None
-        plain = Node("image", tuple((name, made[name]) for name in ("image", "interpolation"))) if ours == "image" else None
-        if made == plain and made["interpolation"] != "cubic":
-            return Colour(_WHITE, made["image"].image, made["interpolation"] == "closest")
-        return made
+        plain = Node("image", tuple((name, result[name]) for name in ("image", "interpolation"))) if ours == "image" else None
+        if result == plain and result["interpolation"] != "cubic":
+            return Colour(_WHITE, result["image"].image, result["interpolation"] == "closest")
+        return result
 
     def _value_input(self, of: Input, known: object) -> Colour | Node | tuple[float, ...] | None:
         """The value of an input of a node that makes values. known : its default, a number where it is one."""

@@ -39,11 +39,11 @@ class Shading:
 
     def pictures(self) -> dict[str, Picture]:
         """The images of all materials that were asked for, as in `Scene`; their pixels are read now."""
-        found: dict[str, Picture] = {}
+        result: dict[str, Picture] = {}
         alphas = {key for reading in self._readings.values() for key in reading.alphas}
         for reading in self._readings.values():
-            add_pictures(reading, alphas, found)
-        return found
+            add_pictures(reading, alphas, result)
+        return result
 
     def names(self, slots: tuple[bpy.types.Material | None, ...]) -> tuple[str, ...]:
         """Keys in `materials`; "" is none, which until 5.0 Cycles draws as we do."""

@@ -75,17 +75,17 @@ def _rendered(
 ) -> world_image.Rendered | None:
     """The image that stands in for a world that is not modelled, or None where a constant one must."""
     obstacle = world_image.obstacle(world)
-    made = None
+    result = None
     if obstacle is None:
-        made = world_image.rendered(world, scene) if render else world_image.Rendered(World((1.0, 1.0, 1.0)), (), {})
-        obstacle = None if made else "can't be rendered by another Blender"
-    if made is None:
+        result = world_image.rendered(world, scene) if render else world_image.Rendered(World((1.0, 1.0, 1.0)), (), {})
+        obstacle = None if result else "can't be rendered by another Blender"
+    if result is None:
         for reason in dict.fromkeys((*reasons, obstacle)):
             ledger.note(world.name, "approximated", f"the world {reason}, and a constant one stands in")
         return None
     width = world_image.width(world)
     image = f"an image of {width} × {width // 2} that Cycles renders of it stands in"
-    if made.suns:
+    if result.suns:
         image += ", with lamps that shine evenly for its suns"
     for reason in reasons:
         ledger.note(world.name, "approximated", f"the world {reason}, and {image}")
@@ -96,9 +96,9 @@ def _rendered(
     hidden = frozenset(ray for ray in _RAYS if not getattr(world.cycles_visibility, ray))
     if scene.render.film_transparent:
         hidden |= {"camera"}
-    made = replace(made, suns=tuple(replace(sun, hidden_from=sun.hidden_from | hidden) for sun in made.suns))
-    ledger.call_for_cycles(world.original, world_image.show, scene.original, made)
-    return made
+    result = replace(result, suns=tuple(replace(sun, hidden_from=sun.hidden_from | hidden) for sun in result.suns))
+    ledger.call_for_cycles(world.original, world_image.show, scene.original, result)
+    return result
 
 
 def _made(radiance: RGB, wrapped: "_Wrapped | None", pictures: dict[str, Picture] | None) -> World:

@@ -99,10 +99,10 @@ def _exactly(values: NDArray[np.float32], dtype: np.dtype) -> NDArray | None:
         return values
     if dtype == RGBE and values.shape[2] != 3:
         return None
-    made = np.empty((*values.shape[:2], 1) if dtype == RGBE else values.shape, dtype)
+    result = np.empty((*values.shape[:2], 1) if dtype == RGBE else values.shape, dtype)
     rows = max(1, _ROWS // values[0].size)
     for first in range(0, len(values), rows):
-        some, part = values[first : first + rows], made[first : first + rows]
+        some, part = values[first : first + rows], result[first : first + rows]
         with np.errstate(over="ignore", invalid="ignore"):
             if dtype == RGBE:
                 largest = np.maximum(np.maximum(some[..., 0], some[..., 1]), some[..., 2])
@@ -112,7 +112,7 @@ def _exactly(values: NDArray[np.float32], dtype: np.dtype) -> NDArray | None:
                 part[:] = some if dtype.kind == "f" else np.rint(some * np.float32(np.iinfo(dtype).max))
         if not np.array_equal(_values(part).view(np.int32), some.view(np.int32)):
             return None
-    return made
+    return result
 
 
 def _ends(pixels: NDArray) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import checks, memory, npy
+from ... import checks, machine, npy
 from ...errors import InputError
 
 _LARGEST_WHOLE = 2**31 - 1
@@ -178,7 +178,7 @@ class Arrays:
                 if file.tell() + size != member.file_size or member.file_size > packed * _MOST_UNPACKED:
                     raise InputError(damaged)
             together = size + sum(array.nbytes for array in self._taken.values())
-            memory.check(f"the arrays of {self._file}", _COPIES * together, "make the scene smaller")
+            machine.check(f"the arrays of {self._file}", _COPIES * together, "make the scene smaller")
             with self._archive.open(member) as file:
                 return np.lib.format.read_array(file, allow_pickle=False)
         except (

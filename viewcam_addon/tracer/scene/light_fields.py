@@ -52,19 +52,19 @@ def light_document(scene: Scene, arrays: dict[str, NDArray]) -> dict:
 
 def light(fields: dict[str, Field], arrays: Arrays) -> dict[str, Any]:
     """The arguments of `Scene` that those of `KEYS` among the fields give."""
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     if "images" in fields:
-        found["images"] = {name: _picture(field, arrays) for name, field in fields["images"].named("image").items()}
+        result["images"] = {name: _picture(field, arrays) for name, field in fields["images"].named("image").items()}
     if "materials" in fields:
-        found["materials"] = {name: _material(field) for name, field in fields["materials"].named("material").items()}
+        result["materials"] = {name: _material(field) for name, field in fields["materials"].named("material").items()}
     if "lamps" in fields:
-        found["lamps"] = tuple(_lamp(field) for field in fields["lamps"].items("lamp"))
+        result["lamps"] = tuple(_lamp(field) for field in fields["lamps"].items("lamp"))
     for key, kind in (("world", World), ("film", Film), ("bounces", Bounces)):
         if key in fields:
-            found[key] = _simple(kind, fields[key])
+            result[key] = _simple(kind, fields[key])
     if "cycles" in fields:
-        found["cycles"] = _version(fields["cycles"])
-    return found
+        result["cycles"] = _version(fields["cycles"])
+    return result
 
 
 def _version(field: Field) -> tuple[int, int]:

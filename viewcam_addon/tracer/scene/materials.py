@@ -148,19 +148,19 @@ def _is_diffuse(principled: Node) -> bool:
 
 
 def _sum(total: dict[str, Any], some: dict[str, Any], weight: float) -> dict[str, Any] | None:
-    made = dict(total)
+    result = dict(total)
     for name, value in some.items():
-        before = made.get(name)
+        before = result.get(name)
         scaled = value if name == "ior" else _scaled(value, weight)
         if name == "ior" or before is None or before.is_black:
-            made[name] = scaled if name != "ior" or before in (None, value) else None
+            result[name] = scaled if name != "ior" or before in (None, value) else None
         elif scaled is not None and not scaled.is_black:
             is_alike = replace(before, rgb=WHITE) == replace(scaled, rgb=WHITE)
             rgb = tuple(a + b for a, b in zip(before.rgb, scaled.rgb, strict=True))
-            made[name] = replace(before, rgb=rgb) if is_alike and max(rgb) <= LARGEST_RADIANCE else None
-        if made[name] is None or scaled is None:
+            result[name] = replace(before, rgb=rgb) if is_alike and max(rgb) <= LARGEST_RADIANCE else None
+        if result[name] is None or scaled is None:
             return None
-    return made
+    return result
 
 
 def _scaled(value: Colour | Node, factor: float | None) -> Colour | None:

@@ -1,4 +1,4 @@
-"""How much memory there may be, asked before what a file claims to hold is allocated.
+"""What of the machine this process may use: cores, and memory, asked before what a file claims to hold is allocated.
 
 Rejected: to allocate and see. Linux promises more than it has, and ends the process that then uses it.
 """
@@ -11,6 +11,11 @@ from pathlib import Path
 from .errors import InputError
 
 _GROUPS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+
+
+def cores() -> int:
+    """The cores that this process may use, which a container or `taskset` may have made fewer."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def most() -> int:
@@ -41,10 +46,10 @@ def _machine() -> int:
 
 
 def _limits() -> list[int]:
-    found = [sys.maxsize]
+    result = [sys.maxsize]
     for file in map(Path, _GROUPS):
         try:
-            found.append(int(file.read_text()))
+            result.append(int(file.read_text()))
         except (OSError, ValueError):  # no such group, or "max"
             continue
     if sys.platform != "win32":
@@ -52,5 +57,5 @@ def _limits() -> list[int]:
 
         limit, _ = resource.getrlimit(resource.RLIMIT_AS)
         if limit != resource.RLIM_INFINITY:
-            found.append(limit)
-    return found
+            result.append(limit)
+    return result
