@@ -257,7 +257,7 @@ def headline(result: dict[str, Any]) -> str:
     if result["answer"] == DIFFERENT:
         return "Cycles renders another picture"
     words = _agreement(result)
-    return f"{words}, {but_for(result['not_modelled']['names'])}" if result["answer"] == SAME_BUT else words
+    return f"{words}, {but_for(result['not_modelled'])}" if result["answer"] == SAME_BUT else words
 
 
 def _agreement(result: dict[str, Any]) -> str:
