@@ -40,7 +40,7 @@ class Overrides:
             setattr(owner, name, value)
 
     def shared(self, make: Callable[..., Made], *arguments: Hashable) -> Made:
-        """The result of `make(overrides, *arguments)` while the overrides last: made for the first who asks, the same for all."""
+        """The result of `make(overrides, *arguments)` while the overrides last, made for the first who asks."""
         key = make, *arguments
         if key not in self._made:
             self._made[key] = make(self, *arguments)
