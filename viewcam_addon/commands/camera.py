@@ -41,7 +41,10 @@ def add_reading_options(added: argparse._ActionsContainer, size: bool = True) ->
     """Add the options that say how cameras are read. size : whether --size is one of them, and not there already."""
     if size:
         added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
-    added.add_argument("--axes", choices=[*cameras.AXES], default="as_is", help="y_up: y points up in the file and z here")
+    added.add_argument(
+        "--axes", choices=[*cameras.AXES], default="as_is", help="y_up, y_down: where y points in the file, and z up here"
+    )
+    added.add_argument("--up-from", choices=[*cameras.UPS], help="turn the world so that the mean of the cameras' up is z")
     added.add_argument("--scale", type=types.above_zero, metavar="S", default=1.0, help="1 unit of the file is S units here")
     added.add_argument("--distance", type=types.above_zero, metavar="D", help="view-plane distance in pixels, for poses alone")
     added.add_argument(
@@ -80,6 +83,7 @@ def options_of(options: argparse.Namespace) -> Options:
         without_distortion=options.without_distortion,
         unmirrored=options.unmirrored,
         original_world=options.original_world,
+        up_from=options.up_from,
     )
 
 
@@ -119,7 +123,7 @@ def _undistort(options: argparse.Namespace) -> Result:
     dataset = Path(options.file)
     if options.file == "-" or options.list or options.out or options.camera is not None:
         raise InputError("--undistort writes all of a data set into its folder: give the data set, and leave the others out")
-    if options.axes != "as_is" or options.scale != 1 or options.original_world:
+    if options.axes != "as_is" or options.scale != 1 or options.original_world or options.up_from:
         raise InputError("--undistort leaves the world as it is, for its points' sake: turn and scale what it has written")
     found = cameras.read(dataset, format=options.format, options=options_of(options))
     form = options.to or ("transforms" if cameras.recognised(dataset) == "transforms" else "colmap")
