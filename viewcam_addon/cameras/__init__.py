@@ -24,6 +24,7 @@ A format is a module in `FORMATS` with
     READER                          of what only writes: the module that reads it
     notes_in(source) → texts        where a file that it wrote has this project's notes, if that is not its text
     read_again(cameras, options) → list[Camera]     where it takes its time: what `read` makes of what `write` gives
+    LENSES                          of what writes a camera's lens, too, and refuses itself what it can't say
     in_world(source, options) → Options             where a file says its own axes and unit: the options with these
 
 **To the bit.** A matrix or an angle holds fewer digits than the values of which it was made. So a writer puts these beside
@@ -297,9 +298,10 @@ def write(cameras: Iterable[Camera], format: str, options: Options | None = None
     cameras = [moved_back(camera, options) for camera in cameras]
     if not cameras:
         raise InputError("there is no camera to write: give one at least")
-    for camera in cameras:
-        distortion.refuse(camera.lens, camera.pinhole.plane, camera.name, _module(format, "write").TITLE)
-    written: str | dict[str, str | bytes] = _module(format, "write").write(cameras, options)
+    module = _module(format, "write")
+    for camera in () if hasattr(module, "LENSES") else cameras:
+        distortion.refuse(camera.lens, camera.pinhole.plane, camera.name, module.TITLE)
+    written: str | dict[str, str | bytes] = module.write(cameras, options)
     return written
 
 
