@@ -21,7 +21,7 @@ from . import options as shared
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     shared.add_blend(added, blend_is_open)
     shared.add_scene_choices(added)
-    shared.add_of_job(added, *shared.OF_CHECKS)
+    shared.add_of_job(added, *shared.of_checks())
     shared.add_error(added, "the tracer takes")
     shared.add_report(added)
     many = added.add_argument_group("many checks, a shot each; --report has their page and results")
@@ -35,7 +35,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
 
 
 def run(options: argparse.Namespace) -> Result:
-    job = shared.job_of(options, *shared.OF_CHECKS)
+    job = shared.job_of(options, *shared.of_checks())
     job.refuse_unchecked()
     if options.frames is not None or options.cameras is not None:
         return _check_many(options, job)

@@ -11,20 +11,30 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import argument_types as types
 from ..errors import InputError, NotModelledError
-from ..jobs.job import LEVELS, Job
 from ..terminal import say
-from ..tracer.scene.film import SAMPLES
+from ..tracer.scene.film import LEVELS, SAMPLES
+
+if TYPE_CHECKING:
+    from ..jobs.job import Job
 
 _OF_SCENES = ("camera", "frame", "strict", "recenter", "clay")
 """Fields of a job that several commands have an option for."""
-OF_CHECKS = tuple(
-    field.name for field in dataclasses.fields(Job) if field.metadata and field.name not in (*_OF_SCENES, "trust")
-)
-"""Fields of a job that `viewcam check` alone has an option for."""
+
+
+def of_checks() -> tuple[str, ...]:
+    """The fields of a job that `viewcam check` alone has an option for."""
+    return tuple(field.name for field in _optional() if field.name not in (*_OF_SCENES, "trust"))
+
+
+def _optional() -> list[dataclasses.Field[Any]]:
+    """The fields of a job that declare an option."""
+    from ..jobs.job import Job  # here, since `viewcam render` starts without
+
+    return [field for field in dataclasses.fields(Job) if field.metadata]
 
 
 def add_blend(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
@@ -38,7 +48,7 @@ def add_blend(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
 
 def add_of_job(added: argparse._ActionsContainer, *names: str) -> None:
     """Add the options of these fields of a job, as the fields declare them."""
-    for field in dataclasses.fields(Job):
+    for field in _optional():
         if field.name in names:
             how = {"action": "store_true"} if field.default is False else {"default": field.default}
             added.add_argument(f"--{field.name}", **how | dict(field.metadata))
@@ -59,7 +69,7 @@ def add_light(added: argparse.ArgumentParser, samples: argparse._ActionsContaine
     """Add the level and its sampling. samples : the group that --samples stands in, if it excludes something."""
     added.add_argument(
         "--level",
-        choices=LEVELS,
+        choices=[*LEVELS, "auto"],
         default="geometry",
         help="how much is modelled; auto is the least that shows the scene's light (default: %(default)s)",
     )
@@ -83,8 +93,10 @@ def add_report(added: argparse.ArgumentParser) -> None:
     added.set_defaults(writes=("report", "difference"))
 
 
-def job_of(options: argparse.Namespace, *names: str) -> Job:
+def job_of(options: argparse.Namespace, *names: str) -> "Job":
     """The job that the words ask for. names : of its fields that only this command has an option for."""
+    from ..jobs.job import Job
+
     width, height = getattr(options, "size", None) or (None, None)
     shared = (*_OF_SCENES, "trust", "samples", "seed", "threads", "level", "error")
     stated = {name: value for name in (*shared, *names) if (value := getattr(options, name, None)) is not None}
