@@ -96,7 +96,7 @@ class PathIntegrator {
     const SobolSampler& sampler() const { return sampler_; }
     const Scene& scene() const { return scene_; }
     // Two objects, which may be one, that paths have met in one place, and how often; with NONE in the place of the second, an object
-    // that shadow rays see otherwise than others, and with NONE in that of the first, a lamp without shadows.
+    // that shadow rays see otherwise than others, or a lamp without shadows. Lamps are counted after the objects.
     std::map<std::pair<uint32_t, uint32_t>, uint64_t> coincident_pairs() const {
         std::lock_guard lock(mutex_);
         return pairs_;
@@ -209,10 +209,11 @@ class PathIntegrator {
         }
         if (left.differ()) {
             std::lock_guard lock(mutex_);
-            pairs_[shadows ? std::pair(cause, NONE) : std::pair(NONE, lamp->number)]++;
+            pairs_[{shadows ? cause : name_of(*lamp), NONE}]++;
         }
         return left;
     }
+    uint32_t name_of(const Light& lamp) const { return uint32_t(scene_.objects.size()) + lamp.number; }
     // What a surface leaves of light that comes along a ray through it.
     Vec3 left_behind(const Ray& ray, const Hit& hit, RayState state) const {
         if (!(scene_.objects[hit.object].visible & state.kind)) return {1, 1, 1};
@@ -252,14 +253,19 @@ class PathIntegrator {
         point.offset = larger(point.offset, 2 * reach * larger(point.cosine, 0.0));
         path.weight = min(path.weight * double(hits.size()), MOST_WEIGHT);
     }
-    // How far before its light a shadow ray must end, so that nothing in the light's place counts; 0 where nothing is there.
-    [[gnu::noinline]] double coincident_end(const Interaction& point, const LightSample& light) const {
+    // How far before its light a shadow ray must end, so that nothing in the light's place counts; 0 where nothing is there. Notes
+    // the surface that a lamp lies in, as in that of a ceiling; the places of surfaces that shine are met by paths, too.
+    [[gnu::noinline]] double coincident_end(const Interaction& point, const LightSample& sample, const Light& light) const {
         static thread_local std::vector<Hit> hits;
-        if (!(light.distance < INFINITE)) return 0;
-        double largest = max_component(abs(point.position + scene_.origin)) + light.distance;
-        double reach = coincident_reach(largest, light.cosine);
-        scene_.surfaces({point.position, light.direction, larger(light.distance - reach, 0.0), light.distance + reach}, SHADOW, INFINITE, hits);
-        return hits.size() > 1 ? reach : 0;
+        if (!(sample.distance < INFINITE && light.casts_shadow)) return 0;
+        double largest = max_component(abs(point.position + scene_.origin)) + sample.distance;
+        double reach = coincident_reach(largest, sample.cosine);
+        scene_.surfaces({point.position, sample.direction, larger(sample.distance - reach, 0.0), sample.distance + reach}, SHADOW, INFINITE, hits);
+        if (light.mesh()) return hits.size() > 1 ? reach : 0;
+        if (hits.empty()) return 0;
+        std::lock_guard lock(mutex_);
+        pairs_[{hits[0].object, name_of(light)}]++;
+        return reach;
     }
 
     const Material& material(const Interaction& point) const { return scene_.illumination.materials[point.material]; }
@@ -524,7 +530,7 @@ class PathIntegrator {
         // Light that the smooth surface has before it and the true one behind it counts, less what scattered rays would have found:
         // these are lost, as in Cycles.
         bool behind = !(dot(point.normal, sample.direction) > 0);
-        double end = coincident_ > 0 && choice.light->mesh() ? coincident_end(point, sample) : 0;
+        double end = coincident_ > 0 && !choice.light->is_environment() ? coincident_end(point, sample, *choice.light) : 0;
         uint32_t kinds = ~choice.light->hidden_from, unseen = 0;  // unseen: for which no scattered ray finds what this one does
         bool hidden_from_some = coincident_ > 0 && !path.coincident && end == 0;
         if (hidden_from_some) {
