@@ -1,7 +1,6 @@
 """Runs Python for another platform on this machine: `python .ci/emulated.py PLATFORM ARGUMENT…`
 
-- windows-4.2, windows-5.0: CPython for Windows under wine, with that Blender for Windows as its module. Tests know wine by the
-  environment variable VIEWCAM_WINE.
+- windows-4.2, windows-5.0: CPython for Windows under wine, with that Blender for Windows as its module.
 - linux-arm64: Debian's Python for arm64 under qemu, which starts no child processes.
 
 Made once in ~/.cache/virtual-pinhole/emulated: wine's drives, Pythons, and packages as pip unpacks them for that platform. What
@@ -22,6 +21,8 @@ import tomllib
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
+
+import lief
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / ".ci")]
@@ -58,18 +59,25 @@ def program(name: str) -> str:
 
 
 @contextlib.contextmanager
-def made_once(folder: Path) -> Iterator[Path | None]:
-    """A folder that is to be filled and is called `folder` when the block has ended well; None if that is there already."""
+def made_once(folder: Path, contents: str = "") -> Iterator[Path | None]:
+    """A folder that is to be filled and is called `folder` when the block has ended well; None if that is there already.
+
+    contents : the folder is made anew when it was made for others.
+    """
+    listed = folder / "contents.txt"
     CACHE.mkdir(parents=True, exist_ok=True)
     with open(CACHE / "lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if folder.exists():
+        if folder.exists() and (listed.read_text(encoding="utf-8") if listed.exists() else "") == contents:
             yield None
             return
         print(f"Making {folder}", file=sys.stderr, flush=True)
         part = Path(tempfile.mkdtemp(dir=CACHE))
         try:
             yield part
+            if contents:
+                (part / listed.name).write_text(contents, encoding="utf-8")
+            shutil.rmtree(folder, ignore_errors=True)
             os.replace(part, folder)
         finally:
             shutil.rmtree(part, ignore_errors=True)
@@ -77,7 +85,7 @@ def made_once(folder: Path) -> Iterator[Path | None]:
 
 def python_for_windows() -> Path:
     """The program of CPython for Windows."""
-    with made_once(CACHE / "python") as part:
+    with made_once(CACHE / "python", f"{CPYTHON} python3.dll") as part:
         if part:
             copy = ["dependency:copy", f"-Dartifact={CPYTHON}", f"-DoutputDirectory={part}"]
             subprocess.run([program("mvn"), "--quiet", "--batch-mode", *copy], check=True)
@@ -85,12 +93,27 @@ def python_for_windows() -> Path:
             with zipfile.ZipFile(jar) as archive:
                 archive.extractall(part)
             jar.unlink()
+            (library,) = part.glob("**/python311.dll")
+            _stable_abi(library)
     return next((CACHE / "python").glob("**/windows-x86_64/python.exe"))
+
+
+def _stable_abi(library: Path) -> None:
+    """Write python3.dll, which Maven's CPython lacks, beside python311.dll: all names of that, forwarded to it."""
+    python = lief.parse(library)
+    names = (entry.name for entry in python.get_export().entries if entry.name)
+    with tempfile.TemporaryDirectory() as folder:
+        empty, exports = Path(folder, "empty.c"), Path(folder, "python3.def")
+        empty.touch()
+        lines = (f"{name}={library.stem}.{name}\n" for name in names)
+        exports.write_text("LIBRARY python3\nEXPORTS\n" + "".join(lines), encoding="utf-8")
+        zig = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", "-shared", "-s"]
+        subprocess.run([*zig, empty, exports, "-o", library.with_name("python3.dll")], check=True)
 
 
 def packages(platform: str, name: str, *requirements: str) -> Path:
     """A folder of packages for a platform, unpacked by pip."""
-    with made_once(CACHE / name) as part:
+    with made_once(CACHE / name, " ".join(requirements)) as part:
         if part:
             pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-compile"]
             target = [*(f"--platform={tag}" for tag in PIP_PLATFORMS[platform]), "--python-version=3.11", "--implementation=cp"]
@@ -154,7 +177,6 @@ def windows(blender: str, bare: bool = False) -> tuple[list[str], dict[str, str]
         "WINEPREFIX": str(prefix()),
         "WINEDEBUG": "-all",
         "DISPLAY": "",
-        "VIEWCAM_WINE": "1",
         "PYTHONUSERBASE": of_windows(user),
     }
     return [program("wine"), of_windows(python_for_windows())], variables
