@@ -48,7 +48,16 @@ BLENDERS = {"4.2": ["bpy==4.2.23", "numpy==1.24.*"], "5.0": ["bpy==5.0.1", "nump
 WINDOWS_ALONE = ["colorama"]
 BUNDLED = ["OpenEXR==3.5.3", "Jinja2==3.1.6", "MarkupSafe==3.0.4", "tqdm==4.70.1"]
 TESTS = ["numpy==1.26.*", "pytest>=8.3", "pytest-timeout>=2.3", "hypothesis>=6.100", "mpmath>=1.3", "pyyaml>=6"]
-WINDOWS_TESTS = ["pytest-xdist>=3.5", "lief>=0.16", "distributed>=2025.1", "cryptography>=42"]
+# The cryptography is of before Rust 1.78, whose programs need bcryptprimitives.dll, which wine 8 lacks.
+WINDOWS_TESTS = ["pytest-xdist>=3.5", "lief>=0.16", "distributed>=2025.1", "cryptography==42.0.5"]
+# wine's clocks tick every 100 ns. Dask waits until it has the same time twice, and so for ever.
+WINDOWS_CLOCKS = """\
+import time
+
+precise_time, precise_monotonic = time.time, time.monotonic
+time.time = lambda: precise_time() * 64 // 1 / 64
+time.monotonic = lambda: precise_monotonic() * 64 // 1 / 64
+"""
 
 
 def program(name: str) -> str:
@@ -173,6 +182,7 @@ def windows(blender: str, bare: bool = False) -> tuple[list[str], dict[str, str]
     site_packages.mkdir(parents=True, exist_ok=True)
     lines = "".join(f"{of_windows(folder)}\n" for folder in folders)
     (site_packages / "folders.pth").write_text(lines, encoding="utf-8")
+    (site_packages / "usercustomize.py").write_text(WINDOWS_CLOCKS, encoding="utf-8")
     variables = {
         "WINEPREFIX": str(prefix()),
         "WINEDEBUG": "-all",

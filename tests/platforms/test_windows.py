@@ -84,7 +84,7 @@ def test_smoke_the_zip_s_wheels_are_installed_and_used_as_4_2_does(run_emulated,
     assert "MISSING" not in printed and "FOLDER" in printed, printed
     path = re.search("FOLDER (.*?)\r?\n", printed)[1] + ";" + of_windows(ROOT)
     result = tmp_path / "result.json"
-    words = ["check", CORNELL, "--level", "path", "--samples", "16", "--json", result]
+    words = ["check", CORNELL, "--level", "path", "--samples", "16", "--size", "96x96", "--json", result]
     printed = run_emulated("windows-4.2-bare", "-m", "viewcam_addon", *words, PYTHONPATH=path)
     assert json.loads(result.read_text(encoding="utf-8"))["exit_status"] == 0, printed
 
