@@ -16,7 +16,7 @@
 #   make artist-pictures  docs/images/artists anew, by a tour in that Blender's window
 #   make scenes        sample_scenes/*.blend anew, by Blender 4.2
 #   make charts        docs/charts anew: every method up to where it fails
-#   make bench         all benchmarks of speed, labels, scaling and poses, some with charts in docs/charts; fails where a target is missed
+#   make bench         all benchmarks of speed and labels, some with charts in docs/charts; fails where a target is missed
 #   make bench-guard   whether the tracer has become slower than it was, as a share of bare Embree's speed; a minute or two
 #   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
 
@@ -192,13 +192,13 @@ scenes: .venvs/4.2/ready
 	.venvs/4.2/bin/python sample_scenes/make.py
 
 charts: .venv/test
-	.venv/bin/viewcam chart stability --json docs/charts/stability.json
-	.venv/bin/viewcam chart light --json docs/charts/light.json
+	.venv/bin/python -m benchmarks stability --json docs/charts/stability.json
+	.venv/bin/python -m benchmarks light --json docs/charts/light.json
 
 bench: .venv/test
 	status=0; \
 	.venv/bin/python -m benchmarks.labels || status=1; \
-	for name in speed scaling poses; do .venv/bin/viewcam chart $$name --json docs/charts/$$name.json || status=1; done; \
+	.venv/bin/python -m benchmarks speed --json docs/charts/speed.json || status=1; \
 	exit $$status
 
 bench-guard: .venv/test

@@ -375,7 +375,7 @@ def run_all(
     for sweep in only or sweeps:
         for chart in sweeps[sweep](quick):
             name = f"{subject}-{chart.name}"
-            command = f"viewcam chart {subject} --only {sweep}{' --quick' if quick else ''}"
+            command = f"python -m benchmarks {subject} --only {sweep}{' --quick' if quick else ''}"
             draw(chart, folder / f"{name}.svg", command)
             print(f"{name}: {chart.reading}", *chart.lines(), sep="\n", flush=True)
             measured[name] = {"command": command, "machine": machine(), **chart.figures()}
@@ -399,7 +399,9 @@ def read(figures: Path) -> dict[str, Any]:
             Chart.of_figures(each), each["command"], each["machine"]
         return {"behind": [*told["behind"]], "charts": told["charts"]}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{figures} has no figures of charts: give what `viewcam chart SUBJECT --json` wrote") from error
+        raise InputError(
+            f"{figures} has no figures of charts: give what `python -m benchmarks SUBJECT --json` wrote"
+        ) from error
 
 
 def redraw(earlier: dict[str, Any], folder: Path) -> tuple[int, dict[str, Any]]:

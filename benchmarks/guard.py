@@ -34,8 +34,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from benchmarks import race
-from benchmarks.scaling import scenes
+from benchmarks import ground, race
 from viewcam_addon.files import written_whole
 from viewcam_addon.tracer.render import Tracer
 from viewcam_addon.tracer.scene import Scene
@@ -49,8 +48,7 @@ RECORDED = Path(__file__).with_suffix(".json")
 # A ratio that has fallen to less of what was recorded is a failure; the machine may be busy, so it is measured again.
 LEAST, ATTEMPTS, ROUNDS = 2 / 3, 3, 5
 _TRIANGLES, _TILE, _SIZE, _SAMPLES = 200_000, 65_536, (320, 180), 16
-_SUN = Sun("Sun", towards=(-0.8, -0.3, 0.52), irradiance=(3.0, 3.0, 3.0))
-_WIDE_SUN = replace(_SUN, angle=0.2)
+_WIDE_SUN = replace(ground.SUN, angle=0.2)
 # A wanted error, the samples that it may take, those of the picture that it is measured against, and those on both sides of it.
 _ERROR, _MOST, _CONVERGED, _FEW, _MANY = 0.01, 256, 128, 16, 64
 
@@ -106,7 +104,7 @@ def _measure(names: Sequence[str], sabotage: Callable[[], None] | None) -> Ratio
 
 
 def _geometry() -> float:
-    scene = scenes.one_mesh(_TRIANGLES, (1920, 1080))
+    scene = ground.scene(_TRIANGLES, (1920, 1080))
     yardstick = Yardstick(scene)
     directions = yardstick.eye_rays(0.5, 0.5)
     eyes = yardstick.eyes(directions)
@@ -114,13 +112,13 @@ def _geometry() -> float:
 
 
 def _light(level: str) -> float:
-    scene = scenes.one_mesh(_TRIANGLES, _SIZE, [_WIDE_SUN])
+    scene = ground.scene(_TRIANGLES, _SIZE, [_WIDE_SUN])
     tracer = Tracer(scene)
     return _share(Yardstick(scene).of_light(_SAMPLES), lambda: tracer.render_light(level, _SAMPLES, 0))
 
 
 def _adaptive() -> float:
-    scene = scenes.one_mesh(_TRIANGLES, _SIZE, [_SUN])
+    scene = ground.scene(_TRIANGLES, _SIZE, [ground.SUN])
     tracer = Tracer(scene)
 
     def light(samples: int, seed: int, error: float | None = None) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ import pytest
 
 from viewcam_addon import cameras, image
 from viewcam_addon.cli import main
-from viewcam_addon.commands import batch, chart, verification
+from viewcam_addon.commands import batch, verification
 from viewcam_addon.commands.verification import DEMO_SCENE
 from viewcam_addon.jobs.folder import Folder
 from viewcam_addon.pinhole import Pinhole
@@ -247,28 +247,6 @@ def viewcam(*words, **options):
     command = [sys.executable, "-m", "viewcam_addon", *map(str, words)]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)}
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, **options)
-
-
-@pytest.mark.exhaustive
-def test_a_chart_is_measured_and_drawn_where_it_is_wanted(tmp_path):
-    pytest.importorskip("bpy")
-    words = ["chart", "stability", "--only", "field_of_view", "--quick", "--output", tmp_path, "--json", tmp_path / "all.json"]
-    done = viewcam(*words)
-    assert (done.returncode, done.stderr) == (0, ""), done.stderr
-    assert "stability-field-of-view-wide: Read whether" in done.stdout
-    assert "viewcam chart stability" in (tmp_path / "stability-field-of-view-wide.svg").read_text(encoding="utf-8")
-    assert len(json.loads((tmp_path / "all.json").read_text())["charts"]) == 2
-
-
-def test_a_chart_that_there_is_not_is_refused_with_those_that_there_are(tmp_path):
-    pytest.importorskip("bpy")
-    done = viewcam("chart", "stability", "--only", "rolls", "--output", tmp_path)
-    assert done.returncode == 2 and "choose from roll" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
-
-
-def test_charts_need_a_clone_of_the_project(tmp_path, capfd, monkeypatch):
-    monkeypatch.setattr(chart, "PROJECT", tmp_path)
-    assert "in a clone of the project" in fails(capfd, "chart", "stability")
 
 
 def test_a_picture_that_can_not_grow_leaves_nothing_behind(tmp_path):

@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 
 from . import argument_types as types
 from . import events
-from .commands import Result, chart, verification
+from .commands import Result, verification
 from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
@@ -315,32 +315,6 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             type=types.path,
             default=Path("demo"),
             help="where the report goes (default: %(default)s)",
-        )
-
-    @command("chart", "Measure the methods and draw how they compare, in a clone of the project.")
-    def add_chart(added: argparse.ArgumentParser) -> None:
-        added.set_defaults(run=chart.run)
-        added.add_argument(
-            "subject",
-            choices=["stability", "light", "speed", "scaling", "poses", "judge"],
-            help="stability: every method up to where it fails; light: error against samples; speed: error against time; "
-            "scaling: time and memory against size; poses: time against error of the camera's axes; "
-            "judge: faults that are missed against false alarms",
-        )
-        added.add_argument(
-            "--output",
-            metavar="DIR",
-            type=types.path,
-            default=Path("docs", "charts"),
-            help="where the SVGs go (default: %(default)s)",
-        )
-        added.add_argument("--only", metavar="NAME", nargs="+", default=[], help="these sweeps and no others")
-        added.add_argument("--quick", action="store_true", help="few trials: seconds instead of minutes")
-        added.add_argument(
-            "--figures",
-            metavar="FILE",
-            type=types.path,
-            help="what an earlier run has measured, its JSON: is drawn anew, or with --only kept of all others",
         )
 
     def add_serve(hidden: argparse.ArgumentParser) -> None:

@@ -1,7 +1,7 @@
 """How good the judge is: of faults that a renderer could have, how many it finds, and how often it blames a good picture.
 
-`viewcam chart judge` injects the faults of faults.py, lets the rivals of rivals.py judge as well, and draws a chart for each
-family of faults.
+`python -m benchmarks judge` injects the faults of faults.py, lets the rivals of rivals.py judge as well, and draws a chart
+for each family of faults.
 """
 
 import functools

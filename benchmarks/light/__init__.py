@@ -1,6 +1,6 @@
 """How light converges: error against samples, for each method that the tracer uses or could have used.
 
-Every module is one sweep, as in benchmarks/stability. `viewcam chart light` measures and draws all of them.
+Every module is one sweep, as in benchmarks/stability. `python -m benchmarks light` measures and draws all of them.
 """
 
 import functools

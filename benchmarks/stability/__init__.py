@@ -1,8 +1,8 @@
 """How stable each method is that the project uses or could have used: a chart for each way to fail.
 
 Every module is one sweep towards a failure, with all candidates on it, and offers `charts(quick)`. The candidates that lost
-live here and nowhere else; the method in use is called from viewcam_addon. `viewcam chart stability` measures and draws all of
-them.
+live here and nowhere else; the method in use is called from viewcam_addon. `python -m benchmarks stability` measures and
+draws all of them.
 """
 
 import functools

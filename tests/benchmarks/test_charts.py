@@ -66,23 +66,23 @@ def test_a_curve_of_unequal_lengths_is_refused():
 
 def test_a_chart_is_drawn_with_its_caption_the_machine_and_the_command(tmp_path):
     ours, other = Curve("ours", X, (0.0, 1e-16, 2e-16), ours=True), Curve("no answer", X, (1e-3, math.nan, math.inf))
-    charts.draw(chart_of(ours, other), tmp_path / "chart.svg", "viewcam chart something")
+    charts.draw(chart_of(ours, other), tmp_path / "chart.svg", "python -m benchmarks something")
     text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
     assert ElementTree.fromstring(text).tag.endswith("svg")
-    for said in ("A title", "Read this.", "ours", "no answer", "viewcam chart something", f"numpy {np.__version__}"):
+    for said in ("A title", "Read this.", "ours", "no answer", "python -m benchmarks something", f"numpy {np.__version__}"):
         assert said in text, f"{said!r} is not in the chart"
 
 
 def test_the_same_measurement_draws_the_same_file(tmp_path):
     for name in ("one", "two"):
-        charts.draw(chart_of(Curve("ours", X, X, ours=True)), tmp_path / f"{name}.svg", "viewcam chart something")
+        charts.draw(chart_of(Curve("ours", X, X, ours=True)), tmp_path / f"{name}.svg", "python -m benchmarks something")
     assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
 
 
 def test_a_chart_in_a_place_that_is_none_is_an_error_in_one_sentence(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="can't be written"):
-        charts.draw(chart_of(Curve("ours", X, X, ours=True)), tmp_path / "file" / "chart.svg", "viewcam chart something")
+        charts.draw(chart_of(Curve("ours", X, X, ours=True)), tmp_path / "file" / "chart.svg", "python -m benchmarks something")
 
 
 def test_figures_are_plain_numbers_and_null_and_what_is_not_left_at_its_default():
@@ -127,7 +127,9 @@ def test_a_file_without_figures_of_charts_is_an_error_in_one_sentence(text, tmp_
 
 
 def test_a_chart_brings_its_paper_along_and_turns_dark_where_the_reader_prefers_that(tmp_path):
-    charts.draw(chart_of(Curve("ours", X, X, ours=True), levels=(0.05,)), tmp_path / "chart.svg", "viewcam chart something")
+    charts.draw(
+        chart_of(Curve("ours", X, X, ours=True), levels=(0.05,)), tmp_path / "chart.svg", "python -m benchmarks something"
+    )
     text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
     dark = text.partition("prefers-color-scheme: dark")[2].partition("</style>")[0]
     drawn = text.partition("</style>")[0].partition("<style")[0] + text.partition("</style>")[2]
@@ -156,7 +158,7 @@ def test_every_colour_of_a_chart_can_be_read_on_a_light_and_on_a_dark_page():
 def test_how_far_measurements_spread_is_drawn(tmp_path):
     spread = [(0.9, 1.2), (0.09, 0.12), (0.009, 0.012)]
     for name, curve in (("with", Curve("ours", X, X, ours=True, spread=spread)), ("without", Curve("ours", X, X, ours=True))):
-        charts.draw(chart_of(curve), tmp_path / f"{name}.svg", "viewcam chart something")
+        charts.draw(chart_of(curve), tmp_path / f"{name}.svg", "python -m benchmarks something")
     sizes = [(tmp_path / f"{name}.svg").read_text(encoding="utf-8").count("<path") for name in ("with", "without")]
     assert sizes[0] >= sizes[1] + len(spread)
 
@@ -168,7 +170,7 @@ def test_methods_of_a_point_or_two_stand_in_rows_the_best_on_top_with_their_erro
         Curve("ours", (0.2,), (1e-16,), ours=True, spread=((0.1, 0.3),)),
     )
     chart = dataclasses.replace(chart_of(*methods), rows=("at once", "one by one"))
-    charts.draw(chart, tmp_path / "chart.svg", "viewcam chart something")
+    charts.draw(chart, tmp_path / "chart.svg", "python -m benchmarks something")
     text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
     for said in ("theirs", "ours", "1e-16", "2e-07", "no answer", "● at once", "○ one by one", "A title"):
         assert said in text, f"{said!r} is not in the chart"
@@ -180,6 +182,6 @@ def test_what_is_in_the_background_is_drawn_thin_and_without_its_spread(tmp_path
     spread = [(0.9, 1.2), (0.09, 0.12), (0.009, 0.012)]
     sizes = []
     for minor in (False, True):
-        charts.draw(chart_of(Curve("other", X, X, spread=spread, minor=minor)), tmp_path / "chart.svg", "viewcam chart")
+        charts.draw(chart_of(Curve("other", X, X, spread=spread, minor=minor)), tmp_path / "chart.svg", "python -m benchmarks")
         sizes.append((tmp_path / "chart.svg").read_text(encoding="utf-8").count("<path"))
     assert sizes[0] >= sizes[1] + len(spread)

@@ -12,7 +12,7 @@ from benchmarks import charts
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
-@pytest.mark.parametrize("subject", ["stability", "light", "speed", "scaling", "poses", "judge"])
+@pytest.mark.parametrize("subject", ["stability", "light", "speed", "judge"])
 def test_the_page_shows_every_chart_and_the_figures_that_it_was_drawn_from(subject):
     figures = json.loads((DOCS / "charts" / f"{subject}.json").read_text(encoding="utf-8"))
     page = (DOCS / f"{subject}.md").read_text(encoding="utf-8")
@@ -22,7 +22,7 @@ def test_the_page_shows_every_chart_and_the_figures_that_it_was_drawn_from(subje
     assert subject == "speed" or all(sentence in page.replace("\n", " ") for sentence in figures["behind"])
 
 
-@pytest.mark.parametrize("subject", ["stability", "light", "speed", "scaling", "poses", "judge"])
+@pytest.mark.parametrize("subject", ["stability", "light", "speed", "judge"])
 def test_every_chart_follows_a_dark_page_and_is_of_its_figures(subject):
     figures = json.loads((DOCS / "charts" / f"{subject}.json").read_text(encoding="utf-8"))
     for name, each in figures["charts"].items():
@@ -30,4 +30,6 @@ def test_every_chart_follows_a_dark_page_and_is_of_its_figures(subject):
         chart = charts.Chart.of_figures(each)
         assert "prefers-color-scheme: dark" in drawn, f"{name} stays light on a dark page"
         for said in (chart.title, chart.reading, each["command"], each["machine"]):
-            assert said in drawn, f"{name} does not say {said!r}: viewcam chart {subject} --figures docs/charts/{subject}.json"
+            assert said in drawn, (
+                f"{name} does not say {said!r}: python -m benchmarks {subject} --figures docs/charts/{subject}.json"
+            )

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pytest
@@ -5,7 +6,7 @@ import pytest
 pytest.importorskip("bpy")
 
 from benchmarks import stability
-from viewcam_addon.errors import InputError
+from benchmarks.__main__ import main
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -15,16 +16,20 @@ def test_every_sweep_is_a_module_and_every_module_a_sweep():
     assert modules == set(stability.SWEEPS)
 
 
-def test_an_unknown_sweep_is_refused_with_those_that_there_are(tmp_path):
-    with pytest.raises(InputError, match="no sweep 'rolls': choose from roll, "):
-        stability.run(tmp_path, ["rolls"])
+def test_an_unknown_sweep_is_refused_with_those_that_there_are(tmp_path, capsys):
+    assert main(["stability", "--only", "rolls", "--output", str(tmp_path)]) == 2
+    assert capsys.readouterr().err.startswith("there is no sweep 'rolls': choose from roll, ")
 
 
-def test_a_run_draws_its_charts_and_returns_their_figures(tmp_path):
-    status, result = stability.run(tmp_path, ["field_of_view"], quick=True)
+def test_a_run_draws_its_charts_and_writes_their_figures(tmp_path, capsys):
+    words = ["stability", "--only", "field_of_view", "--quick", "--output", str(tmp_path), "--json", str(tmp_path / "all.json")]
+    assert main(words) == 0
+    figures = json.loads((tmp_path / "all.json").read_text(encoding="utf-8"))
     names = {"stability-field-of-view-wide", "stability-field-of-view-narrow"}
-    assert status == 0 and result["behind"] == []
-    assert set(result["charts"]) == names == {path.stem for path in tmp_path.glob("*.svg")}
+    assert figures["behind"] == []
+    assert set(figures["charts"]) == names == {path.stem for path in tmp_path.glob("*.svg")}
+    assert "stability-field-of-view-wide: Read whether" in capsys.readouterr().out
+    assert "python -m benchmarks stability" in (tmp_path / "stability-field-of-view-wide.svg").read_text(encoding="utf-8")
 
 
 def test_a_run_in_which_another_method_is_better_says_so_and_fails(tmp_path, monkeypatch, capsys):

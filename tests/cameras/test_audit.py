@@ -221,7 +221,6 @@ BY_DEPTH = [
         "late",
         "fov_axis",
         "focal_factor",
-        "y_down",
         "focal_of_another_size",
         "center_of_another_size",
         "aspect",
@@ -239,6 +238,14 @@ def filmed():
 def test_depth_maps_say_that_right_cameras_are_right(filmed):
     views, maps = filmed
     assert _audited(views, Depths(maps)).kind == "none"
+
+
+@pytest.mark.parametrize("kind", ["y_up", "y_down"])
+def test_depth_maps_do_not_show_how_the_whole_world_is_turned_and_the_audit_says_so(filmed, kind):
+    views, maps = filmed
+    verdict = _audited(MADE[kind](views, np.random.default_rng(5)), Depths(maps))
+    assert (verdict.kind, verdict.others) == ("none", ("y_up", "y_down"))
+    assert "do not show how the whole world is turned: y_up, y_down" in verdict.sentence
 
 
 @pytest.mark.parametrize("kind", BY_DEPTH)

@@ -119,6 +119,26 @@ def test_any_of_several_surfaces_in_one_place_is_right_and_the_objects_are_named
     assert found.to_json()["in_one_place"]["pixels"] == len(found.in_one_place.columns)
 
 
+def test_a_twin_whose_normals_are_a_little_off_is_told_from_the_one_that_is_seen():
+    """As after a subdivision of doubled faces: any pixel of it would pass by itself, and a tenth of the picture does not."""
+    floor = square(2.0)
+    scene = a_scene()
+    turn = 12 * np.median(
+        tolerances.position_shift(CAMERA, Tracer(scene, 1).surface_at(*np.mgrid[50:70, 30:50].reshape(2, -1)))
+    )
+    normals = [np.tile(np.array([np.sin(angle), 0, np.cos(angle)], np.float32), (2, 3, 1)) for angle in (0.0, turn)]
+    geometries = {name: replace(floor, corner_normals=each) for name, each in zip(("floor", "twin"), normals, strict=True)}
+    objects = tuple(Object(name, name.lower(), tilted(np.eye(4)), 1) for name in ("Floor", "Twin"))
+    tracer = Tracer(replace(scene, geometries=geometries, objects=objects), 1)
+    reference = Image(tracer.render())
+    found = compared(reference, rendered(tracer), tracer)
+    assert found.passed, "\n".join(found.lines())
+    assert {*found.in_one_place.pairs()} == {("Floor", "Twin")}
+    assert not len(compared(reference, reference, tracer).in_one_place.columns)
+    turned = replace(reference, passes={**reference.passes, "Normal": reference["Normal"] + np.float32([2 * turn, 0, 0])})
+    assert not compared(reference, turned, tracer).passed
+
+
 def test_leaves_of_a_pixel_are_seen(reference):
     """Else the other tests prove nothing of them."""
     shown = reference["Object Index"][..., 0] == 4

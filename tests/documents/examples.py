@@ -36,14 +36,12 @@ NOT_RUN = {
     "make test": "it runs this test",
     "make bench": _LONG,
     "make charts": _LONG,
-    "viewcam chart judge": _LONG,
-    "viewcam chart judge --quick": _LONG,
-    "viewcam chart poses": _LONG,
+    "python -m benchmarks judge": _LONG,
+    "python -m benchmarks judge --quick": _LONG,
     "viewcam compare traced.exr elsewhere.exr --scene scene.json --channels position=P.X,P.Y,P.Z distance=dist.Y "
     "object-index=id.X": "tests/test_cli.py names the channels of a file of its own",
-    "viewcam chart scaling --only triangles": _LONG,
-    "viewcam chart speed": _LONG,
-    "viewcam chart stability --only roll spheres": _LONG,
+    "python -m benchmarks speed": _LONG,
+    "python -m benchmarks stability --only roll spheres": _LONG,
     "pip install '/path/to/virtual-pinhole[cluster]'": "what it installs is there where this test runs",
     "dask scheduler --port 8786": "it does not end; tests/jobs/test_farm.py runs it",
     f"{_WITH} dask worker tcp://farm:8786 --nworkers 1 --nthreads 1": _FARM,
@@ -62,7 +60,7 @@ ONLY_WHEEL = "vp.check("  # which runs a Python that has bpy; Blender's own has 
 WRITTEN = {
     ("docs/farm.md", "yaml"): "tests/jobs/test_cluster.py has a farm that is configured so",
     ("docs/ci.md", "yaml"): "tests/test_pytest_plugin.py does what its steps do",
-    ("docs/datasets.md", "json"): "its program writes them, as tests/datasets/test_documentation.py compares",
+    ("docs/datasets.md", "json"): "its program writes them, as tests/datasets/test_projection.py compares",
 }
 """Blocks that show what another example writes, and who says so."""
 

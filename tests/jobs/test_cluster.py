@@ -222,8 +222,9 @@ def test_blender_computes_in_as_many_threads_as_without_dask(stand_in, machines,
 
 
 @pytest.mark.exhaustive
-def test_nothing_of_dask_stays_in_this_process(stand_in, processes):
-    """Modules to be found, variables, levels of logging, what Python's main program is; threads."""
+def test_nothing_of_dask_stays_in_this_process(stand_in, processes, monkeypatch):
+    """Modules to be found and their order, variables, levels of logging, what Python's main program is; threads."""
+    monkeypatch.syspath_prepend(str(ROOT))  # found already, before others
 
     def state():
         program = sys.modules["__main__"]

@@ -6,10 +6,9 @@ import tempfile
 from pathlib import Path
 
 import bpy
-import numpy as np
-from panel_in_a_window import NOWHERE, press, region, window
+from panel_in_a_window import press, region, window
 from tour_hands import SIDEBAR, VIEWPORT, call, push, unfold
-from tour_step import Step, camera, is_at_its_values, room, select, values
+from tour_step import Step, camera, is_at_its_values, room, values
 
 FILE = Path(tempfile.gettempdir(), f"shots_{os.getpid()}", "monkey.json")
 
@@ -103,6 +102,9 @@ class Export(Step):
     def after_the_picture(self):
         yield from in_the_file_browser(bpy.ops.file.cancel)
 
+    def tidy(self):
+        shutil.rmtree(FILE.parent)
+
 
 def in_the_file_browser(operator):
     area, part = region("FILE_BROWSER", "WINDOW")
@@ -110,38 +112,6 @@ def in_the_file_browser(operator):
         operator()
     for _ in range(8):
         yield
-
-
-class Import(Step):
-    """File › Import: the same scene once more, in a collection of its own."""
-
-    def prepare(self):
-        self.before = set(bpy.data.objects.keys())
-
-    def by_hand(self):
-        area, part = region(*VIEWPORT)
-        with bpy.context.temp_override(window=window(), area=area, region=part):
-            bpy.ops.viewcam.import_scene("EXEC_DEFAULT", True, filepath=str(FILE))
-        yield
-        yield
-        press("ESC", *NOWHERE)  # the list of what the file lacks, if there is one
-        yield
-        yield
-
-    def by_script(self):
-        bpy.ops.viewcam.import_scene(filepath=str(FILE))
-
-    def check(self):
-        new = [block for block in bpy.data.objects if block.name not in self.before]
-        found = [block for block in new if block.type == "CAMERA"]
-        assert len(found) == 1 and found[0].virtual_pinhole.enabled
-        np.testing.assert_allclose(found[0].virtual_pinhole.numbers()[0], values().numbers()[0])
-
-    def tidy(self):
-        for block in [block for block in bpy.data.objects if block.name not in self.before]:
-            bpy.data.objects.remove(block)
-        shutil.rmtree(FILE.parent)
-        select("Camera")
 
 
 class Preset(Step):
@@ -212,4 +182,4 @@ class Preferences(Step):
         self.mine.default_up = "Z"
 
 
-STEPS = [CompareWithCycles, Export, Import, Preset, Preferences]
+STEPS = [CompareWithCycles, Export, Preset, Preferences]

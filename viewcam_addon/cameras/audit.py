@@ -255,12 +255,13 @@ _UNITS |= {"0.3048 (feet)": 0.3048, "0.0254 (inches)": 0.0254, "1/0.3048 (feet)"
 @dataclass(frozen=True)
 class Mistake:
     """kind : a name for programs. sentence : what was done. undone : the cameras without it. of_depth : whether only depth maps
-    can show it."""
+    can show it. of_world : whether all cameras are turned together, which depth maps can't show: each sees what it saw."""
 
     kind: str
     sentence: str
     undone: Callable[[Views], Views]
     of_depth: bool = False
+    of_world: bool = False
 
 
 def _mistakes() -> list[Mistake]:
@@ -334,17 +335,23 @@ def _mistakes() -> list[Mistake]:
             "the quaternions are w, x, y, z where x, y, z, w is wanted",
             lambda v: _reordered(v, (1, 2, 3, 0)),
         ),
-        Mistake("y_up", "the cameras' world has y up and the scene's has z up", lambda v: _turned_world(v, _Y_TO_Z)),
-        Mistake("y_up", "the cameras' world has z up and the scene's has y up", lambda v: _turned_world(v, _Y_TO_Z.T)),
+        Mistake(
+            "y_up", "the cameras' world has y up and the scene's has z up", lambda v: _turned_world(v, _Y_TO_Z), of_world=True
+        ),
+        Mistake(
+            "y_up", "the cameras' world has z up and the scene's has y up", lambda v: _turned_world(v, _Y_TO_Z.T), of_world=True
+        ),
         Mistake(
             "y_down",
             "the cameras' world is turned upside down: it has y down where the scene has y up, or the reverse",
             lambda v: _turned_world(v, np.diag(_OPENCV)),
+            of_world=True,
         ),
         Mistake(
             "y_down",
             "the cameras' world has y down, as COLMAP's, and the scene's has z up",
             lambda v: _turned_world(v, _Y_TO_Z @ np.diag(_OPENCV)),
+            of_world=True,
         ),
         Mistake("late", "each picture has the camera of the one before it", lambda v: replace(v, shifted=1)),
         Mistake("late", "each picture has the camera of the one after it", lambda v: replace(v, shifted=-1)),
@@ -434,7 +441,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
             "unsure", f"{len(as_is)} observations are too few to tell: {_FEWEST} are needed", observations=len(as_is)
         )
     of_depth = isinstance(evidence, Depths)
-    tried = [mistake for mistake in MISTAKES if of_depth or not mistake.of_depth]
+    tried = [mistake for mistake in MISTAKES if not (mistake.of_world if of_depth else mistake.of_depth)]
     tried.append(_of_focal_factor(views, evidence))
     if not of_depth and np.abs(views.center - views.size / 2).max() <= 0.5:
         tried += _left_out(views, evidence)
@@ -460,6 +467,10 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
             possible = tuple(dict.fromkeys(kind for sure, kind in over if sure < _SURE))
             if possible:
                 sentence += f"; it is too little to exclude: {', '.join(possible)}"
+            if of_depth:
+                turns = tuple(dict.fromkeys(mistake.kind for mistake in MISTAKES if mistake.of_world))
+                sentence += f"; depth maps do not show how the whole world is turned: {', '.join(turns)}"
+                possible += turns
             return Verdict("none", sentence, possible, **shown | {"certainty": min(over)[0] if over else 0.0})
         return unknown
     if error > evidence.plausible:

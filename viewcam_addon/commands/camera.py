@@ -1,4 +1,4 @@
-"""`viewcam camera`: cameras of any program, listed or written for another.
+"""`viewcam camera`: cameras of any program, a .blend among them, listed or written for another.
 
 A file, a folder or, as "-", what stands on standard input; see cameras/.
 """
@@ -10,25 +10,32 @@ from pathlib import Path
 
 from .. import argument_types as types
 from .. import cameras
-from ..cameras import Camera, Options
+from ..cameras import Camera, Options, undistortion
 from ..cameras.sidecar import record
 from ..errors import InputError
+from ..jobs import makers
 from ..pinhole import ViewPlane
 from ..terminal import say, silent_libraries
-from . import Result
+from . import Result, blender_room
 
 _MOST_CHARACTERS = 100_000_000
 
 
 def add_options(added: argparse.ArgumentParser) -> None:
     """Add the command's options to its parser, which has those of every command already."""
-    added.add_argument("file", metavar="FILE", help="a file or folder with cameras; - for standard input")
+    added.add_argument("file", metavar="FILE", help="a file or folder with cameras, a .blend too; - for standard input")
     added.add_argument("--list", action="store_true", help="a line for each camera, and what is to be said of them")
     added.add_argument("--camera", metavar="NAME", help="only this one of them")
+    added.add_argument("--frames", metavar="A..B", help="of a .blend: its camera at each frame (from -5 on: --frames=-5..3)")
+    added.add_argument("--trust", action="store_true", help="of a .blend: let what is in it run and write")
     added.add_argument("--from", dest="format", choices=cameras.readable(), help="the format (default: by its content)")
     added.add_argument("--to", choices=cameras.writable(), help="write them in this format")
     added.add_argument("--out", metavar="FILE", type=types.path, help="where to; a folder for some formats (default: printed)")
     add_reading_options(added)
+    text = "write the pictures without their lens, and their cameras as pinholes, into this new folder"
+    added.add_argument("--undistort", metavar="OUT", type=types.path, help=f"{text} (--to transforms or colmap)")
+    text = "how much of it may be empty: 0 (default): nothing; 1: as much as shows all of each photograph"
+    added.add_argument("--blank", type=types.share, metavar="B", default=0.0, help=f"for --undistort: {text}")
     added.add_argument("--out-axes", choices=[*cameras.AXES], default="as_is", help="the axes of what is written")
     added.add_argument("--out-scale", type=types.above_zero, metavar="S", default=1.0, help="1 unit written is S units here")
 
@@ -37,7 +44,10 @@ def add_reading_options(added: argparse._ActionsContainer, size: bool = True) ->
     """Add the options that say how cameras are read. size : whether --size is one of them, and not there already."""
     if size:
         added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
-    added.add_argument("--axes", choices=[*cameras.AXES], default="as_is", help="y_up: y points up in the file and z here")
+    added.add_argument(
+        "--axes", choices=[*cameras.AXES], default="as_is", help="y_up, y_down: where y points in the file, and z up here"
+    )
+    added.add_argument("--up-from", choices=[*cameras.UPS], help="turn the world so that the mean of the cameras' up is z")
     added.add_argument("--scale", type=types.above_zero, metavar="S", default=1.0, help="1 unit of the file is S units here")
     added.add_argument("--distance", type=types.above_zero, metavar="D", help="view-plane distance in pixels, for poses alone")
     added.add_argument(
@@ -76,19 +86,19 @@ def options_of(options: argparse.Namespace) -> Options:
         without_distortion=options.without_distortion,
         unmirrored=options.unmirrored,
         original_world=options.original_world,
+        up_from=options.up_from,
     )
 
 
 def run(options: argparse.Namespace) -> Result:
     if options.list and options.to:
         raise InputError("--list and --to say each what to do with the cameras: give one of them")
+    if options.undistort:
+        return _undistort(options)
     if options.out and not options.to:
         raise InputError("--out says where to, but not in which format: give --to")
-    given = sys.stdin.read(_MOST_CHARACTERS) if options.file == "-" else Path(options.file)
-    with silent_libraries():  # USD tells of all that a stage lacks
-        found = cameras.read(given, format=options.format, options=options_of(options))
-    if options.camera is not None:
-        found = [cameras.choose(found, options.camera)]
+    with silent_libraries():  # Blender tells what it opens, USD all that a stage lacks
+        found = _found(options)
     notes = list(dict.fromkeys(note for camera in found for note in camera.notes))
     for note in notes:
         options.events.tell("note", command=options.command, text=note)
@@ -107,6 +117,40 @@ def run(options: argparse.Namespace) -> Result:
     count = "1 camera" if len(found) == 1 else f"{len(found)} cameras"
     say(f"{count}, as {cameras.FORMATS[options.to].TITLE}: {options.out}")
     return 0, result | {"written": [str(path) for path in written]}
+
+
+def _found(options: argparse.Namespace) -> list[Camera]:
+    if options.file.lower().endswith(".blend"):
+        room = blender_room("dataset_cameras")
+        if options.frames is not None:
+            shots = [(job.name, job.frame) for job in makers.frames(options.frames)]
+            return room.of_file(Path(options.file), shots, options.camera, options.trust)
+        found = room.of_file(Path(options.file), trust=options.trust)
+    elif options.frames is not None:
+        raise InputError(f"--frames are those of a .blend, and {options.file} is none: leave them out")
+    else:
+        given = sys.stdin.read(_MOST_CHARACTERS) if options.file == "-" else Path(options.file)
+        found = cameras.read(given, format=options.format, options=options_of(options))
+    return found if options.camera is None else [cameras.choose(found, options.camera)]
+
+
+def _undistort(options: argparse.Namespace) -> Result:
+    dataset = Path(options.file)
+    if options.file == "-" or options.list or options.out or options.camera is not None:
+        raise InputError("--undistort writes all of a data set into its folder: give the data set, and leave the others out")
+    if options.axes != "as_is" or options.scale != 1 or options.original_world or options.up_from:
+        raise InputError("--undistort leaves the world as it is, for its points' sake: turn and scale what it has written")
+    found = cameras.read(dataset, format=options.format, options=options_of(options))
+    form = options.to or ("transforms" if cameras.recognised(dataset) == "transforms" else "colmap")
+    if form not in undistortion.FORMS:
+        raise InputError(f"--undistort writes {' or '.join(undistortion.FORMS)}: give --to one of these")
+    for note in dict.fromkeys(note for camera in found for note in camera.notes):
+        options.events.tell("note", command=options.command, text=note)
+    written = undistortion.save(found, dataset, options.undistort, form, options.blank)
+    sizes = ", ".join(dict.fromkeys(f"{each.pinhole.width} × {each.pinhole.height}" for each in written))
+    bent = sum(camera.lens is not None for camera in found)
+    say(f"{len(written)} pictures, {bent} of them undistorted ({sizes}): {options.undistort}")
+    return 0, {"cameras": [{"name": each.name, **_said(each)} for each in written]}
 
 
 def _said(camera: Camera) -> dict:

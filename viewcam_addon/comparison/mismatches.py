@@ -137,6 +137,15 @@ class SurfaceAgreement:
                 same &= _within(*figures)
         return same | ~(tolerances.is_hit(expected) | tolerances.is_hit(seen))
 
+    def roundings(self, expected: Seen, seen: Seen) -> Array:
+        """(n,) how many roundings set normal and UV apart, the larger of the two. Meaningless as of `errors`."""
+        errors = self.errors(expected, seen)
+        apart = [
+            (error - floor) / np.maximum(one_rounding, np.finfo(float).tiny)
+            for error, one_rounding, floor in (errors[name] for name in self.slopes if name in errors)
+        ]
+        return np.max(apart, axis=0, initial=0.0) if apart else np.zeros(len(self.across))
+
     def same_place(self, expected: Seen, seen: Seen) -> NDArray[np.bool_]:
         """(n,) bool: a hit on both sides, with equal indices and the same depth within tolerance."""
         same = tolerances.is_hit(expected) & tolerances.is_hit(seen)
@@ -257,7 +266,7 @@ def settle(
     kinds: NDArray, expected: Seen, seen: Seen, agreement: SurfaceAgreement, borders: NDArray[np.bool_], surfaces_at: SurfacesAt
 ) -> tuple[NDArray, Seen, SurfaceAgreement, InOnePlace]:
     """Settle pixels that differ by what the scene tells at their centers: how steep the surface itself is, and what else is in
-    its place.
+    its place. So it is asked, too, where normal or UV is off by more than half of all pixels may be.
 
     kinds : of all pixels, as `kinds_of` has them. borders : those where the picture does not tell all of their slopes.
 
@@ -265,7 +274,8 @@ def settle(
     agreement with their slopes; and which pixels these are.
     """
     width, differs = agreement.pinhole.width, (kinds >= 0) & (kinds != KINDS.index("not a number"))
-    asked = np.flatnonzero((borders | differs) & tolerances.is_hit(expected))
+    doubtful = agreement.roundings(expected, seen) > tolerances.ROUNDINGS[0]
+    asked = np.flatnonzero((borders | differs | doubtful) & tolerances.is_hit(expected))
     kinds, expected = kinds.copy(), {name: values.copy() for name, values in expected.items()}
     agreement = replace(agreement, slopes={name: slope.copy() for name, slope in agreement.slopes.items()})
     pixels, objects = [NOWHERE.columns], [NOWHERE.objects]
@@ -274,9 +284,12 @@ def settle(
         rays, names, traced = surfaces_at(batch % width, batch // width, *np.full((2, len(batch)), 0.5))
         nearest, pixel = np.searchsorted(rays, np.arange(len(batch))), batch[rays]
         here = agreement.at(pixel)
-        agrees = here.same_surface(traced, at(seen, pixel)) & in_one_place(agreement, rays, traced) & differs[pixel]
+        shown = at(seen, pixel)
+        agrees = here.same_surface(traced, shown) & in_one_place(agreement, rays, traced) & (differs | doubtful)[pixel]
         right = np.flatnonzero(agrees)
-        right = right[np.unique(rays[right], return_index=True)[1]]  # the nearest one that agrees
+        steps = np.ceil(here.roundings(traced, shown)[right] / tolerances.ROUNDINGS[0])  # as good as half of all pixels: one
+        right = right[np.lexsort((right, steps, rays[right]))]
+        right = right[np.unique(rays[right], return_index=True)[1]]  # the nearest of those that agree best
         kinds[pixel[right]] = -1
         other = right[right != nearest[rays[right]]]
         for name, values in expected.items():
@@ -289,8 +302,8 @@ def settle(
         objects.append(np.stack([names[nearest[rays[other]]], names[other]], axis=1))
         if (kinds[batch] >= 0).sum() > len(batch) / 2:
             break  # as in `explain`
-    shown = np.concatenate(pixels)
-    return kinds, expected, agreement, InOnePlace(shown % width, shown // width, np.concatenate(objects))
+    others = np.concatenate(pixels)
+    return kinds, expected, agreement, InOnePlace(others % width, others // width, np.concatenate(objects))
 
 
 def in_one_place(agreement: SurfaceAgreement, rays: NDArray, traced: Seen) -> NDArray[np.bool_]:

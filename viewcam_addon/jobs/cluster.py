@@ -362,11 +362,14 @@ def _processes_of_this_package() -> Iterator[None]:
     parent, program = str(Path(__file__).parents[2]), vars(sys.modules["__main__"])
     kept = {name: program.pop(name) for name in ("__file__", "__spec__") if name in program}
     program["__spec__"] = None
-    sys.path.append(parent)
+    absent = parent not in sys.path
+    if absent:
+        sys.path.append(parent)
     try:
         yield
     finally:
-        sys.path.remove(parent)
+        if absent:
+            sys.path.remove(parent)
         program.update(kept)
 
 

@@ -1,9 +1,3 @@
-import dataclasses
-import json
-import os
-import re
-from pathlib import Path
-
 import pytest
 
 bpy = pytest.importorskip("bpy")
@@ -11,7 +5,6 @@ bpy = pytest.importorskip("bpy")
 import viewcam_addon
 from viewcam_addon.blender.interface import file_menu
 from viewcam_addon.blender.jobs import renderer as jobs
-from viewcam_addon.blender.scenes import import_geometry, import_scene
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.scene import LedgerEntry, scene_file
 
@@ -95,169 +88,6 @@ def test_errors_are_one_sentence_and_leave_no_file(some_scene, camera, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["folder.json"]
 
 
-def blocks():
-    """How many datablocks of each kind the open file has."""
-    kinds = [prop.identifier for prop in bpy.data.bl_rna.properties if prop.type == "COLLECTION"]
-    return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
-
-
-def settings_of(scene):
-    """What an import could change of a scene."""
-    render, cycles = scene.render, scene.cycles
-    size = render.resolution_x, render.resolution_y, render.resolution_percentage, render.use_border
-    film = render.film_transparent, cycles.filter_width, cycles.film_exposure, cycles.max_bounces
-    return scene.camera, scene.world, size, (render.pixel_aspect_x, render.pixel_aspect_y), film
-
-
-def import_(path, **options):
-    return bpy.ops.viewcam.import_scene(filepath=str(path), **options)
-
-
-HAND = """{"format": "virtual-pinhole-scene", "version": 1,
- "camera": {"eye": [0, -6, 2.5], "look_at": [0, 0, 1], "up": [0, 0, 1], "distance": 400, "width": 320, "height": 180},
- "geometries": {
-  "floor": {"type": "plane", "corner": [-4, -4, 0], "edges": [[8, 0, 0], [0, 8, 0]]},
-  "beads": {"type": "spheres", "centers": [[-1, 0, 0.5], [1, 0, 0.5]], "radii": [0.5, 0.25], "materials": [0, 1]},
-  "bent": {"type": "mesh", "vertices": [[0, 0, 1], [1, 0, 1], [0, 1, 1]], "triangles": [[0, 1, 2], [0, 1, 1]]}
- },
- "objects": [
-  {"name": "floor", "geometry": "floor", "object_index": 1, "materials": ["wall"]},
-  {"name": "beads", "geometry": "beads", "material_indices": [3, 4], "scale": [1, 1, 1.5]},
-  {"name": "bent", "geometry": "bent", "rotation": [0, 0, 30]}
- ],
- "materials": {"wall": {"diffuse": [0.5, 0.5, 0.5]}},
- "lamps": [{"type": "spot", "name": "lamp", "location": [0, 0, 4], "angle": 0.001}],
- "world": {"radiance": [0.25, 0.5, 1]}
-}"""
-
-
-@pytest.fixture
-def hand_written(fresh_blender, tmp_path):
-    """The path of a small scene file; a default file is open, whose scene has a camera of its own."""
-    bpy.ops.wm.read_homefile(use_factory_startup=True)
-    path = tmp_path / "Hand.json"
-    path.write_text(HAND)
-    return path
-
-
-def test_the_import_is_a_collection_of_its_own(hand_written, capfd):
-    before = settings_of(bpy.context.scene)
-    assert import_(hand_written) == {"FINISHED"}
-    collection = bpy.data.collections["Hand"]
-    assert sorted(block.name for block in collection.objects) == ["Hand", "beads", "beads.001", "bent", "floor", "lamp"]
-    assert {block.data.materials[0].pass_index for block in collection.objects if block.type == "POINTCLOUD"} == {3, 4}
-    assert settings_of(bpy.context.scene) == before, "the import changed the artist's settings"
-    assert len(collection.objects["bent"].data.polygons) == 1, "a triangle without area is no face"
-    values = collection.objects["Hand"].virtual_pinhole
-    assert values.enabled and values.numbers()[:3] == ((0, -6, 2.5), (0, 0, 1), (0, 0, 1))
-    assert set(bpy.context.selected_objects) == set(collection.objects) and bpy.context.object == collection.objects["Hand"]
-    said = capfd.readouterr().out
-    assert "Warning: Hand.json: 3 of 6 objects imported whole, 3 approximated" in said
-
-
-def test_what_could_not_come_along_is_told(hand_written):
-    imported = import_scene.import_scene(scene_file.read(hand_written), "Hand", bpy.context.scene)
-    reasons = {entry.object: entry.reason for entry in imported.ledger if entry.status != "exported"}
-    assert reasons == {
-        "Hand": "its picture is 320 × 180 pixels and the scene's 1920 × 1080: it is as wide a view",
-        "lamp": "its spot size is 0.001, and Blender makes it 0.0174533",
-        "Scene": "the scene keeps its own world, film and bounces",
-    }
-    assert imported.camera.virtual_pinhole.numbers()[3] == 2400
-
-
-def test_camera_resolution_world_and_film_come_along_if_wanted(hand_written):
-    import_(hand_written, set_picture=True, set_surroundings=True)
-    scene = bpy.context.scene
-    assert scene.camera == bpy.data.objects["Hand"] and scene.world == bpy.data.worlds["Hand"]
-    assert (scene.render.resolution_x, scene.render.resolution_y) == (320, 180)
-    assert scene.camera.virtual_pinhole.numbers()[3] == 400
-
-
-def test_a_scene_without_a_camera_takes_the_files(hand_written):
-    bpy.data.objects.remove(bpy.context.scene.camera)
-    import_(hand_written)
-    assert bpy.context.scene.camera == bpy.data.objects["Hand"] and bpy.context.scene.render.resolution_x == 1920
-
-
-def test_geometry_alone_leaves_the_world(hand_written):
-    text = json.loads(HAND)
-    for key in ("lamps", "world", "materials"):
-        del text[key]
-    del text["objects"][0]["materials"]
-    hand_written.write_text(json.dumps(text))
-    world = bpy.context.scene.world
-    import_(hand_written, set_picture=True, set_surroundings=True)
-    assert bpy.context.scene.world == world
-
-
-def test_coordinates_that_count_from_elsewhere_are_told(hand_written):
-    scene = dataclasses.replace(scene_file.read(hand_written), origin=(500000.25, 4e6, 0.0))
-    imported = import_scene.import_scene(scene, "Hand", bpy.context.scene)
-    assert "its coordinates count from the point 500000.25, 4000000, 0" in imported.ledger[0].reason
-
-
-@pytest.mark.parametrize(
-    ("wrong", "right", "sentence"),
-    [
-        ('"version": 1', '"version": 2', "Hand.json: 'version' of the scene is 2"),
-        ('"distance": 400', '"distance": 1e300', "needs 1e+300, beyond Blender's numbers"),
-        ('"width": 320', '"width": 3', "the camera's picture is 3 × 180 pixels"),
-        ('"radii": [0.5, 0.25]', '"radii": [0.5, -1]', "radii not negative"),
-        ('"name": "lamp"', r'"name": "\ud800"', "this is no JSON text"),
-    ],
-)
-def test_a_bad_file_is_one_sentence_and_changes_nothing(hand_written, wrong, right, sentence):
-    hand_written.write_text(HAND.replace(wrong, right))
-    before = blocks(), settings_of(bpy.context.scene)
-    with pytest.raises(RuntimeError, match=re.escape(sentence.removeprefix("the "))) as error:
-        import_(hand_written, set_picture=True, set_surroundings=True)
-    assert "Traceback" not in str(error.value)
-    assert (blocks(), settings_of(bpy.context.scene)) == before
-
-
-@pytest.mark.parametrize("step", ["points_from", "mesh_from", "_set_normals"])
-def test_whatever_fails_half_way_leaves_nothing_behind(hand_written, step, monkeypatch):
-    def fail(*_arguments):
-        raise MemoryError
-
-    text = json.loads(HAND)
-    text["geometries"]["bent"]["corner_normals"] = [[[0, 0, 1]] * 3] * 2
-    hand_written.write_text(json.dumps(text))
-    before = blocks(), settings_of(bpy.context.scene)
-    monkeypatch.setattr(import_geometry, step, fail)
-    with pytest.raises(MemoryError):
-        import_scene.import_scene(scene_file.read(hand_written), "Hand", bpy.context.scene, True, True)
-    assert (blocks(), settings_of(bpy.context.scene)) == before
-
-
-@pytest.mark.parametrize("name", ["", "x" * 300, "a\nb", "😀", "Hand"])
-def test_things_may_have_any_name(hand_written, name):
-    hand_written.write_text(
-        HAND.replace('"name": "lamp"', f'"name": {json.dumps(name)}').replace('"wall"', json.dumps(name or "-"))
-    )
-    assert import_(hand_written) == {"FINISHED"}
-
-
-def test_a_file_may_have_any_name(hand_written):
-    odd = Path(os.fsdecode(os.fsencode(str(hand_written.parent)) + b"/\xff.json"))
-    hand_written.rename(odd)
-    scene = scene_file.read(odd)
-    assert scene.objects[0].name == "floor"
-    assert import_(odd) == {"FINISHED"}
-    assert "?" in bpy.data.collections
-    odd.write_text("{")
-    with pytest.raises(RuntimeError, match=r"\\udcff\.json: line 1 is not JSON"):
-        import_(odd)
-
-
-def test_it_imports_in_edit_mode(hand_written):
-    bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
-    bpy.ops.object.mode_set(mode="EDIT")
-    assert import_(hand_written) == {"FINISHED"}
-    assert bpy.context.mode == "EDIT_MESH" and "Hand" in bpy.data.objects
-
-
 def test_without_a_camera_it_is_off(fresh_blender):
     assert not bpy.ops.viewcam.export_scene.poll()
 
@@ -280,7 +110,7 @@ def test_the_popup_tells_the_first_dozen_and_how_many_more():
     ],
 )
 def test_the_report_counts_the_ledger(statuses, line):
-    assert file_menu.summary([LedgerEntry("", status) for status in statuses], "exported") == line
+    assert file_menu.summary([LedgerEntry("", status) for status in statuses]) == line
 
 
 @pytest.mark.parametrize(("menu", "entry"), [("export", "_draw_export"), ("import", "_draw_import")])

@@ -1,15 +1,35 @@
 import itertools
+import json
 import math
 import re
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 bpy = pytest.importorskip("bpy")
 
+import viewcam_addon
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import datablocks
-from viewcam_addon.blender.interface import clipboard, moving, panel
+from viewcam_addon.blender.interface import (
+    baking,
+    clipboard,
+    comparing,
+    labels,
+    moving,
+    operators,
+    panel,
+    photo_matching,
+    readouts,
+    render_panels,
+    scene_cameras,
+    view_menu,
+)
+from viewcam_addon.image import SETTINGS
+from viewcam_addon.labels import KINDS
+from viewcam_addon.labels import files as label_files
 
 
 def contents(camera_object, scene):
@@ -122,13 +142,14 @@ class Layout:
         self.drawn, self.above = [] if drawn is None else drawn, above
         self.active = self.enabled = True
         self.alert = self.is_row = False
+        self.factor = None
         self.use_property_split = above is not None and above.use_property_split
         self.use_property_decorate = above is not None and above.use_property_decorate
         self.alignment = "EXPAND"
 
-    def row(self, **_look):
+    def row(self, factor=None, **_look):
         below = Layout(self.drawn, self)
-        below.is_row = True
+        below.is_row, below.factor = True, factor
         return below
 
     def column(self, **_look):
@@ -213,14 +234,40 @@ def test_the_sub_panel_has_every_move_for_the_camera_that_is_shown(posed_camera)
 
 
 def test_every_value_has_its_row_and_the_roll_is_the_one_that_counts(posed_camera):
-    always = ["name", "eye", "eye_target", "look_at", "look_at_target", "up", "focal_length", "lens_unit", "zoom", "keeps"]
-    assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll", "pole"]
+    always = ["name", "eye_target", "eye", "look_at_target", "look_at", "up", "focal_length", "lens_unit"]
+    assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll"]
     for unit, name in (("DIAGONAL", "diagonal_fov"), ("PIXELS", "distance")):
         posed_camera.virtual_pinhole.lens_unit = unit
         always[always.index("lens_unit") - 1] = name
-        assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll", "pole"]
+        assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll"]
+    assert list(properties_drawn(panel.VIEWCAM_PT_data_options)) == ["zoom", "keeps", "pole"]
     posed_camera.virtual_pinhole.pole = "HOLD"
-    assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "held_roll", "hold_within", "pole"]
+    assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "held_roll"]
+    assert list(properties_drawn(panel.VIEWCAM_PT_data_options)) == ["zoom", "keeps", "pole", "hold_within"]
+
+
+def test_before_the_first_sub_panel_there_are_twelve_rows_below_the_camera_s_name(posed_camera):
+    """A vector is three rows; what stands in one row with another, or beside a point, is none of its own."""
+    fields = properties_drawn(panel.VIEWCAM_PT_sidebar)
+    tall = [
+        name for name in fields if getattr(type(posed_camera.virtual_pinhole).bl_rna.properties.get(name), "is_array", False)
+    ]
+    beside = [name for name in fields if name.endswith("_target") or name in ("lens_unit", "name")]
+    rows = 3 * len(tall) + len(fields) - len(tall) - len(beside)
+    buttons = [
+        layout for kind, name, _, layout, _ in drawn(panel.VIEWCAM_PT_sidebar) if kind == "operator" and "camera" in name
+    ]
+    rows += len({id(layout) for layout in buttons}) - 1  # without those beside the name
+    assert rows == 12
+
+
+def test_the_values_of_all_rows_begin_at_one_edge(posed_camera):
+    fields = properties_drawn(panel.VIEWCAM_PT_sidebar)
+    for name in ("eye", "look_at", "up", "focal_length", "roll"):
+        above = fields[name]
+        while above.factor is None:
+            above = above.above
+        assert above.factor == 0.4, name
 
 
 SHOWN = {
@@ -237,8 +284,9 @@ def test_nothing_but_a_dot_takes_room_from_the_lens(posed_camera):
     for unit in [item.identifier for item in fields()["lens_unit"].enum_items]:
         posed_camera.virtual_pinhole.lens_unit = unit
         found = drawn(panel.VIEWCAM_PT_sidebar, 292)
-        beside = [(kind, name) for kind, name, _, layout, _ in found if layout.is_row and kind in ("label", "decorator")]
-        assert ("label", "") not in beside and [name for kind, name in beside if kind == "decorator"] == [SHOWN[unit]]
+        name = SHOWN[posed_camera.virtual_pinhole.lens_unit]
+        (row,) = (layout for kind, other, _, layout, _ in found if (kind, other) == ("prop", name))
+        assert [each[:2] for each in found if each[3] is row] == [("prop", name), ("decorator", name)]
 
 
 BLENDERS = {
@@ -275,7 +323,8 @@ def test_no_label_of_the_panel_reads_as_the_subjects_distance(posed_camera):
     said = []
     for unit in [item.identifier for item in fields()["lens_unit"].enum_items]:
         posed_camera.virtual_pinhole.lens_unit = unit
-        for kind, name, look, *_ in [*drawn(panel.VIEWCAM_PT_sidebar), *drawn(panel.VIEWCAM_PT_sidebar_move)]:
+        panels = (panel.VIEWCAM_PT_sidebar, panel.VIEWCAM_PT_sidebar_options, panel.VIEWCAM_PT_sidebar_move)
+        for kind, name, look, *_ in [row for each in panels for row in drawn(each)]:
             said.append(look.get("text") or name)
             if kind == "prop" and name in fields():
                 said += [fields()[name].name, *(item.name for item in getattr(fields()[name], "enum_items", ()))]
@@ -309,8 +358,8 @@ def test_in_the_narrowest_sidebar_no_name_stands_beside_its_field(posed_camera, 
     posed_camera.virtual_pinhole.look_at_target = block
     wide, narrow = (drawn(panel.VIEWCAM_PT_sidebar, width) for width in (300, NARROWEST))
     fields = [[each[1] for each in found if each[0].startswith("prop")] for found in (wide, narrow)]
-    assert fields[0] == fields[1], "a field is missing"
-    assert any(each[3].use_property_split for each in wide)
+    assert sorted(fields[0]) == sorted(fields[1]), "a field is missing"
+    assert ("label", "Roll") in [each[:2] for each in wide]
     lacking = {"ENUM", "POINTER", "STRING"}  # what has no room for its name inside
     for before, (kind, name, look, layout, _) in itertools.pairwise(narrow):
         if not kind.startswith("prop") or name == "name":
@@ -332,11 +381,12 @@ def keyed_by_a_dot(each, width):
 def test_what_can_be_keyed_has_its_dot_however_narrow_the_panel_is(posed_camera, each):
     for posed_camera.virtual_pinhole.pole in ("CANONICAL", "HOLD"):
         for posed_camera.virtual_pinhole.lens_unit in ("MILLIMETERS", "PIXELS"):
-            shown = {name for kind, name, *_ in drawn(each) if kind == "prop" and name != "name"}
-            keyed = {name for name in shown if fields()[name].is_animatable}
-            assert {"eye", "look_at", "up", "zoom"} <= keyed
-            for width in (300, 249, NARROWEST):
-                assert keyed <= keyed_by_a_dot(each, width), f"at {width} pixels"
+            for part, least in ((each, {"eye", "look_at", "up"}), (panel.VIEWCAM_PT_sidebar_options, {"zoom"})):
+                shown = {name for kind, name, *_ in drawn(part) if kind == "prop" and name != "name"}
+                keyed = {name for name in shown if fields()[name].is_animatable}
+                assert least <= keyed
+                for width in (300, 249, NARROWEST):
+                    assert keyed <= keyed_by_a_dot(part, width), f"at {width} pixels"
 
 
 @pytest.mark.parametrize("each", [panel.VIEWCAM_PT_sidebar_move, panel.VIEWCAM_PT_sidebar_readouts])
@@ -362,7 +412,8 @@ def test_a_camera_that_is_not_enabled_shows_its_own_values_greyed_and_one_button
 def test_what_a_constraint_or_a_driver_places_is_read_only_with_a_word_why(posed_camera, empty):
     def locked():
         bpy.context.view_layer.update()
-        return [name for name, layout in properties_drawn(panel.VIEWCAM_PT_data).items() if not layout.is_all("enabled")]
+        found = properties_drawn(panel.VIEWCAM_PT_data) | properties_drawn(panel.VIEWCAM_PT_data_options)
+        return [name for name, layout in found.items() if not layout.is_all("enabled")]
 
     def words():
         found = drawn(panel.VIEWCAM_PT_data)
@@ -373,7 +424,7 @@ def test_what_a_constraint_or_a_driver_places_is_read_only_with_a_word_why(posed
     constraint.target = empty("Target", (5, 5, 5))
     assert locked() == ["look_at", "up", "roll"] and words() == ["Constraint"]
     posed_camera.data.driver_add("lens").driver.expression = "20.0 + 1.0"
-    assert locked() == ["look_at", "up", "focal_length", "lens_unit", "zoom", "roll"] and words() == ["Constraint", "Driver"]
+    assert locked() == ["look_at", "up", "focal_length", "lens_unit", "roll", "zoom"] and words() == ["Constraint", "Driver"]
     posed_camera.constraints.clear()
     posed_camera.parent = parent = empty("Dolly")
     assert locked() == ["focal_length", "lens_unit", "zoom"], "a parent that stands still lets its camera be set"
@@ -390,7 +441,7 @@ def test_what_is_linked_can_not_be_set_by_buttons(posed_camera, tmp_path):
     bpy.context.scene.collection.objects.link(bpy.data.objects["Camera"])
     bpy.context.scene.camera = bpy.data.objects["Camera"]
     dead = {"viewcam.apply_camera", "viewcam.adopt_camera", "viewcam.bake_camera"}
-    for kind, name, _, layout, _ in drawn(panel.VIEWCAM_PT_data):
+    for kind, name, _, layout, _ in drawn(panel.VIEWCAM_PT_data_options):
         if kind == "operator" and name in dead:
             dead.remove(name)
             assert not layout.is_all("enabled"), name
@@ -432,11 +483,10 @@ def test_a_target_s_vertex_group_or_bone_is_chosen_below_it(posed_camera, scene,
     assert searched == ([(field, {"look_at_group": "vertex_groups", "look_at_bone": "bones"}[field])] if field else [])
 
 
-def test_apply_again_is_not_marked_where_it_mends_nothing(posed_camera, scene):
+def test_apply_again_is_not_offered_where_it_mends_nothing(posed_camera, scene):
     def is_marked():
         bpy.context.view_layer.update()
-        (layout,) = (each[3] for each in drawn(panel.VIEWCAM_PT_data) if each[1] == "viewcam.apply_camera")
-        return layout.alert
+        return "viewcam.apply_camera" in [name for _, name, *_ in drawn(panel.VIEWCAM_PT_data)]
 
     assert not is_marked()
     for block, name, value in (
@@ -458,7 +508,8 @@ def test_a_notice_is_drawn_in_lines_that_fit_and_with_its_remedy_below(posed_cam
     lines = [(name, look["icon"]) for kind, name, look, *_ in found if kind == "label" and "icon" in look]
     assert " ".join(line for line, _ in lines).startswith("The view is parallel to up")
     assert [icon for _, icon in lines] == ["ERROR"] + ["BLANK1"] * (len(lines) - 1) and len(lines) > 2
-    assert found[-1][:2] == ("operator", "viewcam.choose_up") and found[-1][4].camera == "Camera"
+    (remedy,) = (each for each in found if each[:2] == ("operator", "viewcam.choose_up"))
+    assert remedy[4].camera == "Camera" and found.index(remedy) < [each[1] for each in found].index("eye"), "it is at the top"
 
 
 def test_each_read_out_has_a_button_that_copies_it(posed_camera):
@@ -512,7 +563,7 @@ def test_what_is_made_of_pieces_is_translated_before_the_pieces_go_in(posed_came
     posed_camera.virtual_pinhole.eye = (0, 0, 5)
     monkeypatch.setattr(panel, "iface", lambda text: GERMAN.get(text, text))
     found = drawn(panel.VIEWCAM_PT_data)
-    assert found[-1][2] == {"text": "Oben wird (1, 0, 0)", "translate": False}
+    assert {"text": "Oben wird (1, 0, 0)", "translate": False} in [each[2] for each in found]
     assert ("label", "Senkrecht", {"icon": "ERROR", "translate": False}) in [each[:3] for each in found]
 
 
@@ -556,3 +607,302 @@ def test_everything_that_blender_shows_is_spelled_as_blender_spells():
 
 def test_a_british_word_would_be_found():
     assert all(BRITISH.search(word) for word in ("Colours", "modelled", "millimetres", "Normalise", "cancelled"))
+
+
+# --- The sub-panel Labels: what it says it will write is what is written, beside Blender, and nothing of it is in the file
+
+
+# In place of the batch: it keeps what it was to do, and writes the last of a label's files.
+STAND_IN = """
+import json, pathlib, sys
+written = json.loads(pathlib.Path(sys.argv[1]).read_text())
+(shot,), folder = written["jobs"], pathlib.Path(written["plan"]["out"])
+(folder / (shot["name"] + ".labels.json")).write_text(json.dumps([shot, written["plan"]["outputs"]]))
+"""
+
+
+@pytest.fixture
+def settings(fresh_blender, tmp_path):
+    found = bpy.context.window_manager.virtual_pinhole_labels
+    found.folder = str(tmp_path / "out")
+    yield found
+    labels.background.end()
+    for name in ("kinds", "depth_steps", "folder"):
+        found.property_unset(name)
+
+
+@pytest.fixture
+def camera(add_camera, scene):
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 64, 48, 100
+    scene.frame_current = 3
+    return add_camera("Hero: close")
+
+
+@pytest.fixture
+def stand_in(monkeypatch):
+    def command(_copy, _scene, written):
+        return [sys.executable, "-c", STAND_IN, str(written)]
+
+    monkeypatch.setattr(comparing, "command", command)
+
+
+def test_each_label_can_be_chosen_and_none_is_unknown():
+    assert tuple(name.lower() for name, *_ in labels._KINDS) == KINDS
+
+
+def test_a_click_starts_a_batch_of_this_frame_with_labels_alone(settings, camera, stand_in, scene):
+    settings.kinds, settings.depth_steps = {"FLOW", "DEPTH"}, 250
+    bpy.data.objects["Hero: close"].select_set(True)
+    assert bpy.ops.viewcam.write_labels(camera="Hero: close") == {"FINISHED"}
+    folder, sentence = labels.background.latest
+    assert folder.parent == Path(settings.folder) and sentence == f"Written to {folder}"
+    assert folder.name.startswith("untitled Hero_ close 0003 labels 2")
+    shot, outputs = json.loads((folder / "Hero_ close.labels.json").read_text())
+    if not bpy.app.binary_path:  # else Blender is given the file, which is the job's then
+        assert Path(shot.pop("blend")).name == "untitled.blend"
+    assert shot == {"name": "Hero_ close", "camera": "Hero: close", "width": 64, "height": 48, "frame": 3}
+    wanted = {"picture": False, "check": False, "labels": ["depth", "flow"], "depth_steps": 250.0, "report": False}
+    assert outputs == wanted
+
+
+def test_a_child_that_dies_leaves_no_folder_and_its_last_words_are_said(settings, camera, monkeypatch, tmp_path):
+    monkeypatch.setattr(comparing, "command", lambda *_: [sys.executable, "-c", "print('out of memory'); raise SystemExit(9)"])
+    with pytest.raises(RuntimeError, match="out of memory"):
+        bpy.ops.viewcam.write_labels()
+    folder, sentence = labels.background.latest
+    assert folder is None and "out of memory" in sentence and list(Path(settings.folder).iterdir()) == []
+
+
+def test_a_shot_that_fails_is_said_in_its_own_words(settings, camera, monkeypatch):
+    summary = '{"shots": [{"name": "Hero", "error": "the disk is full"}]}'
+    fails = "import json, pathlib, sys; out = json.loads(pathlib.Path(sys.argv[1]).read_text())['plan']['out'];"
+    fails += "pathlib.Path(out, 'summary.json').write_text(sys.argv[2]); sys.exit(4)"
+    monkeypatch.setattr(comparing, "command", lambda *given: [sys.executable, "-c", fails, str(given[2]), summary])
+    with pytest.raises(RuntimeError, match="The disk is full"):
+        bpy.ops.viewcam.write_labels()
+
+
+def test_while_labels_are_written_there_is_cancel_and_no_second_start(settings, camera, monkeypatch, scene):
+    monkeypatch.setattr(comparing, "command", lambda *_: [sys.executable, "-c", "import time; time.sleep(600)"])
+    labels.background.running = writing = labels.Writing(camera, scene, settings)
+    assert writing.poll() is None and not bpy.ops.viewcam.write_labels.poll()
+    assert bpy.ops.viewcam.cancel_labels() == {"FINISHED"}
+    assert not bpy.ops.viewcam.cancel_labels.poll() and not writing.folder.exists()
+    assert writing._process.status() is not None
+
+
+@pytest.mark.parametrize(
+    ("kinds", "folder", "sentence"),
+    [(set(), "out", "No label is chosen"), ({"DEPTH"}, "", "There is no folder for the labels, and the file is not saved")],
+)
+def test_what_can_not_be_begun_is_one_sentence(settings, camera, kinds, folder, sentence):
+    settings.kinds, settings.folder = kinds, folder
+    with pytest.raises(RuntimeError, match=sentence):
+        bpy.ops.viewcam.write_labels()
+
+
+def test_nothing_is_left_of_it_without_the_add_on(registered_addon):
+    registered_addon.unregister()
+    try:
+        assert not hasattr(bpy.types.WindowManager, "virtual_pinhole_labels")
+        assert labels.background.on_load not in bpy.app.handlers.load_pre
+    finally:
+        registered_addon.register()
+
+
+@pytest.mark.exhaustive
+def test_the_files_that_the_panel_shows_are_those_that_are_written(settings, monkey):
+    settings.kinds = {kind.upper() for kind in KINDS}
+    shown = labels.file_names(bpy.context.scene.camera, settings.chosen())
+    assert bpy.ops.viewcam.write_labels() == {"FINISHED"}
+    folder, _ = labels.background.latest
+    of_the_batch = {"summary.json", "contact-sheet.html"}
+    assert {path.name for path in folder.glob("[!.]*")} - of_the_batch == set(shown)
+    told = label_files.read(folder / shown[-1])
+    assert "Suzanne" in {each["name"] for each in told["instances"]} and told["lost"] == {"forward": [], "backward": []}
+
+
+# --- The render engine's panels, and those of Blender that it takes over: all gone with the add-on
+
+
+def engines_of_panels():
+    return {
+        each.__name__: set(each.COMPAT_ENGINES) for each in bpy.types.Panel.__subclasses__() if hasattr(each, "COMPAT_ENGINES")
+    }
+
+
+def test_the_add_on_comes_and_goes_and_leaves_blenders_panels_as_they_were(scene):
+    viewcam_addon.unregister()
+    before = engines_of_panels()
+    try:
+        assert not [name for name, engines in before.items() if "VIEWCAM" in engines and not name.startswith("VIEWCAM")]
+        assert not hasattr(bpy.types.Scene, "virtual_pinhole_reference")
+        for _ in range(3):
+            viewcam_addon.register()
+            assert "VIEWCAM" in engines_of_panels()["RENDER_PT_format"]
+            viewcam_addon.unregister()
+            assert engines_of_panels() == before
+            with pytest.raises(TypeError):
+                scene.render.engine = "VIEWCAM"
+    finally:
+        viewcam_addon.register()
+    scene.render.engine = "VIEWCAM"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(
+            "RENDER_PT_format",
+            "RENDER_PT_frame_range",
+            "RENDER_PT_output",
+            "RENDER_PT_stereoscopy",
+            "RENDER_PT_post_processing",
+        ),
+        *("RENDER_PT_color_management", "VIEWLAYER_PT_layer", "DATA_PT_lens", "DATA_PT_camera", "OBJECT_PT_visibility"),
+        *(
+            "EEVEE_MATERIAL_PT_context_material",
+            "EEVEE_MATERIAL_PT_surface",
+            "EEVEE_WORLD_PT_surface",
+            "WORLD_PT_context_world",
+        ),
+    ],
+)
+def test_blenders_panels_that_matter_are_shown(name):
+    assert "VIEWCAM" in engines_of_panels()[name]
+
+
+@pytest.mark.parametrize("name", ["DATA_PT_light", "DATA_PT_spot", "RENDER_PT_simplify", "RENDER_PT_freestyle"])
+def test_panels_of_what_is_not_modelled_or_is_shown_by_ours_are_not(name):
+    assert "VIEWCAM" not in engines_of_panels()[name]
+
+
+@pytest.mark.parametrize("kind", ["POINT", "SUN", "SPOT", "AREA"])
+def test_what_the_lamps_panel_shows_is_there_and_named_once(scene, kind):
+    lamp = bpy.data.lights.new(kind, kind)
+    names = list(render_panels.lamp_settings(lamp))
+    assert {"color", "energy", "use_shadow"} < set(names) and len(set(names)) == len(names)
+    assert not [name for name in names if not hasattr(lamp, name)]
+
+
+def test_passes_in_the_panel_are_those_that_the_tracer_computes(scene):
+    layer = scene.view_layers[0]
+    assert not [name for name in SETTINGS.values() if not hasattr(layer, name)]
+    shown = {name for names in (render_panels.GEOMETRY_PASSES, render_panels.LIGHT_PASSES) for name in names}
+    assert set(SETTINGS) <= shown
+
+
+# --- Operators
+
+
+def test_apply_leaves_a_camera_where_its_values_are(posed_camera):
+    assert bpy.ops.viewcam.apply_camera() == {"FINISHED"}
+    assert tuple(posed_camera.location) == (7, -6, 5)
+
+
+def test_adopt_takes_the_values_of_a_moved_camera(posed_camera):
+    posed_camera.location = (1, 1, 1)
+    bpy.context.view_layer.update()
+    assert bpy.ops.viewcam.adopt_camera() == {"FINISHED"}
+    assert tuple(posed_camera.virtual_pinhole.eye) == (1, 1, 1)
+    assert tuple(posed_camera.location) == (1, 1, 1)
+
+
+def test_another_up_keeps_the_picture_and_makes_its_roll_certain(posed_camera, scene):
+    group = posed_camera.virtual_pinhole
+    group.eye, group.look_at, group.up = (0.5, 0.25, 5), (0.5, 0.25, 0), (0, 0, 1)
+    before, precision = cameras.stated(posed_camera, scene), 2.0**-24
+    assert "roll" in readouts.roll_warning(before, precision)
+    assert bpy.ops.viewcam.choose_up() == {"FINISHED"}
+    after = cameras.stated(posed_camera, scene)
+    assert after.up == (1, 0, 0) and after.basis()[0] == pytest.approx(before.basis()[0], abs=1e-15)
+    assert readouts.roll_warning(after, precision) is None
+
+
+def test_adopt_enables_a_camera(camera_object):
+    bpy.ops.viewcam.adopt_camera()
+    assert camera_object.virtual_pinhole.enabled
+
+
+def test_a_camera_can_be_named(posed_camera, add_camera):
+    other = add_camera("Other")
+    posed_camera.virtual_pinhole.enabled = False
+    bpy.ops.viewcam.adopt_camera(camera="Camera")
+    assert posed_camera.virtual_pinhole.enabled and not other.virtual_pinhole.enabled
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: bpy.ops.viewcam.apply_camera(camera="Nobody"), "There is no camera 'Nobody'"),
+        (lambda: bpy.ops.viewcam.apply_camera(), "is not enabled"),
+        (lambda: bpy.ops.viewcam.choose_up(), "is not enabled"),
+        (lambda: bpy.ops.viewcam.adopt_camera(camera="Lamp"), "'Lamp' is no camera"),
+    ],
+)
+def test_errors_are_reported_in_one_sentence(camera_object, scene, call, message):
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    scene.collection.objects.link(lamp)
+    with pytest.raises(RuntimeError, match=message) as error:
+        call()
+    assert "Traceback" not in str(error.value)
+
+
+def test_without_a_camera_the_buttons_are_off(fresh_blender):
+    assert not bpy.ops.viewcam.apply_camera.poll()
+    assert not bpy.ops.viewcam.adopt_camera.poll()
+
+
+def test_they_work_in_edit_mode_of_another_object(posed_camera, scene):
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.object.mode_set(mode="EDIT")
+    posed_camera.virtual_pinhole.enabled = False
+    bpy.ops.viewcam.adopt_camera(camera="Camera")
+    assert posed_camera.virtual_pinhole.enabled
+
+
+def test_applying_reports_what_did_not_stick(posed_camera, scene, capfd):
+    posed_camera.virtual_pinhole.keyframe_insert("eye", frame=1)
+    posed_camera.driver_add("location", 0).driver.expression = "1.0 + 1.0"
+    bpy.ops.viewcam.apply_camera()
+    assert cameras.check(posed_camera, cameras.stated(posed_camera, scene), scene)[0].sentence in capfd.readouterr().out
+
+
+# --- View menu
+
+
+def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(registered_addon):
+    entries, drags, menus = [], [], []
+
+    def operator(name, text=""):
+        entries.append(name)
+        drags.extend([text] if text else [])
+        return SimpleNamespace()
+
+    layout = SimpleNamespace(operator=operator, menu=menus.append, separator=lambda: None)
+    view_menu.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
+    classes = (*moving.CLASSES, *operators.CLASSES, *baking.CLASSES, *clipboard.IN_MENUS, *scene_cameras.OPERATORS)
+    classes += photo_matching.OPERATORS
+    assert set(entries) == {each.bl_idname for each in classes} and menus == ["VIEWCAM_MT_copy_camera_as"]
+    assert "viewcam.copy_readout" not in entries, "without a text of its own, as from a menu, it would empty the clipboard"
+    assert drags == ["Drag: Orbit", "Drag: Dolly", "Drag: Dolly Zoom", "Drag: Truck"]
+    assert all(getattr(bpy.ops.viewcam, entry.split(".")[1]).get_rna_type() for entry in entries)
+
+
+def test_the_menu_stands_under_view_cameras(registered_addon):
+    menus = []
+    layout = SimpleNamespace(menu=menus.append, separator=lambda: None)
+    view_menu._draw(SimpleNamespace(layout=layout), bpy.context)
+    assert menus == ["VIEWCAM_MT_cameras"] and hasattr(bpy.types, menus[0])
+    assert view_menu._draw in bpy.types.VIEW3D_MT_view_cameras._dyn_ui_initialize()
+
+
+def test_the_menu_goes_with_the_add_on(registered_addon):
+    functions = bpy.types.VIEW3D_MT_view_cameras._dyn_ui_initialize
+    count = len(functions())
+    viewcam_addon.unregister()
+    try:
+        assert len(functions()) == count - 1 and not hasattr(bpy.types, "VIEWCAM_MT_cameras")
+    finally:
+        viewcam_addon.register()
+    assert len(functions()) == count

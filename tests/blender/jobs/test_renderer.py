@@ -221,6 +221,11 @@ def test_bad_files_and_cameras_are_one_sentence(blend, scene, camera_object, tmp
     fails(Job(blend=path, camera="Cube"), "has no camera 'Cube'")
 
 
+def test_a_file_without_a_camera_is_one_sentence(blend, scene, camera_object):
+    scene.collection.objects.unlink(camera_object)
+    fails(Job(blend=blend()), "scene 'Scene' has no camera: add one, or give another file")
+
+
 @pytest.mark.parametrize(("kind", "words"), [("ORTHO", "orthographic"), ("PANO", "panoramic")])
 def test_cameras_that_are_no_pinholes_are_one_sentence(blend, camera_object, kind, words):
     camera_object.data.type = kind

@@ -9,7 +9,6 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import linking
-from viewcam_addon.blender.scenes.import_scene import import_scene
 from viewcam_addon.comparison import radiance
 from viewcam_addon.image import Image
 from viewcam_addon.jobs.job import Job
@@ -174,18 +173,6 @@ def test_an_instance_shines_for_what_its_object_shines(pictures, panel, painted,
     (sides,) = pictures(scenes=1)
     assert links_of(sides.exported) == ({"Floor", "Panel"}, None)
     assert (np.array(off(sides.exported, sides.traced, sides.cycles[0])) <= (1e-3, 1e-6, 2e-5)).all()
-
-
-@pytest.mark.parametrize("names", [{"Monkey"}, set(), None])
-def test_links_of_surfaces_come_back_from_a_scene_file(stage, panel, names):
-    stage(np.random.default_rng(0))
-    panel(3, 3, 5.0)
-    exported = jobs.export(Job(level="direct"))
-    given = tuple(replace(one, receivers=names, blockers=names) if one.name == "Panel" else one for one in exported.objects)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    import_scene(replace(exported, objects=given), "Imported", bpy.context.scene)
-    wanted = None if names is None else frozenset(names)
-    assert links_of(jobs.export(Job(level="direct"))) == (wanted, wanted)
 
 
 def test_a_recentred_scene_has_no_links_and_they_are_told(stage, panel, link):

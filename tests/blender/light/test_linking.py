@@ -8,7 +8,6 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.jobs import renderer as jobs
-from viewcam_addon.blender.scenes.import_scene import import_scene
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.render import render
 
@@ -91,12 +90,3 @@ def test_a_light_that_is_linked_to_instances_is_named(lamp, link, scene):
     assert "Lamp" not in linked()[2]
     link(lamp, receiver_collection={"Monkey": "INCLUDE"})
     assert "linked to instances" in linked()[2]["Lamp"]
-
-
-@pytest.mark.parametrize("names", [{"Monkey"}, set(), None])
-def test_links_come_back_from_a_scene_file(lamp, link, names):
-    exported = jobs.export(Job(level="direct"))
-    given = replace(exported, lamps=(replace(exported.lamps[0], receivers=names, blockers=names),))
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    import_scene(given, "Imported", bpy.context.scene)
-    assert linked()[:2] == (None if names is None else frozenset(names),) * 2

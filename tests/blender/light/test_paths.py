@@ -215,8 +215,8 @@ def test_a_percent_less_light_is_caught(take, scene, sabotage, monkeypatch):
     if sabotage == "albedo":
         right = shaders.read
 
-        def darker(material, *baked):
-            reading = right(material, *baked)
+        def darker(material):
+            reading = right(material)
             rgb = tuple(0.99 * value for value in reading.material.diffuse.rgb)
             reading.material = Material(diffuse=Colour(rgb))
             return reading

@@ -242,7 +242,8 @@ def procedural():
         }
         found[f"white noise {dimensions}"] = N("TexWhiteNoise", whole, "Color", noise_dimensions=dimensions)
     found["white noise value"] = N("TexWhiteNoise", {"Vector": cells}, "Value")
-    found["noise of generated"] = N("TexNoise", {}, "Fac")
+    for name in ("TexNoise", "TexWhiteNoise", "TexChecker", "TexMagic", "TexBrick", "TexGradient", "TexWave", "TexVoronoi"):
+        found[f"{name} without a vector"] = N(name, {}, "Color" if name != "TexNoise" else "Fac")
     a, b = two_colours()
     for word in ("Color", "Fac"):
         found[f"checker {word}"] = N("TexChecker", {"Vector": place, "Color1": a, "Color2": b, "Scale": 3.3}, word)

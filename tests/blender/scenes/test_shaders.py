@@ -394,6 +394,15 @@ def test_what_makes_an_input_that_does_not_count_is_not_followed(make_material, 
     approximately(material, "'Ambient Occlusion'", "not modelled")
 
 
+@pytest.mark.parametrize("kind", ["AmbientOcclusion", "TexGabor", "RadialTiling", "TexSky", "Bevel"])
+def test_a_texture_that_is_not_modelled_leaves_the_color_of_the_viewport_and_is_named(diffuse, kind):
+    if not hasattr(bpy.types, f"ShaderNode{kind}"):
+        pytest.skip(f"Blender {bpy.app.version_string} has no {kind}")
+    diffuse.diffuse_color = (*RED, 1.0)
+    link(diffuse, f"ShaderNode{kind}", 0, "Color")
+    assert approximately(diffuse, "not modelled") == Material(diffuse=Colour(RED))
+
+
 def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
     mixed = add_shader(diffuse, "ShaderNodeMixShader", (1, diffuse.node_tree.nodes["Shader"]))
     mixed.name = "Blend"

@@ -1,14 +1,12 @@
-"""File › Export and File › Import: Virtual Pinhole Scene, and what could not come along; entries of camera_files.py as well.
+"""File › Export: Virtual Pinhole Scene, and what could not come along; the entries of camera_files.py as well.
 
-The export is that of `viewcam export` (job.py), at the current frame through the scene's camera; the import is that of
-import_scene.py, also for a file that is dropped on a viewport. What is not whole in the ledger is summed up in a report and
-shown in a popup, as Blender's own glTF exporter does. Rejected: the ledger as a text datablock, since exporting should change
-nothing in the file that is open.
+The export is that of `viewcam export` (job.py), at the current frame through the scene's camera. What is not whole in the
+ledger is summed up in a report and shown in a popup, as Blender's own glTF exporter does. Rejected: the ledger as a text
+datablock, since exporting should change nothing in the file that is open.
 """
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar
 
 import bpy
 from bpy_extras.io_utils import ExportHelper, ImportHelper
@@ -19,7 +17,7 @@ from .. import datablocks
 from . import readouts
 
 _SUFFIX = ".json"
-_ENTRIES = (("scene", "Virtual Pinhole Scene (.json)"), ("cameras", "Cameras (COLMAP, fSpy, pbrt, …)"))
+_CAMERAS = "Cameras (COLMAP, fSpy, pbrt, …)"
 _POPUP_ENTRIES = 12
 _POPUP_WIDTH = 480
 
@@ -60,7 +58,7 @@ class VIEWCAM_OT_export_scene(ExportHelper, bpy.types.Operator):
         except InputError as error:
             self.report({"ERROR"}, text(datablocks.sentence(error)))
             return {"CANCELLED"}
-        _tell(self, scene.ledger, "exported", path, context)
+        _tell(self, scene.ledger, path, context)
         return {"FINISHED"}
 
 
@@ -75,63 +73,6 @@ class IntoScene(ImportHelper):
         return False
 
 
-class VIEWCAM_OT_import_scene(IntoScene, bpy.types.Operator):
-    bl_idname = "viewcam.import_scene"
-    bl_label = "Import Virtual Pinhole Scene"
-    bl_description = "Add the objects, lights and camera of a scene file, in a collection of their own"
-    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
-
-    filename_ext = _SUFFIX
-    filter_glob: bpy.props.StringProperty(default=f"*{_SUFFIX}", options={"HIDDEN"})
-    files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
-    set_picture: bpy.props.BoolProperty(
-        name="Set Camera and Resolution",
-        description="Let the scene render through the file's camera, in the file's resolution",
-        options={"SKIP_SAVE"},
-    )
-    set_surroundings: bpy.props.BoolProperty(
-        name="Set World and Film",
-        description="Let the scene have the file's world, film and bounces, if the file has light",
-        options={"SKIP_SAVE"},
-    )
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        """Ask for the file, or of a dropped one for the options. A scene without a camera takes all that the file has."""
-        for name in ("set_picture", "set_surroundings"):
-            if not self.properties.is_property_set(name):
-                setattr(self, name, context.scene.camera is None)
-        return self.invoke_popup(context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        from ...tracer.scene import scene_file  # here, since Blender starts without
-        from ..scenes import import_scene
-
-        path = Path(bpy.path.abspath(self.filepath))
-        try:
-            scene = scene_file.read(path)
-            imported = import_scene.import_scene(scene, text(path.stem), context.scene, self.set_picture, self.set_surroundings)
-        except InputError as error:
-            self.report({"ERROR"}, text(datablocks.sentence(error)))
-            return {"CANCELLED"}
-        if context.mode == "OBJECT":
-            select(imported.objects, imported.camera, context)
-        _tell(self, imported.ledger, "imported", path, context)
-        return {"FINISHED"}
-
-
-class VIEWCAM_FH_scene(bpy.types.FileHandler):
-    """The handler of a scene file that is dropped on a viewport."""
-
-    bl_idname = "VIEWCAM_FH_scene"
-    bl_label = "Virtual Pinhole Scene"
-    bl_import_operator = "viewcam.import_scene"
-    bl_file_extensions = _SUFFIX
-
-    @classmethod
-    def poll_drop(cls, context: bpy.types.Context) -> bool:
-        return context.area is not None and context.area.type == "VIEW_3D"
-
-
 def select(objects: Sequence[bpy.types.Object], active: bpy.types.Object, context: bpy.types.Context) -> None:
     for block in context.selected_objects:
         block.select_set(False)
@@ -140,14 +81,12 @@ def select(objects: Sequence[bpy.types.Object], active: bpy.types.Object, contex
     context.view_layer.objects.active = active
 
 
-def _tell(
-    operator: bpy.types.Operator, ledger: Sequence[LedgerEntry], deed: str, path: Path, context: bpy.types.Context
-) -> None:
-    """Report what became of a scene, and show what lacks in it. deed : "exported" or "imported"."""
+def _tell(operator: bpy.types.Operator, ledger: Sequence[LedgerEntry], path: Path, context: bpy.types.Context) -> None:
+    """Report what became of a scene, and show what lacks in it."""
     lacking = [entry for entry in ledger if entry.status != "exported"]
-    operator.report({"WARNING" if lacking else "INFO"}, text(f"{path.name}: {summary(ledger, deed)}"))
+    operator.report({"WARNING" if lacking else "INFO"}, text(f"{path.name}: {summary(ledger)}"))
     if lacking and not bpy.app.background:
-        show(popup_lines(lacking), f"What the {deed.capitalize()} Scene Lacks", context)
+        show(popup_lines(lacking), "What the Exported Scene Lacks", context)
 
 
 def text(name: str) -> str:
@@ -155,11 +94,11 @@ def text(name: str) -> str:
     return name.encode("utf-8", "replace").decode()
 
 
-def summary(ledger: Sequence[LedgerEntry], deed: str) -> str:
+def summary(ledger: Sequence[LedgerEntry]) -> str:
     """How many objects came along: one line for the status bar."""
     counts = {status: sum(entry.status == status for entry in ledger) for status in ("exported", "approximated", "skipped")}
     total = len(ledger)
-    parts = [f"{counts['exported']} of {total} object{'' if total == 1 else 's'} {deed} whole"]
+    parts = [f"{counts['exported']} of {total} object{'' if total == 1 else 's'} exported whole"]
     parts += [f"{count} {status}" for status, count in counts.items() if count and status != "exported"]
     return ", ".join(parts)
 
@@ -190,16 +129,15 @@ def show(lines: Sequence[tuple[str, str]], title: str, context: bpy.types.Contex
 
 
 def _draw_export(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    for what, text in _ENTRIES:
-        menu.layout.operator(f"viewcam.export_{what}", text=text)
+    menu.layout.operator("viewcam.export_scene", text="Virtual Pinhole Scene (.json)")
+    menu.layout.operator("viewcam.export_cameras", text=_CAMERAS)
 
 
 def _draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    for what, text in _ENTRIES:
-        menu.layout.operator(f"viewcam.import_{what}", text=text)
+    menu.layout.operator("viewcam.import_cameras", text=_CAMERAS)
 
 
-CLASSES = (VIEWCAM_OT_export_scene, VIEWCAM_OT_import_scene, VIEWCAM_FH_scene)
+CLASSES = (VIEWCAM_OT_export_scene,)
 
 
 def register() -> None:

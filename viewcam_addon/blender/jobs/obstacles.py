@@ -73,9 +73,10 @@ def camera_of(
     name = settings.scene_camera(shot.frame) if shot.camera is None else shot.camera
     camera_object = among.get(name)
     if camera_object is None:
+        if not among:
+            raise InputError(f"scene {scene.name!r} has no camera: add one, or give another file")
         lacking = "no camera of its own" if name is None else f"no camera {name!r}"
-        some = ", ".join(itertools.islice(among, 8))
-        raise InputError(f"scene {scene.name!r} has {lacking}: choose from {some or 'none, and add one'}")
+        raise InputError(f"scene {scene.name!r} has {lacking}: choose from {', '.join(itertools.islice(among, 8))}")
     datablocks.check_perspective(camera_object)
     return camera_object
 

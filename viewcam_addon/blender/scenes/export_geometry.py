@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...tracer.scene import Mesh, Spheres
 from .. import versions
-from . import charts, cycles_attributes
+from . import cycles_attributes
 
 # Type of an attribute → the field that has its values, and how many they are.
 _ATTRIBUTES = {
@@ -178,9 +178,6 @@ def _corner_values(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: A
     """(triangles, 3, k) float32: an attribute as Cycles has it, or None where the mesh has none of this name."""
     if name == cycles_attributes.GENERATED:
         return _generated(mesh)[triangles]
-    if name == charts.NAME:
-        starts, totals = (read(mesh.polygons, field, np.int32) for field in ("loop_start", "loop_total"))
-        return charts.corners(starts, totals)[corners]
     if name in (cycles_attributes.POINTINESS, cycles_attributes.RANDOM_PER_ISLAND):
         return _of_edges(mesh, name)[triangles, np.newaxis]
     if name == cycles_attributes.VERTEX_COLOR and mesh.color_attributes.render_color_index >= 0:

@@ -12,7 +12,7 @@ import bpy
 
 from ...tracer.scene.lamps import RAYS
 from .. import datablocks, versions
-from . import charts, images, materials, nodes
+from . import images, materials, nodes
 from .ledger import Ledger
 from .shading import Shading
 
@@ -155,12 +155,7 @@ def note_object(
                 ledger.set_for_cycles(material.original.cycles, "use_bump_map_correction", True)
         for reason in reasons:
             ledger.note(name, "approximated", f"material {material.name!r} {reason}, and a plain one stands in")
-        baked = shading.reading(material).baked if shading else []
-        for clause in baked:
-            ledger.note(name, "approximated", f"material {material.name!r} {clause}")
-        if baked:
-            ledger.call_for_cycles(real.original, charts.lay_out, len(shown.data.polygons))
-        if (reasons or baked) and shading:
+        if reasons and shading:
             ledger.call_for_cycles(material.original, materials.stand_in, shading.reading(material))
         elif reasons:
             ledger.call_for_cycles(material.original, materials.make_plain)

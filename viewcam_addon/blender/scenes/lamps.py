@@ -1,4 +1,4 @@
-"""Blender's lights as the tracer's lamps, and the other way round: a class each.
+"""Blender's lights as the tracer's lamps: a class each.
 
 What the settings mean is Cycles' (light.cpp of intern/cycles/blender and of intern/cycles/scene): a light of the strength s, in
 watts for all but suns, has the radiance s/(π A) if it is normalised, else s/π; a sun the irradiance s, else the radiance s.
@@ -30,7 +30,7 @@ _SHEAR = 1e-5
 
 
 class _Kind:
-    """One of Blender's lights as a lamp of the tracer, both ways.
+    """One of Blender's lights as a lamp of the tracer.
 
     lamp : what it is there. settings : of its numbers → Blender's property. size : the property that is above 0 where it has a
     size.
@@ -58,12 +58,6 @@ class _Kind:
         radius = light.shadow_soft_size
         return 4 * math.pi * radius**2 if radius > 0 else 4.0
 
-    def store(self, lamp: Any, data: bpy.types.Light, ledger: Ledger) -> np.ndarray:
-        """Give a new light the lamp's numbers; the (4, 4) matrix that it stands by."""
-        for ours, theirs in self.settings.items():
-            ledger.store(data, theirs, getattr(lamp, ours), lamp.name)
-        return lamp.to_world
-
     def shown(self, light: bpy.types.Light) -> tuple[str, ...]:
         """The properties that count in the picture, and no other kind of light has."""
         return tuple(self.settings.values())
@@ -81,13 +75,6 @@ class _Sun(_Kind):
 
     def area(self, light: bpy.types.Light, matrix: np.ndarray) -> float:
         return math.pi * math.sin(light.angle / 2) ** 2 if light.angle > 0 else 1.0
-
-    def store(self, lamp: Sun, data: bpy.types.Light, ledger: Ledger) -> np.ndarray:
-        super().store(lamp, data, ledger)
-        u, v, _ = Pinhole(lamp.towards, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, 1, 1).basis()
-        matrix = np.eye(4)
-        matrix[:3, :3] = np.column_stack([u, v, lamp.towards])
-        return matrix
 
     def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
         return None
@@ -156,12 +143,6 @@ class _Area(_Kind):
             ledger.set_for_cycles(light.original, "spread", math.pi)
         return super().exported(name, light, matrix, strength, common, ledger)
 
-    def store(self, lamp: Area, data: bpy.types.Light, ledger: Ledger) -> np.ndarray:
-        data.shape = "ELLIPSE" if lamp.ellipse else "RECTANGLE"
-        for name, value in zip(("size", "size_y"), lamp.size, strict=True):
-            ledger.store(data, name, value, lamp.name)
-        return super().store(lamp, data, ledger)
-
     def shown(self, light: bpy.types.Light) -> tuple[str, ...]:
         sides = ("size", "size_y") if light.shape in ("RECTANGLE", "ELLIPSE") else ("size",)
         return ("shape", *sides, *super().shown(light))
@@ -180,16 +161,16 @@ KINDS: dict[str, _Kind] = {kind.lamp.kind.upper(): kind for kind in (_Sun(), _Po
 """Blender's type of a light → what it is to the tracer."""
 
 
-def light_from(lamp: Lamp, overrides: Overrides, ledger: Ledger) -> tuple[bpy.types.Light, np.ndarray]:
-    """The light, and the (4, 4) matrix that it stands by."""
-    type = lamp.kind.upper()
-    data = bpy.data.lights.new(lamp.name, type)
+def light_of(sun: Sun, overrides: Overrides) -> tuple[bpy.types.Light, np.ndarray]:
+    """The light that a sun is in Blender until the overrides end, and the (4, 4) matrix that it stands by."""
+    data = bpy.data.lights.new(sun.name, "SUN")
     overrides.afterwards(bpy.data.batch_remove, [data])
-    largest = max(lamp.strength)
-    data.energy = largest
-    data.color = tuple(value / largest for value in lamp.strength) if largest else (1.0, 1.0, 1.0)
-    data.use_shadow, data.cycles.use_multiple_importance_sampling = lamp.casts_shadow, lamp.multiple_importance
-    return data, KINDS[type].store(lamp, data, ledger)
+    data.energy, data.angle = max(sun.irradiance), sun.angle
+    data.color = tuple(value / data.energy for value in sun.irradiance)
+    u, v, _ = Pinhole(sun.towards, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, 1, 1).basis()
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.column_stack([u, v, sun.towards])
+    return data, matrix
 
 
 def _within(inverse: np.ndarray, output: str) -> Iterator[Node]:

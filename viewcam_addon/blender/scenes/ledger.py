@@ -8,7 +8,6 @@ Cycles' render, takes out of it what the tracer does not model, so that the rest
 from collections.abc import Callable, Mapping
 
 import bpy
-import numpy as np
 
 from ...errors import NotModelledError
 from ...tracer.scene import LedgerEntry
@@ -33,13 +32,6 @@ class Ledger:
     def note(self, name: str, status: str, reason: str) -> None:
         """A finding, one clause, about the object; the same one again changes nothing."""
         self._findings.setdefault(name, {})[reason] = status
-
-    def store(self, owner: bpy.types.bpy_struct, property: str, value: float, name: str) -> None:
-        """Set a property for the object of this name, and tell if Blender took another number."""
-        setattr(owner, property, value)
-        stored = getattr(owner, property)
-        if stored != value and stored != float(np.float32(value)):
-            self.note(name, "approximated", f"its {property.replace('_', ' ')} is {value:g}, and Blender makes it {stored:g}")
 
     def set_for_cycles(self, owner: bpy.types.bpy_struct, attribute: str, value: object, stands_in: bool = True) -> None:
         """The remedy is a property of an original datablock. stands_in : whether it changes what is in the picture."""

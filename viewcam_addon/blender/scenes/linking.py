@@ -8,7 +8,7 @@ Cycles loses what scattered rays find of a light with blockers behind what casts
 collection names that (kernel/integrator/shadow_linking.h). Where a collection excludes all that casts none, it loses nothing.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from typing import TypeVar
 
@@ -92,34 +92,12 @@ def among(lights: Iterable[_Light], names: set[str]) -> tuple[_Light, ...]:
     )
 
 
-def link(
-    blocks: Iterable[bpy.types.Object],
-    light: Lamp | Object,
-    surfaces: Mapping[str, list[bpy.types.Object]],
-    overrides: Overrides,
-) -> None:
-    """Let new objects have a light's receivers and blockers. surfaces : name → the objects of that name."""
-    for each, names in zip(_COLLECTIONS, (light.receivers, light.blockers), strict=True):
-        if names is None:
-            continue
-        # A collection that includes nothing would mean all.
-        wanted, state = (names, "INCLUDE") if names else (set(surfaces), "EXCLUDE")
-        members = [other for name in sorted(wanted) for other in surfaces[name]]
-        collection = _collection(f"{light.name} {each.split('_')[0]}s", members, state, overrides)
-        for block in blocks:
-            setattr(block.light_linking, each, collection)
-
-
 def _exclude(overrides: Overrides, light: bpy.types.Object, others: Collection[bpy.types.Object]) -> None:
-    """Let others cast no shadow in a light."""
-    overrides.set(light.light_linking, "blocker_collection", _collection(light.name, others, "EXCLUDE", overrides))
-
-
-def _collection(name: str, members: Iterable[bpy.types.Object], state: str, overrides: Overrides) -> bpy.types.Collection:
-    collection = bpy.data.collections.new(name)
+    """Let others cast no shadow in a light until the overrides end."""
+    collection = bpy.data.collections.new(light.name)
     overrides.afterwards(bpy.data.batch_remove, [collection])
-    for member in members:
-        collection.objects.link(member)
+    for other in others:
+        collection.objects.link(other)
     for held in collection.collection_objects:
-        held.light_linking.link_state = state
-    return collection
+        held.light_linking.link_state = "EXCLUDE"
+    overrides.set(light.light_linking, "blocker_collection", collection)

@@ -85,12 +85,12 @@ def make_plain(overrides: Overrides, material: bpy.types.Material) -> None:
 def stand_in(overrides: Overrides, material: bpy.types.Material, reading: shaders.Reading) -> None:
     """Let Cycles see a tracer's material until the overrides end."""
     tables = {key: images.image_of(picture, key, overrides) for key, picture in reading.tables.items()}
-    reading = replace(reading, images=reading.images | tables, texts=texts_of(reading.material.nodes, overrides))
+    reading = replace(reading, images=reading.images | tables, texts=_texts_of(reading.material.nodes, overrides))
     output, adder = nodes.override_output(overrides, material.node_tree, "ShaderNodeOutputMaterial")
-    add_surface(adder, output, reading)
+    _add_surface(adder, output, reading)
 
 
-def texts_of(made: Iterable[Node], overrides: Overrides) -> dict[str, bpy.types.Text]:
+def _texts_of(made: Iterable[Node], overrides: Overrides) -> dict[str, bpy.types.Text]:
     """The texts that nodes ask for, in Blender, until the overrides end."""
     found = {}
     for text in dict.fromkeys(node["text"] for node in made if "text" in KINDS[node.type].inputs):
@@ -100,7 +100,7 @@ def texts_of(made: Iterable[Node], overrides: Overrides) -> dict[str, bpy.types.
     return found
 
 
-def add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Reading) -> None:
+def _add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Reading) -> None:
     """Add the nodes that shaders.read would read so, and link them to a material's output."""
     made = reading.material
     if made.displacement is not None:
@@ -121,13 +121,6 @@ def add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Rea
     # Without any light Cycles would draw nothing: not even the depth.
     total = total or adder.add("ShaderNodeBsdfDiffuse", Color=(0.0, 0.0, 0.0, 1.0))
     adder.link(total.outputs[0], output.inputs["Surface"])
-
-
-def add_emission(adder: nodes.Adder, output: bpy.types.Node, emission: Node, reading: shaders.Reading) -> None:
-    """Let a light's output give what a node makes."""
-    shader = adder.add("ShaderNodeEmission", Strength=1.0)
-    _colour(adder, shader.inputs["Color"], emission, reading)
-    adder.link(shader.outputs[0], output.inputs["Surface"])
 
 
 def _shader(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.types.Node:
@@ -161,7 +154,7 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
         for name, theirs in value.flags.items():
             setattr(added, theirs, node[name])
         for name, theirs in value.names.items():
-            setattr(added, theirs, reading.renamed.get(node[name], node[name]))
+            setattr(added, theirs, node[name])
         for name, theirs in value.numbers.items():
             setattr(added, theirs, type(getattr(added, theirs))(node[name][0]))
         if "image" in KINDS[node.type].inputs and node["image"] is not None:

@@ -36,7 +36,7 @@ from ...tracer.scene.shader_nodes import KINDS
 from .. import camera as cameras
 from .. import conversion, datablocks, findings, pose
 from ..temporary_settings import Overrides, overridden
-from . import baked_inputs, export_geometry, features, linking, materials
+from . import export_geometry, features, linking, materials
 from .depsgraph import visit_still
 from .export import Surface, light_in, placements
 from .film import CYCLES_SETTINGS
@@ -175,7 +175,7 @@ def _seen(
     plain = materials.plain(overrides)
     copies: dict[tuple[int, int], _Copy] = {}
     placed = []
-    shading = Shading(baked_inputs.baked_in(depsgraph)) if lit else None
+    shading = Shading() if lit else None
     found: dict[tuple[int, int], Geometry] = {}
 
     def copy_of(source: Surface, shown: bpy.types.Object) -> None:

@@ -12,10 +12,7 @@ the same for the time of a comparison (materials.stand_in): an approximation is 
 import functools
 import math
 import zlib
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
-from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -27,7 +24,7 @@ from ...tracer.scene.shader_nodes import KINDS, MOST_NODES, Node, closures
 from ...tracer.scene.shader_nodes import node as _node
 from ...tracer.scene.value_nodes import GENERATED, INCOMING, NORMAL, OWN, POSITION, TANGENT, UV
 from .. import versions
-from . import charts, cycles_attributes, images, nodes, value_nodes
+from . import cycles_attributes, images, nodes, value_nodes
 from .nodes import Input, Output
 
 RGB = tuple[float, float, float]
@@ -121,28 +118,6 @@ def word_of(ours: str) -> str:
     return _WORDS.get(ours, ours.upper())
 
 
-class Unknown(NamedTuple):
-    """An input of a shader that is not modelled: the node's name, the input's identifier, whether it takes a number."""
-
-    of: Input
-    node: str
-    input: str
-    is_number: bool
-
-
-class Baked(NamedTuple):
-    """The image that stands in for such an input. difference, most : from an image of half its width (charts.difference), and
-    of all."""
-
-    picture: Picture
-    difference: float
-    most: float
-
-
-BakedInputs = Mapping[tuple[str, str], Baked | str]
-"""A shader's name and an input's identifier → what was baked, or a clause that says why it was not."""
-
-
 # Nodes that feed one another in a row. One of them may become two of the tracer's, which may be more (shader_nodes.MOST_DEEP).
 _MOST_DEEP = 100
 
@@ -151,10 +126,9 @@ _MOST_DEEP = 100
 class Reading:
     """A Blender material as the tracer has it.
 
-    images : key in `Colour.image` → the image. texts : of IES files, where nodes are made that show them. renamed : what
-    attributes of these names are called there. reasons : why it is approximated, one clause each, about the material.
-    unknown : inputs of shaders, in no group, of which one says so. baked : which images stand in for such inputs, one clause
-    each.
+    images : key in `Colour.image` → the image.
+    texts : of IES files, where nodes are made that show them.
+    reasons : why it is approximated, one clause each, about the material.
     """
 
     material: Material = PLAIN
@@ -162,10 +136,7 @@ class Reading:
     alphas: set[str] = field(default_factory=set)
     tables: dict[str, Picture] = field(default_factory=dict)
     texts: dict[str, bpy.types.Text] = field(default_factory=dict)
-    renamed: dict[str, str] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
-    unknown: list[Unknown] = field(default_factory=list)
-    baked: list[str] = field(default_factory=list)
 
     @functools.cached_property
     def asks_for_random(self) -> bool:
@@ -187,21 +158,18 @@ class Reading:
         return refractions > 1 or (refractions == 1 and any(shader.type == "translucent" for shader in shaders))
 
 
-def read(material: bpy.types.Material, baked: BakedInputs = MappingProxyType({})) -> Reading:
-    """The reading of what Cycles would show of an evaluated material, but for what moves the surface and its volume.
-
-    baked : what stands in for inputs that are not modelled.
-    """
+def read(material: bpy.types.Material) -> Reading:
+    """The reading of what Cycles would show of an evaluated material, but for what moves the surface and its volume."""
     tree = versions.node_tree(material)
     output = tree and tree.get_output_node("CYCLES")
     if not output:
         return in_the_viewport(material)
     viewport, of = in_the_viewport(material).material.diffuse, Input(output.inputs["Surface"])
-    reader = Tree(viewport, baked=baked)
+    reader = Tree(viewport)
     surface = reader.surface(of)
     shines = any(closure.node.is_shining for closure in closures(surface))
     if shines:
-        reader = Tree(viewport, shines, baked)
+        reader = Tree(viewport, shines)
         surface = reader.surface(of)
     simple = components(surface)
     of_tree = {"surface": surface, "transparent_shadow": material.use_transparent_shadow}
@@ -231,11 +199,10 @@ def in_the_viewport(material: bpy.types.Material) -> Reading:
 class Tree:
     """Follows the nodes to a tree of shader nodes, and gathers what they ask for.
 
-    viewport : what stands in for a colour that is not modelled. shines : whether it gives off light. baked : as in `read`.
+    viewport : what stands in for a colour that is not modelled. shines : whether it gives off light.
     """
 
-    def __init__(self, viewport: Colour, shines: bool = False, baked: BakedInputs = MappingProxyType({})) -> None:
-        self._baked = baked
+    def __init__(self, viewport: Colour, shines: bool = False) -> None:
         self.reading = Reading()
         self.viewport = viewport
         self._shines = shines
@@ -444,12 +411,6 @@ class Tree:
             why, self.reading.reasons = self.reading.reasons, told
             if made is not None and not why:
                 return made
-            if not output.groups and isinstance(source, Output):
-                socket = output.node.inputs[name]
-                unknown = Unknown(output.input(name), output.node.name, socket.identifier, otherwise is not None)
-                if (image := self._baked_image(unknown, why)) is not None:
-                    return image
-                self.reading.unknown.append(unknown)
             told += [reason for reason in why if reason not in told]
             return self.viewport if otherwise is None else Colour((otherwise,) * 3)
         if isinstance(name, str) and name.endswith("Rotation"):
@@ -461,26 +422,6 @@ class Tree:
             self._reason(output, f"has a {output.node.inputs[name].name} of {value:g}")
             value = 0.0
         return Colour((min(max(value, 0.0), most),) * 3)
-
-    def _baked_image(self, unknown: Unknown, reasons: list[str]) -> Node | None:
-        """The image that stands in for an input, where one is exact enough. reasons : why one is asked for, or is not there."""
-        if (unknown.node, unknown.input) not in self._baked:
-            return None
-        baked = self._baked[unknown.node, unknown.input]
-        if isinstance(baked, str):
-            reasons[-1] += f", {baked}"
-            return None
-        width = baked.picture.pixels.shape[1]
-        size = f"an image of {width} × {width} that Cycles bakes of it"
-        if baked.difference > baked.most:
-            reasons[-1] += f": {size} differs from one of half its width by {baked.difference:.2g}"
-            return None
-        clauses = [f"{reason}, and {size} stands in, exact to {baked.difference:.1g}" for reason in reasons]
-        self.reading.baked += [clause for clause in clauses if clause not in self.reading.baked]
-        key = f"{unknown.node}, {unknown.input} {zlib.crc32(baked.picture.pixels.tobytes()):08x} (baked)"
-        self.reading.tables[key] = baked.picture
-        place = _node("attribute", name=charts.NAME, output="vector")
-        return _node("image", image=Colour(_WHITE, key), vector=place, extension="extend")
 
     def _value(self, output: Output) -> Colour | Node | None:
         """The nodes that make a value; None where a reason says that it is not modelled."""

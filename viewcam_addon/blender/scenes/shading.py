@@ -1,7 +1,6 @@
 """The materials and images of an export, each read once; where there is none of this class, level geometry is exported."""
 
-from collections.abc import Iterable, Mapping
-from types import MappingProxyType
+from collections.abc import Iterable
 
 import bpy
 
@@ -23,17 +22,14 @@ def add_pictures(reading: shaders.Reading, alphas: set[str], to: dict[str, Pictu
 
 
 class Shading:
-    """baked : of materials by their names (baked_inputs.py)."""
-
-    def __init__(self, baked: Mapping[str, shaders.BakedInputs] = MappingProxyType({})) -> None:
-        self._baked = baked
+    def __init__(self) -> None:
         self._readings: dict[str, shaders.Reading] = {}
 
     def reading(self, material: bpy.types.Material) -> shaders.Reading:
         """The reading of an evaluated material."""
         name = material.original.name_full
         if name not in self._readings:
-            self._readings[name] = shaders.read(material, self._baked.get(name, {}))
+            self._readings[name] = shaders.read(material)
         return self._readings[name]
 
     @property

@@ -97,7 +97,7 @@ def _rendered(
     if scene.render.film_transparent:
         hidden |= {"camera"}
     made = replace(made, suns=tuple(replace(sun, hidden_from=sun.hidden_from | hidden) for sun in made.suns))
-    ledger.call_for_cycles(world.original, world_image.show, scene.original, made, ledger)
+    ledger.call_for_cycles(world.original, world_image.show, scene.original, made)
     return made
 
 

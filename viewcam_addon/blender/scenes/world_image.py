@@ -17,8 +17,7 @@ from ...tracer.scene.lamps import RAYS, Sun, World
 from ...tracer.scene.materials import Picture
 from .. import another_blender, versions
 from ..temporary_settings import Overrides
-from . import images, import_light, lamps, nodes
-from .ledger import Ledger
+from . import images, lamps, nodes
 from .nodes import Input, Output
 
 WIDTH = 2048
@@ -102,15 +101,53 @@ def _picture(pixels: NDArray[np.float32]) -> Picture:
     return Picture(np.nan_to_num(np.clip(pixels, 0.0, LARGEST_RADIANCE), nan=0.0))
 
 
-def show(overrides: Overrides, world: bpy.types.World, scene: bpy.types.Scene, made: Rendered, ledger: Ledger) -> None:
+def show(overrides: Overrides, world: bpy.types.World, scene: bpy.types.Scene, made: Rendered) -> None:
     """Let Cycles see the image and the lamps in place of a world."""
     output, adder = nodes.override_output(overrides, world.node_tree, "ShaderNodeOutputWorld")
     shown = {name: images.image_of(picture, name, overrides, packed=False) for name, picture in made.pictures.items()}
-    import_light.add_world(adder, output, made.world, shown)
+    _add_world(adder, output, made.world, shown)
     for sun in made.suns:
-        data, matrix = lamps.light_from(sun, overrides, ledger)
+        data, matrix = lamps.light_of(sun, overrides)
         block = bpy.data.objects.new(sun.name, data)
         overrides.afterwards(bpy.data.batch_remove, [block])
         block.matrix_world = matrix.T.tolist()
-        import_light.hide(block, sun.hidden_from)
+        for ray in RAYS:
+            setattr(block, f"visible_{ray}", ray not in sun.hidden_from)
         scene.collection.objects.link(block)
+
+
+def _add_world(adder: nodes.Adder, output: bpy.types.Node, made: World, shown: dict[str, bpy.types.Image]) -> None:
+    """Let a world's output show what lights and, where that is another world, what the camera sees.
+
+    shown : `World.image` → the image.
+    """
+    backgrounds = []
+    for each in filter(None, (made, made.backdrop)):
+        background = adder.add("ShaderNodeBackground", Color=(*each.radiance, 1.0), Strength=1.0)
+        if each.image is not None:
+            background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+            _add_environment(adder, background, each, shown[each.image])
+        backgrounds.append(background.outputs[0])
+    surface = backgrounds[0]
+    if made.backdrop:
+        is_camera = adder.add("ShaderNodeLightPath").outputs["Is Camera Ray"]
+        surface = adder.add("ShaderNodeMixShader", is_camera, *backgrounds).outputs[0]
+    adder.link(surface, output.inputs["Surface"])
+
+
+def _add_environment(adder: nodes.Adder, background: bpy.types.Node, made: World, image: bpy.types.Image) -> None:
+    """Let a Background node show an image that is wrapped around the world."""
+    coordinates, mapping = adder.add("ShaderNodeTexCoord"), adder.add("ShaderNodeMapping", Rotation=made.rotation)
+    texture = adder.add("ShaderNodeTexEnvironment")
+    texture.image, texture.interpolation = image, "Closest" if made.closest else "Linear"
+    adder.link(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+    adder.link(mapping.outputs[0], texture.inputs["Vector"])
+    color = texture.outputs["Color"]
+    if len(set(made.radiance)) == 1:
+        background.inputs["Strength"].default_value = made.radiance[0]
+    else:
+        multiply = adder.add("ShaderNodeVectorMath", color)
+        multiply.operation = "MULTIPLY"
+        multiply.inputs[1].default_value = made.radiance
+        color = multiply.outputs[0]
+    adder.link(color, background.inputs["Color"])

@@ -30,10 +30,19 @@ struct Camera {
         return (length(beside - here) + length(above - here)) / 2;
     }
 
-    // Through a place in the picture, in pixels from its lower left corner, as pinhole.py's view_plane has it.
-    Ray ray(double column, double row) const {
-        double x = (column - principal_point.x) / distance.x, y = (row - principal_point.y) / distance.y;
-        return {eye, right * x + up * y + forward, t_min, t_max};
+    // Through a place in the picture, or four places, in pixels from its lower left corner, as pinhole.py's view_plane has it.
+    template <class T> Vec3Of<T> direction(T column, T row) const {
+        T x = (column - principal_point.x) / distance.x, y = (row - principal_point.y) / distance.y;
+        return splat<T>(right) * x + splat<T>(up) * y + splat<T>(forward);
+    }
+    Ray ray(double column, double row) const { return {eye, direction(column, row), t_min, t_max}; }
+    // The rays through up to 64 places, filled up to a multiple of four as `Rays` are.
+    void rays(const double* columns, const double* rows, int count, Rays& rays) const {
+        for (int i = 0; i < count; i += 4) {
+            Vec3x4 ahead = direction(load<double4>(columns + i), load<double4>(rows + i));
+            for (int axis = 0; axis < 3; axis++) store(rays.origin[axis] + i, splat4(eye[axis])), store(rays.direction[axis] + i, ahead[axis]);
+            store(rays.t_min + i, splat4(t_min)), store(rays.t_max + i, splat4(t_max));
+        }
     }
 };
 

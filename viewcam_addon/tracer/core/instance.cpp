@@ -42,6 +42,12 @@ const Ray* rays_of(const double* rows) {
     static_assert(sizeof(Ray) == 8 * sizeof(double) && offsetof(Ray, t_max) == 7 * sizeof(double));
     return reinterpret_cast<const Ray*>(rows);
 }
+const Rays& packet_of(const Ray* rays, int count) {
+    Rays& packet = of_this_thread<Rays>();
+    for (int i = 0; i < count; i++) packet.set(i, rays[i]);
+    packet.fill(count);
+    return packet;
+}
 Camera camera_of(const ViewcamCamera& given) {
     Camera camera;
     camera.eye = vector(given.eye), camera.right = vector(given.right), camera.up = vector(given.up), camera.forward = vector(given.forward);
@@ -151,7 +157,7 @@ const ViewcamCore core = {
                 for (size_t i = 0; i < count; i++) {
                     Ray ray = from.camera.ray(columns[i], rows[i]);
                     Hit hit = from.closest(ray, CAMERA);
-                    write_geometry(from, &ray, &hit, 1, {planes, count}, &i);
+                    write_geometry(from, [&](int) { return ray; }, [&](int) { return hit; }, 1, {planes, count}, &i);
                 }
             });
         },
@@ -167,7 +173,7 @@ const ViewcamCore core = {
                     if (hits.empty()) hits.push_back({});
                     if (!planes) numbers[i] = uint32_t(hits.size());
                     for (size_t k = 0; planes && k < numbers[i]; k++, to++) {
-                        write_geometry(from, &ray, &hits[k], 1, {planes, stride}, &to);
+                        write_geometry(from, [&](int) { return ray; }, [&](int) { return hits[k]; }, 1, {planes, stride}, &to);
                         objects[to] = hits[k].object;
                         slopes[to] = slopes[stride + to] = 0;
                         if (hits[k]) slopes_at(from, columns[i], rows[i], hits[k], slopes[to], slopes[stride + to]);
@@ -178,17 +184,15 @@ const ViewcamCore core = {
     .closest =
         [](const ViewcamScene* scene, size_t count, const double* rows, uint32_t kind, int packets, double* t, uint32_t* objects, uint32_t* primitives) {
             return guarded([&] {
-                Hit hits[PACKET];
+                Hits& hits = of_this_thread<Hits>();
                 for (size_t first = 0; first < count; first += PACKET) {
                     const Ray* rays = rays_of(rows) + first;
                     int some = int(std::min<size_t>(count - first, PACKET));
-                    if (packets)
-                        scene_of(scene).closest(rays, some, RayKind(kind), hits);
-                    else
-                        for (int i = 0; i < some; i++) hits[i] = scene_of(scene).closest(rays[i], RayKind(kind));
+                    if (packets) scene_of(scene).closest(packet_of(rays, some), some, RayKind(kind), hits);
                     for (int i = 0; i < some; i++) {
                         size_t k = first + size_t(i);
-                        t[k] = hits[i].t, objects[k] = hits[i].object, primitives[k] = hits[i].primitive;
+                        Hit hit = packets ? hits.hit(i) : scene_of(scene).closest(rays[i], RayKind(kind));
+                        t[k] = hit.t, objects[k] = hit.object, primitives[k] = hit.primitive;
                     }
                 }
             });
@@ -201,7 +205,7 @@ const ViewcamCore core = {
                     const Ray* rays = rays_of(rows) + first;
                     int some = int(std::min<size_t>(count - first, PACKET));
                     if (packets)
-                        scene_of(scene).occluded(rays, some, found);
+                        scene_of(scene).occluded(packet_of(rays, some), some, found);
                     else
                         for (int i = 0; i < some; i++) found[i] = scene_of(scene).occluded(rays[i]);
                     for (int i = 0; i < some; i++) hidden[first + size_t(i)] = found[i];

@@ -105,8 +105,8 @@ inline void sobol(uint32_t seed, uint32_t samples, int scatterings, size_t count
 inline void filter(int shape, double width, size_t count, const double* u, double* out) {
     Filter filter(FilterShape(shape), width);
     for (size_t i = 0; i < count; i++) {
-        Vec2 offset = filter.offset({u[2 * i], u[2 * i + 1]});
-        out[2 * i] = offset.x, out[2 * i + 1] = offset.y;
+        Vec2x4 offset = filter.offset({splat4(u[2 * i]), splat4(u[2 * i + 1])});
+        out[2 * i] = offset.x[0], out[2 * i + 1] = offset.y[0];
     }
 }
 // name: "asin", …; b: of atan2 and pow.

@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "math/vec.h"
+#include "math/simd.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -38,6 +38,23 @@ struct Ray {
     double t_min = 0, t_max = INFINITE;
 };
 
+constexpr int PACKET = 64;
+
+// As many rays, by coordinate. What is computed of four at once reads and writes the last four whole:
+// where fewer are left, `fill` has made the rest like the last.
+struct alignas(64) Rays {
+    double origin[3][PACKET], direction[3][PACKET], t_min[PACKET], t_max[PACKET];
+
+    Ray ray(int i) const { return {{origin[0][i], origin[1][i], origin[2][i]}, {direction[0][i], direction[1][i], direction[2][i]}, t_min[i], t_max[i]}; }
+    void set(int i, const Ray& ray) {
+        for (int axis = 0; axis < 3; axis++) origin[axis][i] = ray.origin[axis], direction[axis][i] = ray.direction[axis];
+        t_min[i] = ray.t_min, t_max[i] = ray.t_max;
+    }
+    void fill(int count) {
+        for (int i = count; i % 4; i++) set(i, ray(count - 1));
+    }
+};
+
 // A ray in an object's space. origin_error: by how much the origin may be off in each coordinate, since it was taken there.
 struct LocalRay : Ray {
     double origin_error = 0;
@@ -66,6 +83,15 @@ struct Nearest {
         name = other;
         return true;
     }
+};
+
+// The nearest hits of as many rays, at infinity where nothing is met.
+struct alignas(64) Hits {
+    double t[PACKET];
+    uint64_t name[PACKET];
+
+    bool met(int i) const { return t[i] < INFINITE; }
+    Hit hit(int i) const { return met(i) ? Hit{t[i], uint32_t(name[i] >> 32), uint32_t(name[i])} : Hit{}; }
 };
 
 // All hits that lie up to `within` times the nearest one's distance beyond it, taken as `Nearest` takes the nearest.

@@ -91,22 +91,17 @@ class Scene {
         });
     }
     // The same as `closest` for up to 64 rays, as packets where enough of them go the same way.
-    void closest(const Ray* rays, int count, RayKind kind, Hit* hits) const {
-        Nearest nearest[PACKET];
-        for (int i = 0; i < count; i++) nearest[i] = {rays[i].t_max};
-        for (const Merged& some : merged_)
-            if (some.visible & kind) intersect_packets<false>(some.triangles, rays, count, nearest);
-        for (int i = 0; i < count; i++) {
-            intersect_instances<false>(rays[i], kind, nearest[i]);
-            hits[i] = hit(nearest[i], rays[i]);
+    void closest(const Rays& rays, int count, RayKind kind, Hits& hits) const {
+        intersect<false>(rays, count, kind, hits);
+        for (int i = 0; i < count; i += 4) {
+            double4 t = load<double4>(hits.t + i);
+            store(hits.t + i, select(long4(t < load<double4>(rays.t_max + i)), t, splat4(INFINITE)));
         }
     }
-    void occluded(const Ray* rays, int count, bool* hidden) const {
-        Nearest nearest[PACKET];
-        for (int i = 0; i < count; i++) nearest[i] = {rays[i].t_max};
-        for (const Merged& some : merged_)
-            if (some.visible & SHADOW) intersect_packets<true>(some.triangles, rays, count, nearest);
-        for (int i = 0; i < count; i++) hidden[i] = nearest[i].t < rays[i].t_max || intersect_instances<true>(rays[i], SHADOW, nearest[i]);
+    void occluded(const Rays& rays, int count, bool* hidden) const {
+        Hits& hits = of_this_thread<Hits>();
+        intersect<true>(rays, count, SHADOW, hits);
+        for (int i = 0; i < count; i++) hidden[i] = hits.t[i] < rays.t_max[i];
     }
 
     // The surfaces at hits, with all that light needs to know there. magnitudes: receive what a renderer's relative rounding
@@ -311,7 +306,22 @@ class Scene {
         });
     }
 
-    template <bool ANY> static void intersect_packets(const TriangleBvh& triangles, const Ray* rays, int count, Nearest* nearest) {
+    // The nearest hits of rays among what their kind sees, at their ends where there is none; of ANY, at −infinity where there is one.
+    template <bool ANY> void intersect(const Rays& rays, int count, RayKind kind, Hits& nearest) const {
+        for (int i = 0; i < count; i += 4) store(nearest.t + i, load<double4>(rays.t_max + i)), store(nearest.name + i, long4{});
+        for (const Merged& some : merged_)
+            if (some.visible & kind) intersect_packets<ANY>(some.triangles, rays, count, nearest);
+        if (instances_.root == NOTHING) return;
+        for (int i = 0; i < count; i++)
+            intersect_one<ANY>(nearest, i, [&](Nearest& found) { return intersect_instances<ANY>(rays.ray(i), kind, found); });
+    }
+    template <bool ANY, class Intersect> static void intersect_one(Hits& nearest, int i, const Intersect& intersect) {
+        if (ANY && nearest.t[i] == -INFINITE) return;
+        Nearest found{nearest.t[i], nearest.name[i]};
+        bool met = intersect(found);
+        nearest.t[i] = ANY && met ? -INFINITE : found.t, nearest.name[i] = found.name;
+    }
+    template <bool ANY> static void intersect_packets(const TriangleBvh& triangles, const Rays& rays, int count, Hits& nearest) {
         constexpr int FEW = 4;
         if (triangles.bvh.root == NOTHING || !count) return;
         auto& [all, some] = of_this_thread<std::array<Packet, 2>>();
@@ -319,7 +329,7 @@ class Scene {
         auto trace = [&](Packet& packet) {
             packet.close();
             triangles.intersect<ANY>(packet);
-            for (int i = 0; i < packet.count; i++) nearest[packet.source[i]] = {packet.t[i], packet.name[i]};
+            for (int i = 0; i < packet.count; i++) nearest.t[packet.source[i]] = packet.t[i], nearest.name[packet.source[i]] = packet.name[i];
         };
         if (std::all_of(all.key, all.key + count, [&](int key) { return key == all.key[0]; })) {
             if (all.key[0] >= 0) trace(all);
@@ -340,7 +350,7 @@ class Scene {
             }
             for (int j = 0; j < some.count; j++) {
                 int which = some.source[j];
-                if (triangles.intersect<ANY>(rays[which], NONE, nearest[which]) && ANY) nearest[which].t = -INFINITE;
+                intersect_one<ANY>(nearest, which, [&](Nearest& found) { return triangles.intersect<ANY>(rays.ray(which), NONE, found); });
             }
         }
     }

@@ -193,7 +193,7 @@ KINDS: dict[str, Mapping[str, Default]] = {
         "normalize": True,
         "output": ("factor", "color"),
     },
-    "white_noise": {"vector": GENERATED, "w": 0.0, "dimensions": DIMENSIONS, "output": ("value", "color")},
+    "white_noise": {"vector": BLACK, "w": 0.0, "dimensions": DIMENSIONS, "output": ("value", "color")},
     "checker": {
         "vector": GENERATED,
         "color1": (0.8, 0.8, 0.8),

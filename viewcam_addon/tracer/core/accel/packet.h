@@ -13,8 +13,6 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-constexpr int PACKET = 64;
-
 // The map that shears a ray's direction to the unit vector of its dominant axis.
 struct Shear {
     int x = 0, y = 1, z = 2;
@@ -107,24 +105,16 @@ struct alignas(64) Packet : BoxRays<PACKET> {
 
 // enter() of four rays at a time: `packet` of all of them, each with its key. The origin is taken from planes before the product,
 // since what all rays have in common needs it; so `error` has 2 U h.
-inline void enter(const Bvh& bvh, const Ray* rays, const Nearest* nearest, int count, Packet& packet) {
-    static_assert(offsetof(Ray, t_min) == 6 * sizeof(double), "a ray's first four numbers and its next three are loaded at once");
+inline void enter(const Bvh& bvh, const Rays& rays, const Hits& nearest, int count, Packet& packet) {
     packet.count = count;
     double largest = max_component(bvh.half);
     for (int i = 0; i < count; i += 4) {
-        double4 row[2][4];
-        for (int lane = 0; lane < 4; lane++) {
-            int ray = std::min(i + lane, count - 1);
-            const double* numbers = &rays[ray].origin.x;
-            row[0][lane] = load<double4>(numbers), row[1][lane] = load<double4>(numbers + 4);
-            packet.t[i + lane] = nearest[ray].t;
-            packet.name[i + lane] = nearest[ray].name;
-            packet.source[i + lane] = i + lane;
-        }
-        for (auto& rows : row) transpose(rows[0], rows[1], rows[2], rows[3]);
-        double4 origin[3] = {row[0][0], row[0][1], row[0][2]}, d[3] = {row[0][3], row[1][0], row[1][1]}, t_min = row[1][2];
-        double4 size[3], unit[3], from[3], reciprocal[3];
+        double4 origin[3], d[3], t_min = load<double4>(rays.t_min + i), size[3], unit[3], from[3], reciprocal[3];
+        store(packet.t + i, load<double4>(nearest.t + i));
+        store(packet.name + i, load<long4>(nearest.name + i));
+        store(packet.source + i, int4{i, i + 1, i + 2, i + 3});
         for (int axis = 0; axis < 3; axis++) {
+            origin[axis] = load<double4>(rays.origin[axis] + i), d[axis] = load<double4>(rays.direction[axis] + i);
             store(packet.origin[axis] + i, origin[axis]);
             size[axis] = abs(d[axis]);
         }
@@ -167,7 +157,7 @@ inline void enter(const Bvh& bvh, const Ray* rays, const Nearest* nearest, int c
         store(packet.start + i, start);
         store(packet.unit + i, per);
         store(packet.far + i, __builtin_convertvector((end - start) * splat4(1 + 2.5e-7) + splat4(1e-37), float4));
-        for (int lane = 0; lane < 4 && i + lane < count; lane++) packet.key[i + lane] = meets[lane] ? int(key[lane]) : -1;
+        store(packet.key + i, __builtin_convertvector((meets & key) | ~meets, int4));
     }
 }
 

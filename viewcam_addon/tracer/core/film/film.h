@@ -25,14 +25,16 @@ enum Category : uint8_t { COLOR, EMISSION, ENVIRONMENT, DIRECT, INDIRECT, OTHER,
 
 // What one path brings. covered: how much of the world behind all it hides from the eye.
 struct PathLight {
-    Vec3 of[CATEGORIES];
-    double covered = 0;
-    uint8_t brought = 0;  // categories that anything was added to, as bits: the others are not summed
+    double4 of[CATEGORIES];  // the channels, and 0
+    double covered;
+    uint8_t brought;  // categories that anything was added to, as bits: the others hold nothing yet
 
-    void add(Category category, Vec3 rgb) {
-        of[category] += rgb;
+    void clear() { covered = 0, brought = 0; }
+    void add(Category category, double4 rgb) {
+        of[category] = brought >> category & 1 ? of[category] + rgb : rgb;
         brought |= uint8_t(1 << category);
     }
+    void add(Category category, Vec3 rgb) { add(category, double4{rgb.x, rgb.y, rgb.z, 0}); }
 };
 
 // How samples become pixels.
@@ -51,34 +53,34 @@ class Pixel {
 
     // Adds a sample. batch_size: a power of two.
     void add(const PathLight& light, const FilmSettings& film, uint32_t batch_size) {
-        Vec3 shown;
+        double4 shown{};
         for (unsigned brought = light.brought; brought;) {
             int category = take_bit(brought);
             totals_[category] += light.of[category];
             if (category != COLOR && !(film.transparent && category == ENVIRONMENT)) shown += light.of[category];
         }
         if (count_ == 0) first_ = shown;
-        Vec3 difference = shown - first_;
+        double4 difference = shown - first_;
         differences_ += difference;
         spread_ += difference * difference;
         covered_ += light.covered;
         if ((++count_ & (batch_size - 1)) == 0) {
-            Vec3 batch = differences_ - before_;
+            double4 batch = differences_ - before_;
             squares_ += batch * batch;
             before_ = differences_;
         }
     }
 
     // The sum of all samples' differences from the first one, and the variance of one sample; without exposure.
-    Vec3 differences() const { return differences_; }
-    Vec3 sample_variance() const { return max((spread_ - differences_ * differences_ / count_) / (count_ - 1.0), Vec3{}); }
+    Vec3 differences() const { return rgb(differences_); }
+    Vec3 sample_variance() const { return rgb(max((spread_ - differences_ * differences_ / double(count_)) / (count_ - 1.0), double4{})); }
 
-    Vec3 combined(const FilmSettings& film) const { return (first_ + differences_ / count_) * film.exposure; }
+    Vec3 combined(const FilmSettings& film) const { return rgb((first_ + differences_ / double(count_)) * film.exposure); }
     // Of `combined`: that of the batches' means over their number, as if one that has begun had ended.
     Vec3 variance(const FilmSettings& film, uint32_t batch_size) const {
         uint32_t batches = count_ / batch_size;
-        Vec3 sums = (squares_ - before_ * before_ / batches) / (batches - 1);
-        return max(sums, Vec3{}) / batch_size / count_ * (film.exposure * film.exposure);
+        double4 sums = (squares_ - before_ * before_ / double(batches)) / double(batches - 1);
+        return rgb(max(sums, double4{}) / double(batch_size) / double(count_) * (film.exposure * film.exposure));
     }
 
     // random: whether another seed would give another picture; if so, the variance of a single sample is infinite.
@@ -88,7 +90,7 @@ class Pixel {
         write(passes, pixel, film, count_ > 1 ? variance(film, batch_size) : unknown);
     }
     void write(const ViewcamLightPasses& passes, size_t pixel, const FilmSettings& film, Vec3 variance) const {
-        Vec3 color = totals_[COLOR] / count_;
+        Vec3 color = rgb(totals_[COLOR]) / count_;
         store(passes.combined + 4 * pixel, combined(film));
         passes.combined[4 * pixel + 3] = film.transparent ? float(covered_ / count_) : 1.0f;
         auto show = [&](float* pass, Vec3 value) {
@@ -106,12 +108,12 @@ class Pixel {
    private:
     static constexpr uint32_t BATCHES = 16;
 
-    static Vec3 max(Vec3 a, Vec3 b) { return {larger(a.x, b.x), larger(a.y, b.y), larger(a.z, b.z)}; }
+    static Vec3 rgb(double4 channels) { return {channels[0], channels[1], channels[2]}; }
     // No pixel is infinite: float32's largest number is the most.
     static float held(double value) { return value < std::numeric_limits<float>::max() ? float(value) : std::numeric_limits<float>::max(); }
     static void store(float* target, Vec3 rgb) { target[0] = held(rgb.x), target[1] = held(rgb.y), target[2] = held(rgb.z); }
 
-    Vec3 mean(Category category, const FilmSettings& film) const { return totals_[category] / count_ * film.exposure; }
+    Vec3 mean(Category category, const FilmSettings& film) const { return rgb(totals_[category]) / count_ * film.exposure; }
 
     // Light divided by the colour that it fell on; where a channel is black, the mean of the others, as in Cycles.
     static Vec3 without_color(Vec3 light, Vec3 color) {
@@ -124,10 +126,10 @@ class Pixel {
         return {divided[0], divided[1], divided[2]};
     }
 
-    Vec3 totals_[CATEGORIES];
-    Vec3 first_, differences_;  // the first sample, and the sum of all differences from it
-    Vec3 spread_;               // their squares
-    Vec3 before_, squares_;     // the sum of differences when the last batch began, and the batches' own sums, squared
+    double4 totals_[CATEGORIES] = {};
+    double4 first_{}, differences_{};  // the first sample, and the sum of all differences from it
+    double4 spread_{};                 // their squares
+    double4 before_{}, squares_{};     // the sum of differences when the last batch began, and the batches' own sums, squared
     double covered_ = 0;
     uint32_t count_ = 0;
 };

@@ -32,7 +32,7 @@
 #include <vector>
 
 #include "../math/trig.h"
-#include "../math/vec.h"
+#include "../math/simd.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -74,8 +74,8 @@ class Filter {
         : reach_(width * (shape == GAUSSIAN ? Gaussian::REACH : BlackmanHarris::REACH)),
           places_(shape == BOX ? nullptr : shape == GAUSSIAN ? &inverse<Gaussian>() : &inverse<BlackmanHarris>()) {}
 
-    // Pixels from a pixel's lower left corner, ½ being its centre. u: in [0, 1).
-    Vec2 offset(Vec2 u) const { return places_ ? Vec2{offset(u.x), offset(u.y)} : u; }
+    // Pixels from a pixel's lower left corner, ½ being its centre, of four samples. u: in [0, 1).
+    Vec2x4 offset(const Vec2x4& u) const { return places_ ? Vec2x4{offset(u.x), offset(u.y)} : u; }
 
    private:
     // Of the mass to the nearer end, plus LEAST, the first binary digits tell the step.
@@ -87,15 +87,17 @@ class Filter {
         double a, b, c, d;
     };
 
-    double offset(double u) const {
-        auto bits = std::bit_cast<uint64_t>(smaller(u, 1 - u) + LEAST);
-        const Cubic& step = (*places_)[(bits >> DROPPED) - (std::bit_cast<uint64_t>(LEAST) >> DROPPED)];
-        uint64_t rest = bits & ((uint64_t(1) << DROPPED) - 1);
-        double t = (std::bit_cast<double>(rest | std::bit_cast<uint64_t>(1.0)) - 1) * (1 << DIGITS);
-        double place = step.a + t * (step.b + t * (step.c + t * step.d));
-        // Its sign turned beyond the centre, without a branch that half of all numbers would take.
-        auto turn = std::bit_cast<uint64_t>(0.5 - u) & uint64_t(1) << 63;
-        return std::bit_cast<double>(std::bit_cast<uint64_t>(place) ^ turn) * reach_ + 0.5;
+    double4 offset(double4 u) const {
+        auto bits = (ulong4)(min(u, 1.0 - u) + LEAST);
+        ulong4 step = (bits >> DROPPED) - (std::bit_cast<uint64_t>(LEAST) >> DROPPED);
+        auto cubic = [&](int lane) { return load<double4>(&(*places_)[step[lane]]); };
+        double4 a = cubic(0), b = cubic(1), c = cubic(2), d = cubic(3);
+        transpose(a, b, c, d);
+        ulong4 rest = bits & ((uint64_t(1) << DROPPED) - 1);
+        double4 t = ((double4)(rest | std::bit_cast<uint64_t>(1.0)) - 1.0) * double(1 << DIGITS);
+        double4 place = a + t * (b + t * (c + t * d));
+        ulong4 turn = (ulong4)(0.5 - u) & uint64_t(1) << 63;  // its sign, beyond the centre
+        return (double4)((ulong4)place ^ turn) * reach_ + 0.5;
     }
 
     template <class Shape> static const std::vector<Cubic>& inverse() {

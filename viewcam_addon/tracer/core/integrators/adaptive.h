@@ -64,6 +64,12 @@ class TileSampler {
         uint32_t row, column, height, width;
         std::vector<Pixel> pixels;  // place: row · TILE + column
     };
+    // A few samples of each of some pixels, and what they bring.
+    struct Group {
+        CameraSamples samples;
+        double columns[PathIntegrator::MOST], rows[PathIntegrator::MOST];  // on the film
+        PathLight light[PathIntegrator::MOST];
+    };
     // What a pixel's samples tell of its mean: s²/N and D²/4, the mean of the channels.
     struct Spread {
         double sample = 0, own = 0, apart = 0;
@@ -93,26 +99,27 @@ class TileSampler {
     }
     void sample_group(Tile& tile, const uint16_t* group, uint32_t size, uint32_t begin, uint32_t end, uint32_t batch,
                       const volatile int* stop) const {
-        CameraSample samples[PathIntegrator::MOST];
-        Ray rays[PathIntegrator::MOST];
-        PathLight light[PathIntegrator::MOST];
-        const SobolSampler& sampler = integrator_.sampler();
+        auto& [samples, columns, rows, light] = of_this_thread<Group>();
         uint32_t at_a_time = PathIntegrator::MOST / size;
         for (uint32_t first = begin; first < end && !(stop && *stop); first += at_a_time) {
             uint32_t last = std::min(first + at_a_time, end);
             int count = 0;
-            for (uint32_t k = 0; k < size; k++) {
-                uint32_t place = group[k], number = pixel(tile, place), key = sampler.key(number);
-                SobolSampler::Scramble scramble[] = {sampler.scramble(key, 0), sampler.scramble(key, 1)};
+            for (uint32_t k = 0; k < size; k++)
                 for (uint32_t i = first; i < last; i++) {
-                    Vec2 u{sampler.number(scramble[0], i, 0), sampler.number(scramble[1], i, 1)};
-                    Vec2 offset = samples_ > 1 ? filter_.offset(u) : Vec2{0.5, 0.5};
-                    double column = tile.column + place % TILE + offset.x, row = tile.row + place / TILE + offset.y;
-                    samples[count] = {number, i};
-                    rays[count++] = camera_.ray(column, row);
+                    samples.pixel[count] = pixel(tile, group[k]), samples.number[count] = i;
+                    columns[count] = tile.column + group[k] % TILE, rows[count++] = tile.row + group[k] / TILE;
                 }
+            const SobolSampler& sampler = integrator_.sampler();
+            for (int i = 0; i < count; i += 4) {
+                uint4 key = sampler.key(load<uint4>(samples.pixel + i));
+                store(samples.key + i, key);
+                Vec2x4 offset{splat4(0.5), splat4(0.5)};
+                if (samples_ > 1) offset = filter_.offset(sampler.pair(key, load<uint4>(samples.number + i), 0));
+                store(columns + i, load<double4>(columns + i) + offset.x);
+                store(rows + i, load<double4>(rows + i) + offset.y);
             }
-            integrator_.trace(samples, rays, count, light);
+            camera_.rays(columns, rows, count, samples.rays);
+            integrator_.trace(samples, count, light);
             for (int i = 0; i < count; i++) tile.pixels[group[uint32_t(i) / (last - first)]].add(light[i], film_, batch);
         }
     }

@@ -34,9 +34,12 @@ struct GeometryHits {
     uint32_t *object, *primitive;
 };
 
-// What up to 64 rays met, written as Cycles writes it, also where that is nothing. pixels: where in the planes.
-inline void write_geometry(const Scene& scene, const Ray* rays, const Hit* hits, int count, const GeometryPasses& passes, const size_t* pixels) {
+// What up to 64 rays met, written as Cycles writes it, also where that is nothing. ray_of(i), hit_of(i): each. pixels: where in
+// the planes.
+template <class RayOf, class HitOf>
+inline void write_geometry(const Scene& scene, const RayOf& ray_of, const HitOf& hit_of, int count, const GeometryPasses& passes, const size_t* pixels) {
     constexpr double BACKGROUND_DEPTH = 1e10;
+    Ray rays[PACKET];
     const Ray* met_by[PACKET];
     Hit met[PACKET];
     size_t at[PACKET], beside[PACKET];
@@ -44,8 +47,8 @@ inline void write_geometry(const Scene& scene, const Ray* rays, const Hit* hits,
     double magnitudes[PACKET];
     int some = 0, none = 0;
     for (int i = 0; i < count; i++) {
-        if (hits[i])
-            met_by[some] = &rays[i], met[some] = hits[i], at[some++] = pixels[i];
+        if (Hit hit = hit_of(i))
+            rays[some] = ray_of(i), met_by[some] = &rays[some], met[some] = hit, at[some++] = pixels[i];
         else
             beside[none++] = pixels[i];
     }
@@ -105,7 +108,8 @@ inline void slopes_at(const Scene& scene, double column, double row, const Hit& 
 template <class Trace> void for_pixel_centers(const Camera& camera, uint32_t begin, uint32_t end, const volatile int* stop, const Trace& trace) {
     constexpr uint32_t WIDTH = 16, HEIGHT = 4;
     static_assert(WIDTH * HEIGHT <= PACKET);
-    Ray rays[WIDTH * HEIGHT];
+    Rays& rays = of_this_thread<Rays>();
+    double columns[WIDTH * HEIGHT] = {}, rows[WIDTH * HEIGHT] = {};
     size_t pixels[WIDTH * HEIGHT];
     for (uint32_t first_row = begin; first_row < end; first_row += HEIGHT)
         for (uint32_t first_column = 0; first_column < camera.width; first_column += WIDTH) {
@@ -114,8 +118,9 @@ template <class Trace> void for_pixel_centers(const Camera& camera, uint32_t beg
             for (uint32_t row = first_row; row < std::min(first_row + HEIGHT, end); row++)
                 for (uint32_t column = first_column; column < std::min(first_column + WIDTH, camera.width); column++) {
                     pixels[count] = size_t(row) * camera.width + column;
-                    rays[count++] = camera.ray(column + 0.5, row + 0.5);
+                    columns[count] = column + 0.5, rows[count++] = row + 0.5;
                 }
+            camera.rays(columns, rows, count, rays);
             trace(rays, pixels, count);
         }
 }
@@ -124,18 +129,20 @@ inline void render_geometry(
     const Scene& scene, uint32_t begin, uint32_t end, const GeometryPasses& passes, const GeometryHits& ends, const volatile int* stop
 ) {
     const bool has_passes = passes.any();
-    for_pixel_centers(scene.camera, begin, end, stop, [&](const Ray* rays, const size_t* pixels, int count) {
-        Hit hits[PACKET];
+    for_pixel_centers(scene.camera, begin, end, stop, [&](const Rays& rays, const size_t* pixels, int count) {
+        Hits& hits = of_this_thread<Hits>();
         scene.closest(rays, count, CAMERA, hits);
-        if (has_passes) write_geometry(scene, rays, hits, count, passes, pixels);
-        for (int i = 0; ends.depth && i < count; i++)
-            ends.depth[pixels[i]] = hits[i].t, ends.object[pixels[i]] = hits[i].object, ends.primitive[pixels[i]] = hits[i].primitive;
+        if (has_passes) write_geometry(scene, [&](int i) { return rays.ray(i); }, [&](int i) { return hits.hit(i); }, count, passes, pixels);
+        for (int i = 0; ends.depth && i < count; i++) {
+            Hit hit = hits.hit(i);
+            ends.depth[pixels[i]] = hit.t, ends.object[pixels[i]] = hit.object, ends.primitive[pixels[i]] = hit.primitive;
+        }
     });
 }
 
 // Of each pixel of a camera whether its centre shows anything at all.
 inline void silhouette(const Scene& scene, const Camera& camera, uint8_t* covered) {
-    for_pixel_centers(camera, 0, camera.height, nullptr, [&](const Ray* rays, const size_t* pixels, int count) {
+    for_pixel_centers(camera, 0, camera.height, nullptr, [&](const Rays& rays, const size_t* pixels, int count) {
         bool found[PACKET];
         scene.occluded(rays, count, found);
         for (int i = 0; i < count; i++) covered[pixels[i]] = found[i];

@@ -22,6 +22,9 @@
 // Which of several surfaces in one place a ray of a float32 renderer meets, and which of them shadows the other, is its rounding's
 // choice. What light depends on that can be asked for: then that alone counts which comes by such a place, as much of it as all
 // surfaces there would scatter, none of which shadows another. No choice of a renderer's brings more, and any brings at least nothing.
+// So it is with light that shadow rays find and scattered rays do not, or the reverse (an object that only some kinds of rays see, a
+// material that asks which kind has come, a lamp without shadows): how much of it a picture has is its renderer's own weights of multiple
+// importance sampling, which elsewhere make no difference.
 //
 // Rejected: splitting a path at glass, which makes work where light is faint.
 #pragma once
@@ -46,14 +49,15 @@ inline Ray shadow_ray(const Interaction& point, const LightSample& sample) {
     return {origin, sample.direction, 0, larger(sample.distance - slack, 0.0)};
 }
 
-// A sample of a pixel, row · width + column.
-struct CameraSample {
-    uint32_t pixel, number;
+// Samples of pixels, row · width + column, with the keys of these and the rays from the eye.
+struct CameraSamples {
+    uint32_t pixel[PACKET], number[PACKET], key[PACKET];
+    Rays rays;
 };
 
 class PathIntegrator {
    public:
-    static constexpr int MOST = 64;  // paths at a time
+    static constexpr int MOST = PACKET;  // paths at a time
 
     // bounces: of the scene, or none at level `direct`. coincident: 0 for all light, or how many of float32's roundings apart
     // surfaces are in one place, for what comes by these alone.
@@ -80,12 +84,19 @@ class PathIntegrator {
         shadow_linked_ = shines && scene.is_shadow_linked();
         for (const ValueNode& node : scene.illumination.nodes.all) has_pixels_ |= std::holds_alternative<BumpNode>(node);
         dark_ = !shines && !transparent_;
+        sees_otherwise_ = std::any_of(scene.objects.begin(), scene.objects.end(), [&](const Object& object) {
+            return (object.visible & kinds_) != (object.visible & SHADOW ? kinds_ : 0);
+        });
+        for (const Lamp& lamp : scene.illumination.lamps) sees_otherwise_ |= !lamp.casts_shadow;
+        for (const Material& material : scene.illumination.materials) sees_otherwise_ |= material.is_transparent() && !material.transparent_shadow;
+        for (const ValueNode& node : scene.illumination.nodes.all) sees_otherwise_ |= transparent_ && std::holds_alternative<LightPathNode>(node);
         lit_ = !scene.illumination.lamps.empty() || shines || !is_black(lights_.environment().radiance);
     }
 
     const SobolSampler& sampler() const { return sampler_; }
     const Scene& scene() const { return scene_; }
-    // Two objects, which may be one, that paths have met in one place, and how often.
+    // Two objects, which may be one, that paths have met in one place, and how often; with NONE in the place of the second, an object
+    // that shadow rays see otherwise than others, and with NONE in that of the first, a lamp without shadows.
     std::map<std::pair<uint32_t, uint32_t>, uint64_t> coincident_pairs() const {
         std::lock_guard lock(mutex_);
         return pairs_;
@@ -99,17 +110,17 @@ class PathIntegrator {
         return lit_ && random;
     }
 
-    // The light of up to 64 paths, each with its ray from the eye.
-    void trace(const CameraSample* samples, const Ray* rays, int count, PathLight* light) const {
+    // The light of up to 64 paths.
+    void trace(const CameraSamples& samples, int count, PathLight* light) const {
         Block& block = of_this_thread<Block>();
-        block.light = light;
+        block.samples = &samples, block.light = light;
         block.live = 0;
-        std::fill_n(light, count, PathLight{});
-        start(samples, rays, count, block);
+        for (int i = 0; i < count; i++) light[i].clear();
+        start(count, block);
         for (int depth = 1; block.live > 0; depth++) {
-            scatter(samples, depth, block);
+            scatter(depth, block);
             gather(depth, block);
-            arrive(samples, depth, block);
+            arrive(depth, block);
         }
     }
 
@@ -146,12 +157,14 @@ class PathIntegrator {
         Vec3 light, other;  // other: of what is not diffuse where the eye sees it
     };
     struct Block {
+        const CameraSamples* samples;
         PathLight *light, ignored;
         int live = 0, lit[LightSampler::ASKED] = {};
         Path paths[MOST], onwards[MOST];
         Interaction tables[2][MOST], *points = tables[0], *next_points = tables[1];
         Shadowed shadowed[LightSampler::ASKED][MOST];  // by the light that was asked
-        Ray shadow_rays[LightSampler::ASKED][MOST];
+        Rays shadow_rays[LightSampler::ASKED];
+        Hits hits;
     };
 
     static int row(RayKind kind) { return kind == DIFFUSE ? 0 : kind == GLOSSY ? 1 : 2; }
@@ -166,13 +179,56 @@ class PathIntegrator {
     PathLight& light_of(const Path& path, Block& block) const {
         return coincident_ > 0 && !path.coincident ? block.ignored : block.light[path.sample];
     }
+    // The same of light that a path has met at a distance, |cos| to the surface that shines, and that a shadow ray could have found, too.
+    PathLight& light_of(const Path& path, double distance, double cosine, const Light* lamp, int depth, Block& block) const {
+        if (coincident_ > 0 && sees_otherwise_ && !path.coincident && path.kind != CAMERA && path.pdf < INFINITE) {
+            Ray ray = shadow_ray(block.points[path.from], {path.ray.direction, distance, {}, 0, cosine});
+            RayState state{path.kind, path.diffuse, false, depth, path.passed, path.scattered, 0, path.width};
+            if (left_by_kinds(ray, lamp, state).differ()) return block.light[path.sample];
+        }
+        return light_of(path, block);
+    }
+    // What shadow rays, and scattered rays, leave of a light.
+    struct LeftByKinds {
+        Vec3 shadow{1, 1, 1}, scattered{1, 1, 1};
+        bool differ() const { return !VIEWCAM_ISA::is_black(shadow - scattered); }
+    };
+    // The same along a ray, and notes what makes the difference. lamp: null where a surface or the sky shines. state: of the scattered ray.
+    [[gnu::noinline]] LeftByKinds left_by_kinds(const Ray& ray, const Light* lamp, const RayState& state) const {
+        static thread_local std::vector<Hit> hits;
+        scene_.surfaces(ray, RayKind(state.kind | SHADOW), INFINITE, hits);
+        RayState shadow = state;
+        shadow.kind = SHADOW, shadow.diffuse = false;
+        bool shadows = !lamp || lamp->casts_shadow;
+        LeftByKinds left;
+        uint32_t cause = NONE;
+        for (const Hit& hit : hits) {
+            Vec3 by_shadow = shadows ? left_behind(ray, hit, shadow) : Vec3{1, 1, 1}, by_scattered = left_behind(ray, hit, state);
+            if (cause == NONE && !VIEWCAM_ISA::is_black(by_shadow - by_scattered)) cause = hit.object;
+            left.shadow *= by_shadow, left.scattered *= by_scattered;
+        }
+        if (left.differ()) {
+            std::lock_guard lock(mutex_);
+            pairs_[shadows ? std::pair(cause, NONE) : std::pair(NONE, lamp->number)]++;
+        }
+        return left;
+    }
+    // What a surface leaves of light that comes along a ray through it.
+    Vec3 left_behind(const Ray& ray, const Hit& hit, RayState state) const {
+        if (!(scene_.objects[hit.object].visible & state.kind)) return {1, 1, 1};
+        Interaction point = scene_.interaction(ray, hit);
+        const Material& made_of = material(point);
+        if (!made_of.is_transparent() || (state.kind == SHADOW && !made_of.transparent_shadow)) return {};
+        state.length = hit.t * length(ray.direction);
+        return made_of.bsdf(scene_.shading(point, ray.direction, state)).transparency();
+    }
     // By how much rounding may move a surface along a ray that meets it, in world units. size: of what is rounded.
     double coincident_reach(double size, double cosine) const {
         constexpr double FLOAT32 = 0x1p-24, GRAZED = 0.05;
         return coincident_ * FLOAT32 * size / larger(cosine, GRAZED);
     }
     // Where several surfaces lie in the place of what a path has met: one of them, by chance, in the place of all.
-    [[gnu::noinline]] void meet_coincident(Path& path, const Ray& ray, Hit& hit, Interaction& point, const CameraSample& sample, int depth) const {
+    [[gnu::noinline]] void meet_coincident(Path& path, const Ray& ray, Hit& hit, Interaction& point, int depth, const Block& block) const {
         constexpr double PARALLEL = 0.1;
         static thread_local std::vector<Hit> hits;
         const Ray* met_by = &ray;
@@ -190,7 +246,7 @@ class PathIntegrator {
             for (size_t i = 1; i < hits.size(); i++) pairs_[std::minmax(hits[0].object, hits[i].object)]++;
         }
         // Any number does that the sampler does not use for anything else.
-        uint32_t chosen = ((sample.pixel * 0x9e3779b9u ^ sample.number) * 0x85ebca6bu ^ uint32_t(depth)) * 0xc2b2ae35u >> 16;
+        uint32_t chosen = ((block.samples->pixel[path.sample] * 0x9e3779b9u ^ block.samples->number[path.sample]) * 0x85ebca6bu ^ uint32_t(depth)) * 0xc2b2ae35u >> 16;
         hit = hits[chosen % hits.size()];
         point = scene_.interaction(ray, hit);
         point.offset = larger(point.offset, 2 * reach * larger(point.cosine, 0.0));
@@ -232,15 +288,19 @@ class PathIntegrator {
         return path.weight * material(at.point).emission(at) * share;
     }
 
+    // A path's number in [0, 1) of a dimension.
+    double number(const Path& path, int dimension, const Block& block) const {
+        return sampler_.number(block.samples->key[path.sample], block.samples->number[path.sample], dimension);
+    }
     bool has_ended(const Path& path) const { return path.passed > 0 && path.passed >= ended_after_; }
 
     // Whether a path goes straight through a surface; what it brings from now on is weighted by the chance of that. u: a number in
     // [0, 1) that chooses, or −1 where none has been made yet.
-    bool passes(Path& path, const BSDF& bsdf, const CameraSample& sample, int depth, double& u) const {
+    bool passes(Path& path, const BSDF& bsdf, int depth, double& u, const Block& block) const {
         double chance = path.last ? !is_black(bsdf.transparency()) : bsdf.chance_through();
         if (!(chance > 0)) return false;
         if (chance < 1) {
-            if (u < 0) u = sampler_.number(sampler_.key(sample.pixel), sample.number, SobolSampler::dimension(depth + 1, SobolSampler::THROUGH));
+            if (u < 0) u = number(path, SobolSampler::dimension(depth + 1, SobolSampler::THROUGH), block);
             if (u >= chance) {
                 path.weight = min(path.weight / (1 - chance), MOST_WEIGHT);
                 u = (u - chance) / (1 - chance);
@@ -254,19 +314,20 @@ class PathIntegrator {
     }
     // Takes a path from the first surface that its ray meets through all that lets it through, and adds what shines there. Whether it
     // is scattered at `point`, where it then is. depth: how often it has been scattered.
-    bool follow(Path& path, Ray ray, Hit hit, Interaction& point, const CameraSample& sample, int depth, Block& block) const {
+    bool follow(Path& path, Ray ray, Hit hit, Interaction& point, int depth, Block& block) const {
         for (double u = -1;;) {
-            if (coincident_ > 0) meet_coincident(path, ray, hit, point, sample, depth + path.passed);
-            PathLight& light = light_of(path, block);
+            if (coincident_ > 0) meet_coincident(path, ray, hit, point, depth + path.passed, block);
             const Material& made_of = material(point);
             ShadingPoint at = arriving(point, path, depth);
-            if (made_of.emits() && (!shadow_linked_ || path.kind == CAMERA || scene_.objects[point.object].shadow_rays == SHADOW))
+            if (made_of.emits() && (!shadow_linked_ || path.kind == CAMERA || scene_.objects[point.object].shadow_rays == SHADOW)) {
+                PathLight& light = light_of(path, hit.t, point.cosine, nullptr, depth, block);
                 light.add(path.kind == CAMERA ? EMISSION : path.category, emission(path, at, hit.t, block));
+            }
             if (has_ended(path)) return false;
             if (!made_of.is_transparent()) return made_of.scatters() && !path.last;
             BSDF bsdf = made_of.bsdf(at);
             if (path.kind == CAMERA) block.light[path.sample].add(COLOR, path.weight * bsdf.diffuse_color());
-            if (!passes(path, bsdf, sample, depth, u)) return made_of.scatters() && !path.last;
+            if (!passes(path, bsdf, depth, u, block)) return made_of.scatters() && !path.last;
             ray.t_min = hit.t;
             hit = scene_.closest(ray, path.kind);
             meet_lamps(path, ray, hit, depth, block);
@@ -282,9 +343,16 @@ class PathIntegrator {
         if (!lights_.meets_lamps(path.kind)) return;
         double size = path.kind == CAMERA ? length(ray.direction) : 1;
         LightRay seen{ray.origin, ray.direction / size, ray.t_min * size, smaller(ray.t_max, hit.t) * size, !hit, path.kind == CAMERA ? scene_.camera.t_min * size : 0};
-        Vec3 radiance = path.kind == CAMERA ? lights_.le(seen, CAMERA)
-                                            : lights_.le(seen, path.kind, block.points[path.from], path.pdf, depth == 1, path.through);
-        light_of(path, block).add(path.kind == CAMERA ? EMISSION : path.category, path.weight * radiance);
+        if (path.kind == CAMERA) return light_of(path, block).add(EMISSION, path.weight * lights_.le(seen, CAMERA));
+        Vec3 sum;
+        lights_.each_lamp(seen, path.kind, block.points[path.from], path.pdf, depth == 1, path.through, [&](const Light& lamp, Vec3 radiance, double distance) {
+            if (lamp.shadow_rays != SHADOW) return;
+            if (coincident_ > 0)
+                light_of(path, distance, 1, &lamp, depth, block).add(path.category, path.weight * radiance);
+            else
+                sum += radiance;
+        });
+        light_of(path, block).add(path.category, path.weight * sum);
     }
     // Adds what lights with blockers of their own bring along a path's ray: whatever else it meets, only these stand before them.
     [[gnu::noinline]] void meet_shadow_linked(const Path& path, int depth, Block& block) const {
@@ -303,13 +371,13 @@ class PathIntegrator {
             ShadingPoint at = arriving(point, path, depth);
             add(emission(path, at, hit.t, block), hit.t, std::fabs(dot(point.normal, ray.direction)), object.shadow_rays);
         }
-        lights_.each_shadow_linked({ray.origin, ray.direction, 0, INFINITE, true}, path.kind, from, path.pdf, depth == 1, path.through, [&](const Light& lamp, Vec3 radiance, double distance) {
-            add(path.weight * radiance, distance, 1, lamp.casts_shadow ? lamp.shadow_rays : NO_RAY);
+        if (lights_.is_shadow_linked()) lights_.each_lamp({ray.origin, ray.direction, 0, INFINITE, true}, path.kind, from, path.pdf, depth == 1, path.through, [&](const Light& lamp, Vec3 radiance, double distance) {
+            if (lamp.shadow_rays != SHADOW) add(path.weight * radiance, distance, 1, lamp.casts_shadow ? lamp.shadow_rays : NO_RAY);
         });
     }
     // Adds what the world brings to a path that leaves the scene.
     void leave(const Path& path, const Ray& ray, int depth, Block& block) const {
-        PathLight& light = light_of(path, block);
+        PathLight& light = lights_.has_sky() ? light_of(path, INFINITE, 1, nullptr, depth, block) : light_of(path, block);
         if (path.kind == CAMERA) {
             const auto& backdrop = scene_.illumination.backdrop;
             light.add(ENVIRONMENT, path.weight * (backdrop ? *backdrop : lights_.environment()).le(normalize(ray.direction), CAMERA));
@@ -342,36 +410,39 @@ class PathIntegrator {
     }
 
     // What the eye's rays come to, and the light that is of this alone.
-    void start(const CameraSample* samples, const Ray* rays, int count, Block& block) const {
+    void start(int count, Block& block) const {
+        Ray rays[MOST];
         Hit hits[MOST];
         const Ray* met_by[MOST];
-        int from[MOST], met = 0;
-        scene_.closest(rays, count, CAMERA, hits);
+        int met = 0;
+        scene_.closest(block.samples->rays, count, CAMERA, block.hits);
         for (int i = 0; i < count; i++) {
+            Ray& ray = rays[met] = block.samples->rays.ray(i);
+            Hit& hit = hits[met] = block.hits.hit(i);
             Path& path = block.paths[met];  // the rest is known when it is scattered
             path.sample = i, path.from = met;
             path.category = COLOR, path.kind = CAMERA, path.last = path.diffuse = false, path.pdf = INFINITE, path.passed = 0;
             path.scattered = {}, path.inside = NONE, path.touches = path.coincident = false;
             path.weight = {1, 1, 1};
-            meet_lamps(path, rays[i], hits[i], 0, block);
-            if (!hits[i]) {
-                leave(path, rays[i], 0, block);
+            meet_lamps(path, ray, hit, 0, block);
+            if (!hit) {
+                leave(path, ray, 0, block);
                 continue;
             }
             block.light[i].covered = 1;
-            from[met] = i, met_by[met] = &rays[i], hits[met++] = hits[i];
+            met_by[met++] = &ray;
         }
         scene_.interactions(met_by, hits, met, block.points);
         for (int k = 0; k < met; k++) {
             Path& path = block.paths[block.live];
             if (block.live < k) path = block.paths[k];
             path.ray.direction = normalize(met_by[k]->direction);
-            if (follow(path, *met_by[k], hits[k], block.points[k], samples[from[k]], 0, block)) block.live++;
+            if (follow(path, *met_by[k], hits[k], block.points[k], 0, block)) block.live++;
         }
     }
 
     // Adds what lights may bring to all points where paths are, and finds the rays on which they go on.
-    void scatter(const CameraSample* samples, int depth, Block& block) const {
+    void scatter(int depth, Block& block) const {
         int onwards = 0;
         for (int& lit : block.lit) lit = 0;
         for (int i = 0; i < block.live; i++) {
@@ -382,13 +453,10 @@ class PathIntegrator {
             BSDF bsdf = made_of.bsdf(at);
             if (depth == 1 && !made_of.is_transparent()) block.light[path.sample].add(COLOR, path.weight * bsdf.diffuse_color());
             if (bsdf.is_black() || !lit_) continue;
-            const CameraSample& sample = samples[path.sample];
-            uint32_t key = sampler_.key(sample.pixel);
-            auto number = [&](SobolSampler::Purpose purpose) {
-                return sampler_.number(key, sample.number, SobolSampler::dimension(depth, purpose));
-            };
+            auto number = [&](SobolSampler::Purpose purpose) { return this->number(path, SobolSampler::dimension(depth, purpose), block); };
             auto pair = [&](SobolSampler::Purpose purpose) {
-                return sampler_.pair(key, sample.number, SobolSampler::dimension(depth, purpose));
+                int dimension = SobolSampler::dimension(depth, purpose);
+                return Vec2{this->number(path, dimension, block), this->number(path, dimension + 1, block)};
             };
             bool total_used = depth >= most_;
             uint32_t leading = 0, last = 0;  // kinds of rays that can bring anything, and those on which the path ends
@@ -456,24 +524,51 @@ class PathIntegrator {
         // Light that the smooth surface has before it and the true one behind it counts, less what scattered rays would have found:
         // these are lost, as in Cycles.
         bool behind = !(dot(point.normal, sample.direction) > 0);
+        double end = coincident_ > 0 && choice.light->mesh() ? coincident_end(point, sample) : 0;
+        uint32_t kinds = ~choice.light->hidden_from, unseen = 0;  // unseen: for which no scattered ray finds what this one does
+        bool hidden_from_some = coincident_ > 0 && !path.coincident && end == 0;
+        if (hidden_from_some) {
+            kinds &= bsdf.spread_kinds();
+            see_otherwise(*choice.light, point, sample, path, depth, kinds, unseen);
+            if (!kinds) return;
+        }
         auto weight = [&](RayKind kind, auto&& pdf) {
+            if (unseen & kind) return 1.0;
             bool is_lost = behind != (kind == TRANSMISSION);
-            return (is_lost && choice.light->multiple_importance) || choice.light->is_found_by(kind) ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1;
+            return (is_lost && choice.light->multiple_importance) || choice.light->is_found_by(kind) ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1.0;
         };
-        ScatteredLight light = bsdf.eval(sample.direction, ~choice.light->hidden_from, weight);
+        ScatteredLight light = bsdf.eval(sample.direction, kinds, weight);
         if (depth > 1) light.diffuse += light.other, light.other = {};
         light.diffuse = light.diffuse * sample.weight, light.other = light.other * sample.weight;
         if (is_black(light.diffuse) && is_black(light.other)) return;
-        double end = coincident_ > 0 && choice.light->mesh() ? coincident_end(point, sample) : 0;
-        if (coincident_ > 0 && !path.coincident && end == 0) return;
         int place = block.lit[choice.slot]++;
-        bool traced = choice.light->casts_shadow;
+        bool traced = choice.light->casts_shadow && !hidden_from_some;
         block.shadowed[choice.slot][place] = {path.sample, after(path.category, true, depth), traced, choice.light->shadow_rays, {SHADOW, false, false, depth, path.passed, path.scattered},
                                               light.diffuse * path.weight / choice.chance, light.other * path.weight / choice.chance};
         if (has_pixels_) block.shadowed[choice.slot][place].ray.width = at.footprint();
         if (!traced) return;
-        Ray& ray = block.shadow_rays[choice.slot][place] = shadow_ray(point, sample);
+        Ray ray = shadow_ray(point, sample);
         if (end > 0) ray.t_max = larger(smaller(ray.t_max, sample.distance - end), 0.0);
+        block.shadow_rays[choice.slot].set(place, ray);
+    }
+
+    // Leaves of kinds of rays those that see a light otherwise than shadow rays do. unseen: receives those of them that don't see it.
+    [[gnu::noinline]] void see_otherwise(const Light& light, const Interaction& point, const LightSample& sample, const Path& path, int depth, uint32_t& kinds,
+                                         uint32_t& unseen) const {
+        bool found_both_ways = light.is_sized() && light.multiple_importance && light.shadow_rays == SHADOW;
+        if (!sees_otherwise_ || !found_both_ways) {
+            kinds = 0;
+            return;
+        }
+        const Light* lamp = light.mesh() || light.is_environment() ? nullptr : &light;
+        for (RayKind kind : {DIFFUSE, GLOSSY, TRANSMISSION}) {
+            if (!(kinds & kind)) continue;
+            RayState state{kind, kind == DIFFUSE, false, depth, path.passed, path.scattered};
+            state.scattered[row(kind)]++;
+            LeftByKinds left = left_by_kinds(shadow_ray(point, sample), lamp, state);
+            if (!left.differ()) kinds &= ~kind;
+            if (VIEWCAM_ISA::is_black(left.scattered)) unseen |= kind;
+        }
     }
 
     // Sends the shadow rays, and adds the light that nothing hides.
@@ -481,20 +576,22 @@ class PathIntegrator {
         for (int slot = 0; slot < LightSampler::ASKED; slot++) {
             int count = block.lit[slot];
             bool hidden[MOST];
-            const Ray* rays = block.shadow_rays[slot];
+            Rays& rays = block.shadow_rays[slot];
             const Shadowed* shadowed = block.shadowed[slot];
             auto is_plain = [](const Shadowed& one) { return one.traced && one.shadow_rays == SHADOW; };
-            if (count > 0 && depth == 1 && std::all_of(shadowed, shadowed + count, is_plain))
+            if (count > 0 && depth == 1 && std::all_of(shadowed, shadowed + count, is_plain)) {
+                rays.fill(count);
                 scene_.occluded(rays, count, hidden);
-            else
-                for (int i = 0; i < count; i++) hidden[i] = shadowed[i].traced && scene_.occluded(rays[i], shadowed[i].shadow_rays);
+            } else {
+                for (int i = 0; i < count; i++) hidden[i] = shadowed[i].traced && scene_.occluded(rays.ray(i), shadowed[i].shadow_rays);
+            }
             for (int i = 0; i < count; i++) {
                 PathLight& light = block.light[shadowed[i].sample];
                 if (!hidden[i]) {
                     light.add(shadowed[i].category, shadowed[i].light);
                     light.add(OTHER, shadowed[i].other);
                 } else if (transparent_) {
-                    Vec3 left = transmittance(rays[i], shadowed[i].shadow_rays, shadowed[i].ray);
+                    Vec3 left = transmittance(rays.ray(i), shadowed[i].shadow_rays, shadowed[i].ray);
                     light.add(shadowed[i].category, shadowed[i].light * left);
                     light.add(OTHER, shadowed[i].other * left);
                 }
@@ -536,7 +633,7 @@ class PathIntegrator {
     }
 
     // Where rays come to; adds what shines there.
-    void arrive(const CameraSample* samples, int depth, Block& block) const {
+    void arrive(int depth, Block& block) const {
         const Ray* met_by[MOST];
         Hit hits[MOST];
         int arrived[MOST], met = 0;
@@ -562,7 +659,7 @@ class PathIntegrator {
         for (int k = 0; k < met; k++) {
             Path& path = block.onwards[arrived[k]];
             if (path.inside != NONE && path.inside != hits[k].object) let_out_first(path, hits[k], block.next_points[k]);
-            if (!follow(path, path.ray, hits[k], block.next_points[k], samples[path.sample], depth, block)) continue;
+            if (!follow(path, path.ray, hits[k], block.next_points[k], depth, block)) continue;
             block.paths[live] = path;
             block.paths[live].from = k;
             live++;
@@ -581,6 +678,7 @@ class PathIntegrator {
     bool lit_, transparent_ = false, mixed_ = false;  // whether materials let anything straight through, and beside that scatter
     bool dark_;                                       // whether nothing shines but lamps and the sky, and nothing lets light through
     bool shadow_linked_ = false;                      // whether the light of surfaces has blockers of its own
+    bool sees_otherwise_ = false;                     // whether shadow rays may find a light where scattered rays don't, or the reverse
     bool has_pixels_ = false;                         // whether materials ask how wide pixels are
     int most_passed_, ended_after_;                   // surfaces that shadow rays, and paths, go straight through
     uint32_t kinds_ = 0, spread_ = 0;  // of rays that any material scatters, and all over

@@ -22,6 +22,7 @@ class Light {
     bool multiple_importance = true;  // whether rays run into it, where it has a size
     uint64_t receivers;
     RayKind shadow_rays;
+    uint32_t number = NONE;  // of lamps, in the scene
 
     // part: one number more in [0, 1), of those that have parts.
     LightSample sample_li(const Interaction& from, double part, Vec2 u) const {

@@ -18,6 +18,9 @@ typedef float float8 __attribute__((vector_size(32)));
 typedef int32_t int8 __attribute__((vector_size(32)));
 typedef double double4 __attribute__((vector_size(32)));
 typedef int64_t long4 __attribute__((vector_size(32)));
+typedef uint64_t ulong4 __attribute__((vector_size(32)));
+typedef int32_t int4 __attribute__((vector_size(16)));
+typedef uint32_t uint4 __attribute__((vector_size(16)));
 
 template <class V, class T> inline V load(const T* from) {
     V v;
@@ -29,6 +32,7 @@ template <class V, class T> inline void store(T* to, V v) { std::memcpy(to, &v, 
 inline float8 splat8(float x) { return float8{x, x, x, x, x, x, x, x}; }
 inline double4 splat4(double x) { return double4{x, x, x, x}; }
 inline long4 splat4(int64_t x) { return long4{x, x, x, x}; }
+inline uint4 splat4(uint32_t x) { return uint4{x, x, x, x}; }
 
 #if defined(__AVX__)
 inline float8 min(float8 a, float8 b) { return (float8)_mm256_min_ps((__m256)a, (__m256)b); }
@@ -86,7 +90,7 @@ inline double4 abs(double4 a) { return (double4)((long4)a & splat4(INT64_MAX)); 
 inline double4 copysign(double4 size, double4 sign) {
     return (double4)(((long4)size & splat4(INT64_MAX)) | ((long4)sign & splat4(INT64_MIN)));
 }
-inline double4 select(long4 mask, double4 a, double4 b) { return (double4)((mask & (long4)a) | (~mask & (long4)b)); }
+inline double4 select(long4 mask, double4 a, double4 b) { return mask ? a : b; }
 
 inline double4 sqrt(double4 a) {
 #if defined(__AVX__)
@@ -96,7 +100,12 @@ inline double4 sqrt(double4 a) {
 #endif
 }
 
+// As a number, exactly: words become signed by their highest bit, which is added again.
+inline double4 number_of(uint4 words) { return __builtin_convertvector((int4)(words ^ 0x80000000u), double4) + splat4(0x1p31); }
+inline double number_of(uint32_t word) { return word; }
+
 // Four vectors: their coordinates in one register each.
+using Vec2x4 = Vec2Of<double4>;
 using Vec3x4 = Vec3Of<double4>;
 
 inline Vec3x4 splat4(Vec3 v) { return {splat4(v.x), splat4(v.y), splat4(v.z)}; }
@@ -116,6 +125,17 @@ template <class Of> inline auto gather4(const Of& of) {
         return double4{of(0), of(1), of(2), of(3)};
     }
 }
+
+// A number or a vector in the type that a formula is computed in, for one or for four at once.
+template <class T> inline T splat(double x) {
+    if constexpr (std::is_same_v<T, double4>)
+        return splat4(x);
+    else
+        return x;
+}
+template <class T> inline Vec3Of<T> splat(Vec3 v) { return {splat<T>(v.x), splat<T>(v.y), splat<T>(v.z)}; }
+// What a comparison of these gives.
+template <class T> using Mask = std::conditional_t<std::is_same_v<T, double4>, long4, bool>;
 
 // Rows become columns.
 inline void transpose(double4& a, double4& b, double4& c, double4& d) {

@@ -16,11 +16,14 @@ inline double smaller(double a, double b) { return a < b ? a : b; }
 inline double min(double a, double b) { return a < b ? a : b; }
 inline double max(double a, double b) { return a > b ? a : b; }
 
-struct Vec2 {
-    double x = 0, y = 0;
-};
+inline double sqrt(double a) { return std::sqrt(a); }
+inline double select(bool mask, double a, double b) { return mask ? a : b; }
 
 // Of numbers, or of double4 where four are computed at once (simd.h).
+template <class T> struct Vec2Of {
+    T x{}, y{};
+};
+using Vec2 = Vec2Of<double>;
 template <class T> struct Vec3Of {
     T x{}, y{}, z{};
 

@@ -28,7 +28,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "../math/vec.h"
+#include "../math/simd.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -51,25 +51,18 @@ class SobolSampler {
         depths_ = int(depths);
     }
 
+    // Word: uint32_t for one sample, uint4 for four.
+
     // All that a pixel's numbers share. pixel: row · width + column.
-    uint32_t key(uint32_t pixel) const { return mixed(pixel ^ seeds_[0]); }
-
-    // What scrambles a pixel's numbers in a dimension. key: of the pixel.
-    struct Scramble {
-        uint32_t factor, shift;
-    };
-    Scramble scramble(uint32_t key, int dimension) const {
-        uint32_t shift = mixed(key ^ mixed(uint32_t(dimension) + seeds_[1]));
-        return {factor(shift), shift};
+    template <class Word> Word key(Word pixel) const { return mixed(pixel ^ seeds_[0]); }
+    // A number in [0, 1). key: of the pixel.
+    template <class Word> auto number(Word key, Word sample, int dimension) const {
+        Word shift = mixed(key ^ mixed(uint32_t(dimension) + seeds_[1])), factor = shift * 0x9e3779b1u;
+        factor = (factor ^ factor >> 15) | 1u;
+        return number_of(reversed(digits(sample, dimension) * factor + shift)) * 0x1p-32;
     }
-
-    // A number in [0, 1).
-    double number(Scramble scramble, uint32_t sample, int dimension) const {
-        return reversed(digits(sample, dimension) * scramble.factor + scramble.shift) * 0x1p-32;
-    }
-    double number(uint32_t key, uint32_t sample, int dimension) const { return number(scramble(key, dimension), sample, dimension); }
-    Vec2 pair(uint32_t key, uint32_t sample, int dimension) const {
-        return {number(key, sample, dimension), number(key, sample, dimension + 1)};
+    template <class Word> auto pair(Word key, Word sample, int dimension) const {
+        return Vec2Of<decltype(number(key, sample, dimension))>{number(key, sample, dimension), number(key, sample, dimension + 1)};
     }
 
     // The digits of Sobol's points in a dimension, before they are scrambled.
@@ -83,6 +76,9 @@ class SobolSampler {
             if (sample >> bit & 1) value ^= matrices()[row][bit];
         return value;
     }
+    uint4 digits(uint4 samples, int dimension) const {
+        return uint4{digits(samples[0], dimension), digits(samples[1], dimension), digits(samples[2], dimension), digits(samples[3], dimension)};
+    }
 
    private:
     static constexpr int BITS = 24, LOW = 16;  // LOW: bits of a sample's number that its scattering's order changes
@@ -90,22 +86,19 @@ class SobolSampler {
     using Matrix = std::array<uint32_t, BITS>;
 
     // A permutation of all words that looks random (Wellons, Prospecting for Hash Functions, 2018: lowbias32).
-    static uint32_t mixed(uint32_t word) {
+    template <class Word> static Word mixed(Word word) {
         word ^= word >> 16;
         word *= 0x7feb352du;
         word ^= word >> 15;
         word *= 0x846ca68bu;
         return word ^ word >> 16;
     }
-    static uint32_t reversed(uint32_t word) {
+    template <class Word> static Word reversed(Word word) {
         word = (word >> 1 & 0x55555555u) | (word & 0x55555555u) << 1;
         word = (word >> 2 & 0x33333333u) | (word & 0x33333333u) << 2;
         word = (word >> 4 & 0x0f0f0f0fu) | (word & 0x0f0f0f0fu) << 4;
-        return __builtin_bswap32(word);
-    }
-    static uint32_t factor(uint32_t shift) {
-        uint32_t factor = shift * 0x9e3779b1u;
-        return (factor ^ factor >> 15) | 1;
+        word = (word >> 8 & 0x00ff00ffu) | (word & 0x00ff00ffu) << 8;
+        return word >> 16 | word << 16;
     }
 
     // Which of Sobol's points a sample has at a scattering: Owen's permutation, each bit flipped, or not, by those above it.
