@@ -23,8 +23,9 @@ DATASETS = {"coco": "coco.json", "panoptic": "panoptic.json", "bop": "bop", "col
 
 
 def is_same(name: str, ours: bytes | None, theirs: bytes | None) -> bool:
-    """Whether a file's bytes are the same; of BOP's rotations, all but what each system's LAPACK rounds otherwise."""
-    if ours == theirs or ours is None or theirs is None or not re.search(r"bop/(objects|scene_gt)\.json$", name):
+    """Whether a file's bytes are the same; of angles and rotations, all but what each system's libraries round otherwise."""
+    rounded = re.search(r"(bop/(objects|scene_gt)|transforms)\.json$", name)
+    if ours == theirs or ours is None or theirs is None or not rounded:
         return ours == theirs
     number = rb"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
     text, its_text = (re.sub(number, b"", each) for each in (ours, theirs))
@@ -33,13 +34,16 @@ def is_same(name: str, ours: bytes | None, theirs: bytes | None) -> bool:
 
 
 def different_files(ours: Path, theirs: Path) -> list[str]:
-    """Names of files that one of two folders lacks or has with other bytes, but for those that tell times and folders."""
-    telling = re.compile(r"(.*/)?(contact-sheet\.html|summary\.json|\.viewcam\.lock|orbit_\d+\.json)")
+    """Names of files that one of two folders lacks or has with other bytes.
+
+    Left out are those that tell times and folders, and pictures to look at, in which Blender's view transform rounds otherwise.
+    """
+    left_out = re.compile(r"(.*/)?(contact-sheet\.html|summary\.json|\.viewcam\.lock|orbit_\d+\.(json|png)|rgb/\d+\.png)")
     contents = [
         {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
         for folder in (ours, theirs)
     ]
-    names = {name for name in contents[0].keys() | contents[1].keys() if not telling.fullmatch(name)}
+    names = {name for name in contents[0].keys() | contents[1].keys() if not left_out.fullmatch(name)}
     assert names, f"{ours} and {theirs} hold nothing to compare"
     return sorted(name for name in names if not is_same(name, contents[0].get(name), contents[1].get(name)))
 
