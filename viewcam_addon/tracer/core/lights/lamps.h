@@ -28,10 +28,12 @@ class Sun {
 
     bool is_sized() const { return spread_ > 0; }
 
-    LightSample sample_li(const Interaction&, Vec2 u) const {
-        double short_of;
-        Vec3 direction = spread_ > 0 ? cone_direction(towards_, spread_, u, short_of) : towards_;
-        return {direction, INFINITE, irradiance_ * (2 / (2 - spread_)), pdf_li()};  // the radiance times 2π (1 − cos)
+    template <class T> LightSampleOf<T> sample_li(const SurfacePoint<T>&, Vec2Of<T> u) const {
+        T short_of;
+        Vec3Of<T> direction = splat<T>(towards_);
+        if (spread_ > 0) direction = cone_direction(direction, splat<T>(spread_), u, short_of);
+        // The weight is the radiance times 2π (1 − cos).
+        return {direction, splat<T>(INFINITE), splat<T>(irradiance_ * (2 / (2 - spread_))), splat<T>(pdf_li())};
     }
     double pdf_li(const Interaction&, Vec3) const { return pdf_li(); }
 

@@ -10,26 +10,28 @@
 #include <cstdint>
 #include <limits>
 
-#include "vec.h"
+#include "simd.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
 constexpr double PI = 3.14159265358979323846;
 
 // The polynomial with these coefficients, the lowest first.
-template <int N>
-inline double polynomial(double x, const double (&coefficients)[N]) {
-    double value = coefficients[N - 1];
+template <class T, int N>
+inline T polynomial(T x, const double (&coefficients)[N]) {
+    T value = splat<T>(coefficients[N - 1]);
     for (int k = N - 2; k >= 0; k--) value = value * x + coefficients[k];
     return value;
 }
 
-struct SinCos {
-    double sin, cos;
+template <class T> struct SinCosOf {
+    T sin, cos;
 };
+using SinCos = SinCosOf<double>;
 
-// Of an angle in turns, |turns| < 2^30: no digit is lost to a multiple of π.
-inline SinCos sincos_of_turns(double turns) {
+// Of an angle in turns, |turns| < 2^30, or of four: no digit is lost to a multiple of π.
+template <class T> inline SinCosOf<T> sincos_of_turns(T turns) {
+    constexpr double WHOLE = 0x1.8p52;  // what it is added to is rounded to a whole number, whose last binary digits are the sum's
     static constexpr double SIN[] = {6.283185307179586,  -41.34170224039976, 81.60524927607493,  -76.70585975299812,
                                      42.05869392898878,  -15.094640403891546, 3.8197881201632113, -0.7116358090781666};
     static constexpr double COS[] = {1.0,
@@ -41,11 +43,13 @@ inline SinCos sincos_of_turns(double turns) {
                                      7.9035351947629575,
                                      -1.7143161879285278,
                                      0.27945867147528963};
-    double quarters = std::floor(4 * turns + 0.5), x = turns - 0.25 * quarters, squared = x * x;
-    double sin = x * polynomial(squared, SIN), cos = polynomial(squared, COS);
-    int quarter = int(int64_t(quarters) & 3);
-    double across = quarter & 1 ? cos : sin, along = quarter & 1 ? sin : cos;
-    return {quarter & 2 ? -across : across, quarter == 1 || quarter == 2 ? -along : along};
+    T four = 4.0 * turns + 0.5, quarters = (four + WHOLE) - WHOLE;
+    quarters = select(Mask<T>(quarters > four), quarters - 1.0, quarters);
+    T x = turns - 0.25 * quarters, squared = x * x, sin = x * polynomial(squared, SIN), cos = polynomial(squared, COS);
+    auto quarter = bits_of(quarters + WHOLE);
+    Mask<T> odd((quarter & 1) != 0);
+    T across = select(odd, cos, sin), along = select(odd, sin, cos);
+    return {of_bits(bits_of(across) ^ quarter >> 1 << 63), of_bits(bits_of(along) ^ (quarter ^ quarter >> 1) << 63)};
 }
 // A vector that is turned about a unit axis (Rodrigues).
 inline Vec3 turned_about(Vec3 axis, Vec3 v, SinCos angle) { return v * angle.cos + cross(axis, v) * angle.sin + axis * (dot(axis, v) * (1 - angle.cos)); }
