@@ -4,6 +4,7 @@
 """
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import storage
+from viewcam_addon.blender import datablocks, preferences, storage
 from viewcam_addon.camera_values import CameraValues
 
 SAVED = Path(__file__).parent / "saved"
@@ -77,3 +78,80 @@ def test_what_is_restored_is_as_it_was_whatever_was_stored(posed_camera):
         group.keeps, group.counted_in, group.exact = "FIELD_OF_VIEW", (1, 2, 3, 4, 5), "[]"
     assert (group.keeps, group.exact) == ("PIXELS", "nonsense")
     assert tuple(group.counted_in) == pytest.approx((1.5, -3, 0, 1e-30, 7))
+
+
+# --- Datablocks
+
+
+@pytest.mark.parametrize(
+    ("system", "scale", "value", "words"),
+    [
+        ("METRIC", 1.0, 2.0, "2 m"),
+        ("METRIC", 0.01, 2.0, "2 cm"),
+        ("METRIC", 1.0, 1e-9, "1e-09"),  # Blender would say 0 m
+        ("METRIC", 1.0, math.inf, "inf"),
+        ("IMPERIAL", 1.0, 3.048, "10'"),
+        ("NONE", 0.01, 2.0, "2"),
+    ],
+)
+def test_a_length_is_said_in_the_scenes_units(scene, system, scale, value, words):
+    scene.unit_settings.system, scene.unit_settings.scale_length = system, scale
+    assert datablocks.length(value, scene) == words
+
+
+def test_without_markers_a_render_takes_the_scenes_camera(camera_object, scene):
+    scene.timeline_markers.new("Loose", frame=1)
+    assert datablocks.render_camera(scene) == camera_object
+
+
+@pytest.mark.parametrize(("frame", "chosen"), [(1, "A"), (5, "A"), (9, "A"), (10, "B"), (99, "B")])
+def test_with_markers_a_render_takes_the_last_one_before_the_frame_or_the_first(add_camera, scene, frame, chosen):
+    """And so does Blender, whose answer stands in the scene after a change of frame."""
+    for name, at in (("B", 10), ("Unrendered", 7), ("A", 5)):
+        scene.timeline_markers.new(name, frame=at).camera = add_camera(name)
+    bpy.data.objects["Unrendered"].hide_render = True
+    scene.frame_set(frame)
+    assert datablocks.render_camera(scene).name == scene.camera.name == chosen
+
+
+# --- Preferences
+
+
+def test_without_an_add_on_there_are_the_defaults():
+    assert preferences.get() == preferences.Defaults()
+    assert preferences.up_axis() == (0, 0, 1)
+
+
+def test_the_defaults_are_those_that_blender_shows():
+    """One of each: what a person sees before the first change is what a script without an add-on gets."""
+    shown = preferences.VIEWCAM_preferences.bl_rna.properties
+    for name, default in vars(preferences.Defaults()).items():
+        found = shown[name].default_array if shown[name].type == "FLOAT" else shown[name].default
+        assert found == default if isinstance(default, str) else tuple(found) == pytest.approx(default, rel=2**-24), name
+
+
+@pytest.mark.parametrize(("name", "axis"), [("X", (1, 0, 0)), ("-Y", (0, -1, 0)), ("-Z", (0, 0, -1))])
+def test_the_chosen_up_is_a_unit_vector(monkeypatch, name, axis):
+    monkeypatch.setattr(preferences, "get", lambda: preferences.Defaults(default_up=name))
+    assert preferences.up_axis() == axis
+
+
+def test_every_up_that_can_be_chosen_is_an_axis(monkeypatch):
+    names = [item.identifier for item in preferences.VIEWCAM_preferences.bl_rna.properties["default_up"].enum_items]
+    assert len(names) == 6
+    for name in names:
+        monkeypatch.setattr(preferences, "get", lambda name=name: preferences.Defaults(default_up=name))
+        assert sorted(map(abs, preferences.up_axis())) == [0, 0, 1]
+
+
+def test_an_enabled_add_on_has_preferences_of_its_own(fresh_blender):
+    addons = fresh_blender.context.preferences.addons
+    addon = addons.new()
+    try:
+        addon.module = preferences.PACKAGE
+        addon.preferences.default_up = "Y"
+        assert preferences.up_axis() == (0, 1, 0)
+        assert preferences.get().default_level == "GEOMETRY"
+    finally:
+        addons.remove(addon)
+    assert preferences.get() == preferences.Defaults()

@@ -1,11 +1,19 @@
 """Export and Cycles in the Blender that VIEWCAM_BLENDER names: the same words, and its status."""
 
+import io
+import json
 import shlex
 import sys
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+import viewcam_addon as vp
+from viewcam_addon import cameras, cli
+from viewcam_addon.cameras import Camera, Options
 from viewcam_addon.cli import main
+from viewcam_addon.pinhole import Pinhole
 
 
 @pytest.fixture
@@ -46,3 +54,117 @@ def test_a_blender_without_the_extension_or_none_at_all_is_one_sentence(named, t
     monkeypatch.setenv("VIEWCAM_BLENDER", str(tmp_path / "none"))
     assert main(["cycles", "a.blend", str(tmp_path / "out")]) == 2
     assert "can't be started" in capfd.readouterr().err
+
+
+# --- `viewcam camera`: what it lists, what it writes, and what it says in one sentence
+
+
+LEFT = Pinhole((7, -6, 4), (0, 0, 1), (0, 0, 1), (600, 500), 640, 360, (300, 200))
+RIGHT = Pinhole((8, -6, 4), (1, 0, 1), (0, 0, 1), 600, 640, 360)
+
+
+@pytest.fixture
+def model(tmp_path):
+    cameras.save([Camera("left", LEFT), Camera("right", RIGHT)], tmp_path / "model", "colmap")
+    return tmp_path / "model"
+
+
+def test_a_line_for_each_camera_says_what_it_is(model, capfd):
+    assert cli.main(["camera", str(model), "--list"]) == 0
+    left, right = capfd.readouterr().out.splitlines()
+    assert left.startswith("left: 640 × 360, d = 600 × 500, principal point 300, 200, eye (7, -6, 4), look-at (")
+    assert right.startswith("right: 640 × 360, d = 600, eye (8, -6, 4), look-at (")
+
+
+def test_one_is_written_in_another_format_with_other_axes_and_scale(model, tmp_path, capfd):
+    out = tmp_path / "right.gltf"
+    words = ["camera", str(model), "--camera", "right", "--to", "gltf", "--out", str(out), "--out-axes", "y_up"]
+    assert cli.main([*words, "--out-scale", "0.01", "--json", str(tmp_path / "result.json")]) == 0
+    (back,) = cameras.read(out, options=Options(axes="y_up", scale=0.01))
+    assert back.pinhole.eye == pytest.approx(RIGHT.eye, abs=1e-14) and back.pinhole.distance == pytest.approx((600, 600))
+    (said,) = json.loads((tmp_path / "result.json").read_text())["cameras"]
+    assert said["name"] == "right" and said["camera"]["eye"] == pytest.approx(RIGHT.eye, abs=1e-14)
+    assert "right.gltf" in capfd.readouterr().out
+
+
+def test_text_on_standard_input_is_answered_on_standard_output(monkeypatch, capfd):
+    monkeypatch.setattr("sys.stdin", io.StringIO(cameras.write([Camera("left", LEFT)], "opencv")))
+    assert cli.main(["camera", "-", "--to", "transforms"]) == 0
+    told = capfd.readouterr()
+    (back,) = cameras.read(told.out)
+    assert back.pinhole.principal_point == LEFT.principal_point
+    assert "half a pixel was added" in told.err, "how it was taken must be said, and not among what is written"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["camera", "MODEL", "--camera", "middle"], "'left', 'right'"),
+        (["camera", "MODEL", "--list", "--to", "gltf"], "--list and --to"),
+        (["camera", "MODEL", "--out", "a"], "--to"),
+        (["camera", "MODEL", "--to", "colmap"], "--out"),
+        (["camera", "MODEL", "--to", "gltf", "--out", "a.gltf"], "shifted"),
+        (["camera", "MODEL", "--to", "fspy"], "fspy"),
+        (["camera", "MODEL", "--from", "gltf"], "not glTF"),
+        (["camera", "MODEL", "--distance", "3"], "--size"),
+        (["camera", "none.json"], "none.json"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence_and_nothing_is_written(model, tmp_path, monkeypatch, capfd, words, told):
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    assert cli.main([str(model) if word == "MODEL" else word for word in words]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("viewcam camera: ") and told in line
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+# --- `import viewcam_addon as vp`: what a program gets is what the command line gets. The page's own examples are run as well
+
+
+@pytest.fixture
+def scene():
+    from viewcam_addon.tracer.scene import Object, Scene, Spheres
+
+    camera = vp.Pinhole((3, -5, 2), (0, 0, 1), (0, 0, 1), 60, 48, 32)
+    ball = Spheres(np.array([[0.0, 0.0, 1.0]]), np.array([1.0]), np.zeros(1, np.int32))
+    placed = Object("Ball", "ball", np.eye(4), object_index=1, material_indices=(1,))
+    return Scene(camera, {"ball": ball}, (placed,))
+
+
+def test_a_picture_and_itself_are_the_same_and_a_longer_lens_is_found(scene):
+    picture = vp.render(scene, level="geometry")
+    same = vp.compare(picture, vp.render(scene, level="geometry"), scene)
+    assert same.passed and same.sentence.startswith("The same picture"), same.sentence
+    longer = replace(scene.camera, distance=60.06)
+    found = vp.compare(picture, vp.render(replace(scene, camera=longer), level="geometry"), scene)
+    assert not found.passed and "magnified by 0.999001" in found.sentence, found.sentence
+
+
+def test_a_file_is_the_same_as_what_was_read_of_it(scene, tmp_path):
+    from viewcam_addon import image
+    from viewcam_addon.tracer.scene import scene_file
+
+    scene_file.write(scene, tmp_path / "scene.json")
+    picture = vp.render(tmp_path / "scene.json", level="geometry")
+    np.testing.assert_array_equal(picture["Depth"], vp.render(scene, level="geometry")["Depth"])
+    image.write(tmp_path / "a.exr", picture)
+    assert vp.compare(tmp_path / "a.exr", str(tmp_path / "a.exr"), tmp_path / "scene.json").passed
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda scene, folder: vp.render(scene, level="all"), "the level is 'all'"),
+        (lambda scene, folder: vp.render(folder / "none.json"), "none.json"),
+        (
+            lambda scene, folder: vp.compare(vp.Image({"Depth": np.zeros((2, 2, 1), np.float32)}), []),
+            "does not tell its camera",
+        ),
+        (lambda scene, folder: vp.check(folder / "none.blend"), "none.blend"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(scene, tmp_path, call, sentence):
+    with pytest.raises(vp.InputError, match=sentence) as raised:
+        call(scene, tmp_path)
+    assert "\n" not in str(raised.value)

@@ -60,7 +60,7 @@ ONLY_WHEEL = "vp.check("  # which runs a Python that has bpy; Blender's own has 
 WRITTEN = {
     ("docs/farm.md", "yaml"): "tests/jobs/test_cluster.py has a farm that is configured so",
     ("docs/ci.md", "yaml"): "tests/test_pytest_plugin.py does what its steps do",
-    ("docs/datasets.md", "json"): "its program writes them, as tests/datasets/test_documentation.py compares",
+    ("docs/datasets.md", "json"): "its program writes them, as tests/datasets/test_projection.py compares",
 }
 """Blocks that show what another example writes, and who says so."""
 

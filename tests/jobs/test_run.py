@@ -217,7 +217,7 @@ def test_whatever_went_wrong_before_resume_ends_as_an_undisturbed_run(tmp_path_f
     painting.assert_same(folder, undisturbed)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="on Windows a second batch is refused: test_locks.py")
+@pytest.mark.skipif(sys.platform == "win32", reason="on Windows a second batch is refused: test_folder.py")
 @pytest.mark.parametrize("killed", [False, True])
 def test_a_batch_waits_for_what_another_one_renders_and_takes_over_if_that_is_killed(tmp_path, painting, killed):
     program = [sys.executable, painting.__file__, tmp_path / "a", json.dumps({"count": 1, "pause": 0.1 if not killed else 60})]

@@ -1,5 +1,6 @@
 """The buttons that move a camera: what each does, what it says where it can't, and that undo takes it all back."""
 
+import dataclasses
 import math
 from types import SimpleNamespace
 
@@ -10,7 +11,9 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import preferences
-from viewcam_addon.blender.interface import moving, viewport
+from viewcam_addon.blender.interface import dragging, kept, moving, selection, viewport
+from viewcam_addon.errors import InputError
+from viewcam_addon.pinhole import Pinhole
 
 POINT = (1.5, -2.25, 3.125)  # numbers that float32 holds
 
@@ -417,3 +420,334 @@ def test_dolly_in_a_menu_asks_for_the_distance_and_does_nothing_before(posed_cam
     clicked = SimpleNamespace(found=lambda context: posed_camera, properties=properties, reach=0.0)
     assert operator.invoke(clicked, SimpleNamespace(window_manager=window_manager), None) == {"RUNNING_MODAL"}
     assert asked == [math.dist(before.eye, before.look_at)] and stated() == before
+
+
+# --- Orbit, dolly, dolly zoom and truck as the mouse drags them
+
+
+REACH = math.dist((7, -6, 5), (0, 0, 1))
+
+
+@pytest.mark.parametrize("kind", [dragging.ORBIT, dragging.DOLLY, dragging.DOLLY_ZOOM, dragging.TRUCK])
+def test_a_drag_moves_visibly_there_and_back_and_cancelling_restores_every_bit(posed_camera, scene, kind):
+    bpy.context.view_layer.update()
+    before, start = kept.state(posed_camera), cameras.stated(posed_camera, scene)
+    drag = dragging.Drag(posed_camera, scene, kind)
+    drag.move(80, 20)
+    bpy.context.view_layer.update()
+    there = cameras.stated(posed_camera, scene)
+    assert math.dist(there.eye, start.eye) > 0.05 * REACH
+    drag.move(-80, -20)
+    assert cameras.stated(posed_camera, scene).eye == pytest.approx(start.eye, abs=1e-9)
+    drag.move(33, 7, precise=True)
+    drag.cancel()
+    bpy.context.view_layer.update()
+    assert kept.state(posed_camera) == before
+
+
+def test_a_dolly_zoom_keeps_the_size_at_the_look_at_point(posed_camera, scene):
+    drag = dragging.Drag(posed_camera, scene, dragging.DOLLY_ZOOM)
+    drag.move(120, 0)
+    found = cameras.stated(posed_camera, scene)
+    reach = math.dist(found.eye, found.look_at)
+    assert reach < 0.7 * REACH
+    assert found.distance[0] / reach == pytest.approx(1500 / REACH, rel=1e-12)
+
+
+def test_a_truck_carries_the_look_at_point_along_under_the_mouse(posed_camera, scene):
+    start = cameras.stated(posed_camera, scene)
+    dragging.Drag(posed_camera, scene, dragging.TRUCK).move(100, -50)
+    column, row, _ = cameras.stated(posed_camera, scene).project(np.array(start.look_at))
+    assert (column, row) == pytest.approx((960 + 100, 540 - 50), abs=1e-6)
+
+
+def test_a_typed_number_counts_instead_of_the_mouse(posed_camera, scene):
+    drag = dragging.Drag(posed_camera, scene, dragging.DOLLY)
+    drag.move(500, 0)
+    drag.type("2.5")
+    found = cameras.stated(posed_camera, scene)
+    assert math.dist(found.eye, found.look_at) == pytest.approx(REACH + 2.5, rel=1e-12)
+    drag.type("-")
+    assert math.dist(cameras.stated(posed_camera, scene).eye, found.look_at) < REACH
+    drag.type("-99")
+    assert math.dist(cameras.stated(posed_camera, scene).eye, found.look_at) < REACH, "beyond the look-at point it waits"
+
+
+def test_what_follows_an_object_is_not_dragged_away_from_it(posed_camera, scene, empty):
+    posed_camera.virtual_pinhole.look_at_target = empty("Target")
+    with pytest.raises(InputError, match="the look-at follows 'Target', and can't be dragged"):
+        dragging.Drag(posed_camera, scene, dragging.TRUCK)
+    dragging.Drag(posed_camera, scene, dragging.ORBIT).move(10, 0)
+    assert posed_camera.virtual_pinhole.look_at_target is not None
+
+
+def test_the_operator_does_the_same_by_numbers(posed_camera, scene):
+    assert bpy.ops.viewcam.drag_camera(kind="DOLLY", amount=(1.0, 0.0)) == {"FINISHED"}
+    found = cameras.stated(posed_camera, scene)
+    assert math.dist(found.eye, found.look_at) == pytest.approx(REACH + 1)
+
+
+# --- Selection
+
+
+CUBE = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
+
+
+@pytest.fixture
+def points(posed_camera):
+    """A function that gives the selection's points, sorted."""
+
+    def sorted_points():
+        bpy.context.view_layer.update()
+        found = selection.points(bpy.context, posed_camera)
+        return found[np.lexsort(found.round(3).T[::-1])]
+
+    return sorted_points
+
+
+def select_only(*blocks):
+    for block in bpy.context.scene.objects:
+        block.select_set(block in blocks)
+
+
+def test_a_mesh_is_its_vertices_in_the_world(points):
+    bpy.ops.mesh.primitive_cube_add(location=(1, 2, 3), rotation=(0, 0, math.pi / 2), scale=(1, 1, 2))
+    expected = CUBE * (1, 1, 2) + (1, 2, 3)
+    np.testing.assert_allclose(points(), expected[np.lexsort(expected.T[::-1])], atol=8 * 2**-24)
+
+
+def test_modifiers_and_constraints_count(points, empty):
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    array = cube.modifiers.new("Array", "ARRAY")
+    array.use_relative_offset, array.use_constant_offset, array.constant_offset_displace = False, True, (10, 0, 0)
+    cube.constraints.new("COPY_LOCATION").target = empty("There", (0, 0, 100))
+    found = points()
+    assert len(found) == 16
+    np.testing.assert_allclose(selection.bounds_centre(found), (5, 0, 100), atol=200 * 2**-24)
+
+
+def test_the_instances_of_a_collection_count(points, scene):
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    collection = bpy.data.collections.new("Cubes")
+    collection.objects.link(cube)
+    scene.collection.objects.unlink(cube)
+    instancer = bpy.data.objects.new("Instancer", None)
+    scene.collection.objects.link(instancer)
+    instancer.instance_type, instancer.instance_collection, instancer.location = "COLLECTION", collection, (5, 0, 0)
+    select_only(instancer)
+    np.testing.assert_allclose(points(), CUBE + np.array([5, 0, 0]), atol=8 * 2**-24)
+
+
+@pytest.mark.parametrize("kind", ["curve.primitive_bezier_circle", "surface.primitive_nurbs_surface_sphere", "object.text"])
+def test_curves_surfaces_and_text_are_what_is_drawn(points, kind):
+    room, name = kind.split(".")
+    getattr(getattr(bpy.ops, room), f"{name}_add")(location=(0, 0, 7))
+    found = points()
+    assert len(found) > 8 and np.abs(found - (0, 0, 7)).max() < 3
+
+
+def test_metaballs_are_what_is_drawn(points):
+    bpy.ops.object.metaball_add(type="BALL", location=(0, 0, 7))
+    found = points()
+    assert len(found) > 20
+    np.testing.assert_allclose(selection.bounds_centre(found), (0, 0, 7), atol=0.1)
+
+
+def test_what_has_no_geometry_is_its_origin(points, empty, add_lamp):
+    there = empty("There", (1, 2, 3))
+    lamp = add_lamp("POINT", (4, 5, 6))
+    select_only(there, lamp)
+    np.testing.assert_array_equal(points(), [(1, 2, 3), (4, 5, 6)])
+
+
+@pytest.mark.parametrize("kind", ["armature", "lattice"])
+def test_armatures_and_lattices_are_their_boxes(points, kind):
+    if kind == "armature":
+        bpy.ops.object.armature_add(location=(3, 0, 0))
+        middle = (3, 0, 0.5)
+    else:
+        bpy.ops.object.add(type="LATTICE", location=(3, 0, 0))
+        middle = (3, 0, 0)
+    np.testing.assert_allclose(selection.bounds_centre(points()), middle, atol=0.11)
+
+
+def test_the_camera_itself_does_not_count(points, posed_camera, empty):
+    there = empty("There", (1, 2, 3))
+    select_only(there, posed_camera)
+    np.testing.assert_array_equal(points(), [(1, 2, 3)])
+
+
+def test_a_vertex_that_is_nowhere_does_not_count(points):
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.object.data.vertices[0].co.x = math.nan
+    assert len(points()) == 7
+
+
+def test_nothing_selected_is_said(points, posed_camera):
+    select_only(posed_camera)
+    with pytest.raises(InputError, match="nothing but the camera, or nothing at all, is selected"):
+        points()
+
+
+def test_in_edit_mode_the_selected_vertices_count_without_modifiers(points):
+    bpy.ops.mesh.primitive_cube_add(location=(0, 0, 10))
+    cube = bpy.context.object
+    cube.modifiers.new("Array", "ARRAY")
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="DESELECT")
+    with pytest.raises(InputError, match="no vertex, control point or bone is selected"):
+        points()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for vertex in cube.data.vertices:
+        vertex.select = vertex.co.z > 0
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert len(points()) == 4 and (points()[:, 2] == 11).all()
+
+
+def test_in_edit_mode_of_a_curve_the_selected_points_count(points):
+    bpy.ops.curve.primitive_bezier_curve_add(location=(0, 0, 10))
+    curve = bpy.context.object
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.curve.select_all(action="DESELECT")
+    curve.data.splines[0].bezier_points[0].select_control_point = True
+    np.testing.assert_array_equal(points(), [(-1, 0, 10)])
+
+
+def test_in_edit_mode_of_a_surface_the_selected_points_count(points):
+    bpy.ops.surface.primitive_nurbs_surface_sphere_add(location=(0, 0, 10))
+    surface = bpy.context.object
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.curve.select_all(action="DESELECT")
+    point = surface.data.splines[0].points[3]
+    point.select = True
+    np.testing.assert_allclose(points(), [np.add(point.co[:3], (0, 0, 10))], atol=16 * 2**-24)
+
+
+def test_in_edit_mode_of_a_lattice_the_selected_points_count(points):
+    bpy.ops.object.add(type="LATTICE", location=(0, 0, 10))
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.lattice.select_all(action="SELECT")
+    np.testing.assert_allclose(points(), CUBE / 2 + (0, 0, 10), atol=16 * 2**-24)
+
+
+def test_in_edit_mode_of_an_armature_the_selected_ends_count(points):
+    bpy.ops.object.armature_add(location=(0, 0, 10))
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = bpy.context.object.data.edit_bones[0]
+    bone.select_head, bone.select_tail = False, True
+    np.testing.assert_allclose(points(), [(0, 0, 11)], atol=16 * 2**-24)
+
+
+def test_in_pose_mode_the_selected_bones_count_as_they_are_posed(points):
+    bpy.ops.object.armature_add(location=(0, 0, 10))
+    bpy.ops.object.mode_set(mode="POSE")
+    bpy.ops.pose.select_all(action="SELECT")
+    bpy.context.object.pose.bones[0].location = (5, 0, 0)
+    np.testing.assert_allclose(points(), [(5, 0, 10), (5, 0, 11)], atol=32 * 2**-24)
+
+
+def test_the_median_is_the_mean_and_the_centre_is_that_of_the_box():
+    cloud = np.array([[0.0, 0, 0], [0, 0, 0], [3, 6, -9]])
+    assert selection.median(cloud) == (1, 2, -3)
+    assert selection.bounds_centre(cloud) == (1.5, 3, -4.5)
+
+
+# --- Viewport
+
+
+LIKE = Pinhole((9, 9, 9), (0, 0, 0), (0, 0, 1), 1, 1920, 1080)
+
+
+@pytest.fixture
+def area(posed_camera):
+    """The 3D viewport, looking from (0, −5, 2) along y at (0, 3, 2) with a lens of 36 mm: 90° across its larger side."""
+    area = viewport.area_in(bpy.context)
+    space = area.spaces.active
+    view, space.lens = space.region_3d, 36.0
+    view.view_perspective, view.view_location, view.view_distance = "PERSP", (0, 3, 2), 8.0
+    view.view_rotation = (math.sqrt(0.5), math.sqrt(0.5), 0, 0)
+    return area
+
+
+def region_of(area):
+    return next(region for region in area.regions if region.type == "WINDOW")
+
+
+def test_the_view_of_the_viewport_on_paper(area, scene):
+    found = viewport.pinhole_of(area, LIKE, scene)
+    # sqrt(½) in float32, and the quaternion is normalised in float32 again.
+    np.testing.assert_allclose(found.eye, (0, -5, 2), atol=8 * 4 * 2**-24)
+    assert found.look_at == (0, 3, 2) and found.up == (0, 0, 1)
+    assert (found.width, found.height, found.principal_point) == (1920, 1080, (960, 540))
+
+
+@pytest.mark.parametrize("size", [(1920, 1080), (1080, 1920), (1000, 1000), (4000, 100)])
+@pytest.mark.parametrize("ratio", [1.0, 1.5])
+def test_the_picture_shows_all_that_the_viewport_shows_and_no_more_than_it_must(area, scene, size, ratio):
+    like = dataclasses.replace(LIKE, width=size[0], height=size[1], distance=(1, ratio), principal_point=None)
+    found, region = viewport.pinhole_of(area, like, scene), region_of(area)
+    assert found.distance[1] == ratio * found.distance[0]
+    larger = max(region.width, region.height)
+    shown = np.array([region.width / larger, region.height / larger])  # tangents: 45° to the larger side
+    pictured = np.array(size) / 2 / found.distance
+    assert (pictured / shown).min() == pytest.approx(1, rel=1e-15)
+
+
+def test_a_tilted_view_takes_its_own_up(area, scene):
+    area.spaces.active.region_3d.view_rotation = (0.5, 0.5, 0.5, 0.5)
+    found = viewport.pinhole_of(area, LIKE, scene)
+    np.testing.assert_allclose(np.array(found.basis()), [(0, 1, 0), (0, 0, 1), (1, 0, 0)], atol=8 * 2**-24)
+    area.spaces.active.region_3d.view_rotation = (1, 0, 0, 0)
+    assert viewport.pinhole_of(area, LIKE, scene).up == (0, 1, 0)
+
+
+def test_a_view_locked_to_an_object_or_the_cursor_looks_at_that(area, scene, empty):
+    space = area.spaces.active
+    space.lock_cursor, scene.cursor.location = True, (1, 2, 3)
+    assert viewport.pinhole_of(area, LIKE, scene).look_at == (1, 2, 3)
+    space.lock_object = empty("There", (4, 5, 6))
+    assert viewport.pinhole_of(area, LIKE, scene).look_at == (4, 5, 6)
+
+
+def test_a_view_locked_to_a_bone_looks_at_its_head(area, scene):
+    bpy.ops.object.armature_add(location=(4, 5, 6))
+    armature = bpy.context.object
+    armature.pose.bones[0].location = (0, 2, 0)
+    bpy.context.view_layer.update()
+    area.spaces.active.lock_object, area.spaces.active.lock_bone = armature, armature.pose.bones[0].name
+    np.testing.assert_allclose(viewport.pinhole_of(area, LIKE, scene).look_at, (4, 5, 8), atol=16 * 2**-24)
+
+
+def test_a_view_through_a_camera_is_that_camera(area, scene, posed_camera):
+    posed_camera.data.shift_x = 0.1
+    bpy.context.view_layer.update()
+    area.spaces.active.region_3d.view_perspective = "CAMERA"
+    found, expected = viewport.pinhole_of(area, LIKE, scene), cameras.read(posed_camera, scene)
+    assert (found.eye, found.distance, found.principal_point) == (expected.eye, expected.distance, expected.principal_point)
+    np.testing.assert_allclose(found.look_at, (0, 0, 1), atol=1e-5)  # the values' distance along the camera's axis
+
+
+def test_a_viewport_with_a_camera_of_its_own_looks_through_that(area, scene, posed_camera, add_camera):
+    other = add_camera("Other")
+    other.location = (1, 2, 3)
+    scene.camera = posed_camera
+    bpy.context.view_layer.update()
+    space = area.spaces.active
+    space.use_local_camera, space.camera = True, other
+    space.region_3d.view_perspective = "CAMERA"
+    assert viewport.pinhole_of(area, LIKE, scene).eye == (1, 2, 3)
+
+
+def test_an_orthographic_view_is_no_pinhole(area, scene):
+    area.spaces.active.region_3d.view_perspective = "ORTHO"
+    with pytest.raises(InputError, match="orthographic, no pinhole: switch it to perspective"):
+        viewport.pinhole_of(area, LIKE, scene)
+
+
+def test_a_view_through_no_camera_is_said(area, scene):
+    area.spaces.active.region_3d.view_perspective = "CAMERA"
+    scene.camera = None
+    with pytest.raises(InputError, match="a camera that is gone"):
+        viewport.pinhole_of(area, LIKE, scene)

@@ -1,15 +1,35 @@
 import itertools
+import json
 import math
 import re
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 bpy = pytest.importorskip("bpy")
 
+import viewcam_addon
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import datablocks
-from viewcam_addon.blender.interface import clipboard, moving, panel
+from viewcam_addon.blender.interface import (
+    baking,
+    clipboard,
+    comparing,
+    labels,
+    moving,
+    operators,
+    panel,
+    photo_matching,
+    readouts,
+    render_panels,
+    scene_cameras,
+    view_menu,
+)
+from viewcam_addon.image import SETTINGS
+from viewcam_addon.labels import KINDS
+from viewcam_addon.labels import files as label_files
 
 
 def contents(camera_object, scene):
@@ -556,3 +576,302 @@ def test_everything_that_blender_shows_is_spelled_as_blender_spells():
 
 def test_a_british_word_would_be_found():
     assert all(BRITISH.search(word) for word in ("Colours", "modelled", "millimetres", "Normalise", "cancelled"))
+
+
+# --- The sub-panel Labels: what it says it will write is what is written, beside Blender, and nothing of it is in the file
+
+
+# In place of the batch: it keeps what it was to do, and writes the last of a label's files.
+STAND_IN = """
+import json, pathlib, sys
+written = json.loads(pathlib.Path(sys.argv[1]).read_text())
+(shot,), folder = written["jobs"], pathlib.Path(written["plan"]["out"])
+(folder / (shot["name"] + ".labels.json")).write_text(json.dumps([shot, written["plan"]["outputs"]]))
+"""
+
+
+@pytest.fixture
+def settings(fresh_blender, tmp_path):
+    found = bpy.context.window_manager.virtual_pinhole_labels
+    found.folder = str(tmp_path / "out")
+    yield found
+    labels.background.end()
+    for name in ("kinds", "depth_steps", "folder"):
+        found.property_unset(name)
+
+
+@pytest.fixture
+def camera(add_camera, scene):
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 64, 48, 100
+    scene.frame_current = 3
+    return add_camera("Hero: close")
+
+
+@pytest.fixture
+def stand_in(monkeypatch):
+    def command(_copy, _scene, written):
+        return [sys.executable, "-c", STAND_IN, str(written)]
+
+    monkeypatch.setattr(comparing, "command", command)
+
+
+def test_each_label_can_be_chosen_and_none_is_unknown():
+    assert tuple(name.lower() for name, *_ in labels._KINDS) == KINDS
+
+
+def test_a_click_starts_a_batch_of_this_frame_with_labels_alone(settings, camera, stand_in, scene):
+    settings.kinds, settings.depth_steps = {"FLOW", "DEPTH"}, 250
+    bpy.data.objects["Hero: close"].select_set(True)
+    assert bpy.ops.viewcam.write_labels(camera="Hero: close") == {"FINISHED"}
+    folder, sentence = labels.background.latest
+    assert folder.parent == Path(settings.folder) and sentence == f"Written to {folder}"
+    assert folder.name.startswith("untitled Hero_ close 0003 labels 2")
+    shot, outputs = json.loads((folder / "Hero_ close.labels.json").read_text())
+    if not bpy.app.binary_path:  # else Blender is given the file, which is the job's then
+        assert Path(shot.pop("blend")).name == "untitled.blend"
+    assert shot == {"name": "Hero_ close", "camera": "Hero: close", "width": 64, "height": 48, "frame": 3}
+    wanted = {"picture": False, "check": False, "labels": ["depth", "flow"], "depth_steps": 250.0, "report": False}
+    assert outputs == wanted
+
+
+def test_a_child_that_dies_leaves_no_folder_and_its_last_words_are_said(settings, camera, monkeypatch, tmp_path):
+    monkeypatch.setattr(comparing, "command", lambda *_: [sys.executable, "-c", "print('out of memory'); raise SystemExit(9)"])
+    with pytest.raises(RuntimeError, match="out of memory"):
+        bpy.ops.viewcam.write_labels()
+    folder, sentence = labels.background.latest
+    assert folder is None and "out of memory" in sentence and list(Path(settings.folder).iterdir()) == []
+
+
+def test_a_shot_that_fails_is_said_in_its_own_words(settings, camera, monkeypatch):
+    summary = '{"shots": [{"name": "Hero", "error": "the disk is full"}]}'
+    fails = "import json, pathlib, sys; out = json.loads(pathlib.Path(sys.argv[1]).read_text())['plan']['out'];"
+    fails += "pathlib.Path(out, 'summary.json').write_text(sys.argv[2]); sys.exit(4)"
+    monkeypatch.setattr(comparing, "command", lambda *given: [sys.executable, "-c", fails, str(given[2]), summary])
+    with pytest.raises(RuntimeError, match="The disk is full"):
+        bpy.ops.viewcam.write_labels()
+
+
+def test_while_labels_are_written_there_is_cancel_and_no_second_start(settings, camera, monkeypatch, scene):
+    monkeypatch.setattr(comparing, "command", lambda *_: [sys.executable, "-c", "import time; time.sleep(600)"])
+    labels.background.running = writing = labels.Writing(camera, scene, settings)
+    assert writing.poll() is None and not bpy.ops.viewcam.write_labels.poll()
+    assert bpy.ops.viewcam.cancel_labels() == {"FINISHED"}
+    assert not bpy.ops.viewcam.cancel_labels.poll() and not writing.folder.exists()
+    assert writing._process.status() is not None
+
+
+@pytest.mark.parametrize(
+    ("kinds", "folder", "sentence"),
+    [(set(), "out", "No label is chosen"), ({"DEPTH"}, "", "There is no folder for the labels, and the file is not saved")],
+)
+def test_what_can_not_be_begun_is_one_sentence(settings, camera, kinds, folder, sentence):
+    settings.kinds, settings.folder = kinds, folder
+    with pytest.raises(RuntimeError, match=sentence):
+        bpy.ops.viewcam.write_labels()
+
+
+def test_nothing_is_left_of_it_without_the_add_on(registered_addon):
+    registered_addon.unregister()
+    try:
+        assert not hasattr(bpy.types.WindowManager, "virtual_pinhole_labels")
+        assert labels.background.on_load not in bpy.app.handlers.load_pre
+    finally:
+        registered_addon.register()
+
+
+@pytest.mark.exhaustive
+def test_the_files_that_the_panel_shows_are_those_that_are_written(settings, monkey):
+    settings.kinds = {kind.upper() for kind in KINDS}
+    shown = labels.file_names(bpy.context.scene.camera, settings.chosen())
+    assert bpy.ops.viewcam.write_labels() == {"FINISHED"}
+    folder, _ = labels.background.latest
+    of_the_batch = {"summary.json", "contact-sheet.html"}
+    assert {path.name for path in folder.glob("[!.]*")} - of_the_batch == set(shown)
+    told = label_files.read(folder / shown[-1])
+    assert "Suzanne" in {each["name"] for each in told["instances"]} and told["lost"] == {"forward": [], "backward": []}
+
+
+# --- The render engine's panels, and those of Blender that it takes over: all gone with the add-on
+
+
+def engines_of_panels():
+    return {
+        each.__name__: set(each.COMPAT_ENGINES) for each in bpy.types.Panel.__subclasses__() if hasattr(each, "COMPAT_ENGINES")
+    }
+
+
+def test_the_add_on_comes_and_goes_and_leaves_blenders_panels_as_they_were(scene):
+    viewcam_addon.unregister()
+    before = engines_of_panels()
+    try:
+        assert not [name for name, engines in before.items() if "VIEWCAM" in engines and not name.startswith("VIEWCAM")]
+        assert not hasattr(bpy.types.Scene, "virtual_pinhole_reference")
+        for _ in range(3):
+            viewcam_addon.register()
+            assert "VIEWCAM" in engines_of_panels()["RENDER_PT_format"]
+            viewcam_addon.unregister()
+            assert engines_of_panels() == before
+            with pytest.raises(TypeError):
+                scene.render.engine = "VIEWCAM"
+    finally:
+        viewcam_addon.register()
+    scene.render.engine = "VIEWCAM"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(
+            "RENDER_PT_format",
+            "RENDER_PT_frame_range",
+            "RENDER_PT_output",
+            "RENDER_PT_stereoscopy",
+            "RENDER_PT_post_processing",
+        ),
+        *("RENDER_PT_color_management", "VIEWLAYER_PT_layer", "DATA_PT_lens", "DATA_PT_camera", "OBJECT_PT_visibility"),
+        *(
+            "EEVEE_MATERIAL_PT_context_material",
+            "EEVEE_MATERIAL_PT_surface",
+            "EEVEE_WORLD_PT_surface",
+            "WORLD_PT_context_world",
+        ),
+    ],
+)
+def test_blenders_panels_that_matter_are_shown(name):
+    assert "VIEWCAM" in engines_of_panels()[name]
+
+
+@pytest.mark.parametrize("name", ["DATA_PT_light", "DATA_PT_spot", "RENDER_PT_simplify", "RENDER_PT_freestyle"])
+def test_panels_of_what_is_not_modelled_or_is_shown_by_ours_are_not(name):
+    assert "VIEWCAM" not in engines_of_panels()[name]
+
+
+@pytest.mark.parametrize("kind", ["POINT", "SUN", "SPOT", "AREA"])
+def test_what_the_lamps_panel_shows_is_there_and_named_once(scene, kind):
+    lamp = bpy.data.lights.new(kind, kind)
+    names = list(render_panels.lamp_settings(lamp))
+    assert {"color", "energy", "use_shadow"} < set(names) and len(set(names)) == len(names)
+    assert not [name for name in names if not hasattr(lamp, name)]
+
+
+def test_passes_in_the_panel_are_those_that_the_tracer_computes(scene):
+    layer = scene.view_layers[0]
+    assert not [name for name in SETTINGS.values() if not hasattr(layer, name)]
+    shown = {name for names in (render_panels.GEOMETRY_PASSES, render_panels.LIGHT_PASSES) for name in names}
+    assert set(SETTINGS) <= shown
+
+
+# --- Operators
+
+
+def test_apply_leaves_a_camera_where_its_values_are(posed_camera):
+    assert bpy.ops.viewcam.apply_camera() == {"FINISHED"}
+    assert tuple(posed_camera.location) == (7, -6, 5)
+
+
+def test_adopt_takes_the_values_of_a_moved_camera(posed_camera):
+    posed_camera.location = (1, 1, 1)
+    bpy.context.view_layer.update()
+    assert bpy.ops.viewcam.adopt_camera() == {"FINISHED"}
+    assert tuple(posed_camera.virtual_pinhole.eye) == (1, 1, 1)
+    assert tuple(posed_camera.location) == (1, 1, 1)
+
+
+def test_another_up_keeps_the_picture_and_makes_its_roll_certain(posed_camera, scene):
+    group = posed_camera.virtual_pinhole
+    group.eye, group.look_at, group.up = (0.5, 0.25, 5), (0.5, 0.25, 0), (0, 0, 1)
+    before, precision = cameras.stated(posed_camera, scene), 2.0**-24
+    assert "roll" in readouts.roll_warning(before, precision)
+    assert bpy.ops.viewcam.choose_up() == {"FINISHED"}
+    after = cameras.stated(posed_camera, scene)
+    assert after.up == (1, 0, 0) and after.basis()[0] == pytest.approx(before.basis()[0], abs=1e-15)
+    assert readouts.roll_warning(after, precision) is None
+
+
+def test_adopt_enables_a_camera(camera_object):
+    bpy.ops.viewcam.adopt_camera()
+    assert camera_object.virtual_pinhole.enabled
+
+
+def test_a_camera_can_be_named(posed_camera, add_camera):
+    other = add_camera("Other")
+    posed_camera.virtual_pinhole.enabled = False
+    bpy.ops.viewcam.adopt_camera(camera="Camera")
+    assert posed_camera.virtual_pinhole.enabled and not other.virtual_pinhole.enabled
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: bpy.ops.viewcam.apply_camera(camera="Nobody"), "There is no camera 'Nobody'"),
+        (lambda: bpy.ops.viewcam.apply_camera(), "is not enabled"),
+        (lambda: bpy.ops.viewcam.choose_up(), "is not enabled"),
+        (lambda: bpy.ops.viewcam.adopt_camera(camera="Lamp"), "'Lamp' is no camera"),
+    ],
+)
+def test_errors_are_reported_in_one_sentence(camera_object, scene, call, message):
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    scene.collection.objects.link(lamp)
+    with pytest.raises(RuntimeError, match=message) as error:
+        call()
+    assert "Traceback" not in str(error.value)
+
+
+def test_without_a_camera_the_buttons_are_off(fresh_blender):
+    assert not bpy.ops.viewcam.apply_camera.poll()
+    assert not bpy.ops.viewcam.adopt_camera.poll()
+
+
+def test_they_work_in_edit_mode_of_another_object(posed_camera, scene):
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.object.mode_set(mode="EDIT")
+    posed_camera.virtual_pinhole.enabled = False
+    bpy.ops.viewcam.adopt_camera(camera="Camera")
+    assert posed_camera.virtual_pinhole.enabled
+
+
+def test_applying_reports_what_did_not_stick(posed_camera, scene, capfd):
+    posed_camera.virtual_pinhole.keyframe_insert("eye", frame=1)
+    posed_camera.driver_add("location", 0).driver.expression = "1.0 + 1.0"
+    bpy.ops.viewcam.apply_camera()
+    assert cameras.check(posed_camera, cameras.stated(posed_camera, scene), scene)[0].sentence in capfd.readouterr().out
+
+
+# --- View menu
+
+
+def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(registered_addon):
+    entries, drags, menus = [], [], []
+
+    def operator(name, text=""):
+        entries.append(name)
+        drags.extend([text] if text else [])
+        return SimpleNamespace()
+
+    layout = SimpleNamespace(operator=operator, menu=menus.append, separator=lambda: None)
+    view_menu.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
+    classes = (*moving.CLASSES, *operators.CLASSES, *baking.CLASSES, *clipboard.IN_MENUS, *scene_cameras.OPERATORS)
+    classes += photo_matching.OPERATORS
+    assert set(entries) == {each.bl_idname for each in classes} and menus == ["VIEWCAM_MT_copy_camera_as"]
+    assert "viewcam.copy_readout" not in entries, "without a text of its own, as from a menu, it would empty the clipboard"
+    assert drags == ["Drag: Orbit", "Drag: Dolly", "Drag: Dolly Zoom", "Drag: Truck"]
+    assert all(getattr(bpy.ops.viewcam, entry.split(".")[1]).get_rna_type() for entry in entries)
+
+
+def test_the_menu_stands_under_view_cameras(registered_addon):
+    menus = []
+    layout = SimpleNamespace(menu=menus.append, separator=lambda: None)
+    view_menu._draw(SimpleNamespace(layout=layout), bpy.context)
+    assert menus == ["VIEWCAM_MT_cameras"] and hasattr(bpy.types, menus[0])
+    assert view_menu._draw in bpy.types.VIEW3D_MT_view_cameras._dyn_ui_initialize()
+
+
+def test_the_menu_goes_with_the_add_on(registered_addon):
+    functions = bpy.types.VIEW3D_MT_view_cameras._dyn_ui_initialize
+    count = len(functions())
+    viewcam_addon.unregister()
+    try:
+        assert len(functions()) == count - 1 and not hasattr(bpy.types, "VIEWCAM_MT_cameras")
+    finally:
+        viewcam_addon.register()
+    assert len(functions()) == count

@@ -1,11 +1,21 @@
 """What a scene refuses, each in a sentence that names the object."""
 
+import functools
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
+from viewcam_addon.tracer.scene.film import Bounces
+from viewcam_addon.tracer.scene.lamps import RAYS, Area, Point, Spot, Sun, World
+from viewcam_addon.tracer.scene.levels import least_level
+from viewcam_addon.tracer.scene.materials import Colour, Material, components
+from viewcam_addon.tracer.scene.shader_nodes import node
 
 CAMERA = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 4, 4)
 
@@ -65,3 +75,237 @@ def test_what_is_wrong_is_named_in_one_sentence(build, words):
 def test_a_scene_that_is_right_is_taken():
     scene = Scene(CAMERA, {"mesh": triangle(), "beads": beads()}, (placed(), placed(geometry="beads")), clip=(1, 100))
     assert scene.clip == (1.0, 100.0) and isinstance(scene.clip[1], float)
+
+
+# --- The least level: no more than a scene needs, and a sentence that names why
+
+
+WHITE, BLACK = Colour((1.0, 1.0, 1.0)), Colour((0.0, 0.0, 0.0))
+SUN = Sun("Sun", irradiance=(1.0, 1.0, 1.0))
+
+
+@pytest.fixture
+def scene(make_scene, make_mesh):
+    """scene(material, field=value, …) → a Scene of one triangle of this material, "object 1"."""
+
+    def build(material=None, **changes):
+        made = make_scene(Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 4, 4), make_mesh(np.eye(3), [[0, 1, 2]]))
+        if material:
+            placed = replace(made.objects[0], materials=("M",))
+            made = replace(made, objects=(placed,), materials={"M": material})
+        return replace(made, **changes)
+
+    return build
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"lamps": (replace(SUN, irradiance=(0.0, 0.0, 0.0)), Point("Off", power=(0.0, 0.0, 0.0)))},
+        {"world": World(hidden_from={"camera"})},
+        {"material": Material(emission=BLACK)},
+    ],
+)
+def test_without_light_there_is_only_geometry(scene, changes):
+    level, reason = least_level(scene(**changes))
+    assert level == "geometry" and "Nothing gives light" in reason
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"lamps": (SUN,)}, "the lamp 'Sun'"),
+        ({"lamps": (Area("Panel", matrix=np.eye(4)),)}, "the lamp 'Panel'"),
+        ({"material": Material(emission=WHITE, diffuse=WHITE)}, "the surface of 'object 1'"),
+        ({"world": World((0.0, 0.5, 0.0))}, "the world"),
+        ({"world": World(backdrop=World((0.0, 0.5, 0.0)))}, "the world"),
+    ],
+)
+def test_light_on_a_surface_that_reflects_needs_paths(scene, changes, words):
+    level, reason = least_level(scene(**changes))
+    assert level == "path" and words in reason and "'object 1' reflects" in reason
+
+
+@pytest.mark.parametrize(
+    ("material", "words"),
+    [(Material(mirror=WHITE), "mirrors"), (Material(glass=WHITE), "is clear"), (Material(refraction=WHITE), "is clear")],
+)
+def test_mirrors_and_glass_need_paths(scene, material, words):
+    level, reason = least_level(scene(material, lamps=(SUN,)))
+    assert level == "path" and f"'object 1' {words}" in reason
+
+
+@pytest.mark.parametrize(
+    ("material", "bounces", "words"),
+    [
+        (None, Bounces().none, "allows no bounces"),
+        (Material(emission=WHITE), Bounces(), "nothing reflects"),
+        (Material(diffuse=BLACK), Bounces(), "nothing reflects"),
+        (Material(diffuse=WHITE), Bounces(diffuse=0), "of the kinds"),
+        (Material(mirror=WHITE), Bounces(glossy=0), "of the kinds"),
+        (Material(glass=WHITE), Bounces(transmission=0, glossy=0), "of the kinds"),
+    ],
+)
+def test_without_bounces_light_is_direct(scene, material, bounces, words):
+    level, reason = least_level(scene(material, lamps=(SUN,), bounces=bounces))
+    assert level == "direct" and words in reason
+
+
+def test_glass_that_only_reflects_needs_paths(scene):
+    assert least_level(scene(Material(glass=WHITE), lamps=(SUN,), bounces=Bounces(transmission=0)))[0] == "path"
+
+
+def test_materials_that_nothing_shows_do_not_count(scene):
+    made = scene(Material(emission=WHITE))
+    unused = replace(made, materials=made.materials | {"Mirror": Material(mirror=WHITE)})
+    assert least_level(unused)[0] == "direct"
+
+
+# --- Trees of shaders that are sums of components, and those that are not
+
+
+RED, BLUE = Colour((0.5, 0.25, 0.125)), Colour((0.0, 0.25, 1.0))
+WOOD, BARK = Colour((1.0, 1.0, 1.0), "wood"), Colour((1.0, 1.0, 1.0), "bark")
+COLOURS = st.builds(Colour, st.tuples(*[st.floats(0.01, 1.0)] * 3))
+
+
+def added(*shaders):
+    return functools.reduce(lambda first, second: node("add", first=first, second=second), shaders)
+
+
+def mixed(factor, first, second):
+    return node("mix", factor=factor, first=first, second=second)
+
+
+@given(st.dictionaries(st.sampled_from(["diffuse", "emission", "mirror", "glass", "refraction"]), COLOURS))
+def test_the_components_of_what_a_material_adds_up_are_its_own(given):
+    material = Material(**given, ior=1.3)
+    tree = added(*(closure.node for closure in material.closures)) if given else None
+    found = components(tree)
+    assert Material(**found).colours == given
+    assert found.get("ior", 1.3) == 1.3
+
+
+def test_a_mixture_shares_out_colours_and_adds_those_that_are_alike():
+    red, blue = node("diffuse", color=RED), node("diffuse", color=BLUE)
+    assert components(mixed(0.25, red, None)) == {"diffuse": Colour((0.375, 0.1875, 0.09375))}
+    assert components(mixed(0.5, red, blue)) == {"diffuse": Colour((0.25, 0.25, 0.5625))}
+    assert components(mixed(0.0, red, node("sheen"))) == {"diffuse": RED}
+    wood = node("diffuse", color=WOOD)
+    assert components(mixed(0.25, wood, wood)) == {"diffuse": WOOD}
+
+
+def test_a_principled_surface_without_gloss_is_diffuse_and_may_shine():
+    plain = {"base_color": RED, "roughness": 0.3, "specular_ior_level": 0.0}
+    assert components(node("principled", **plain)) == {"diffuse": RED}
+    assert components(node("principled", base_color=RED, ior=1.0)) == {"diffuse": RED}
+    shining = node("principled", **plain, emission_color=BLUE, emission_strength=2.0)
+    assert components(shining) == {"diffuse": RED, "emission": Colour((0.0, 0.5, 2.0))}
+    for name in ("metallic", "transmission_weight", "coat_weight", "sheen_weight", "diffuse_roughness", "specular_ior_level"):
+        assert components(node("principled", **(plain | {name: 0.1}))) is None, name
+    assert components(node("principled", **plain, alpha=0.9)) is None
+
+
+@pytest.mark.parametrize(
+    "tree",
+    [
+        node("glossy", color=RED, roughness=0.1),
+        node("diffuse", color=RED, roughness=0.1),
+        node("diffuse", color=node("noise")),
+        node("diffuse", color=RED, normal=node("geometry", output="normal")),
+        node("emission", color=RED, strength=node("noise")),
+        node("emission", color=Colour((1e18, 0.0, 0.0)), strength=2.0),
+        node("glass", color=RED, roughness=0.0, ior=node("noise")),
+        added(node("glass", roughness=0.0, ior=1.3), node("refraction", roughness=0.0, ior=1.4)),
+        added(node("diffuse", color=WOOD), node("diffuse", color=BARK)),
+        mixed(node("noise"), node("diffuse"), None),
+        mixed(0.5, node("diffuse"), node("sheen")),
+        node("transparent"),
+    ],
+)
+def test_what_components_can_not_say_is_none(tree):
+    assert components(tree) is None
+
+
+# --- What lamps may be: hostile values become a sentence, and what gives no light is known
+
+
+EYE = np.eye(4)
+
+
+@pytest.mark.parametrize(
+    ("make", "named"),
+    [
+        (lambda: Sun("key", irradiance=(1, float("nan"), 1)), "irradiance of light 'key'"),
+        (lambda: Sun("key", irradiance=(1, -1, 1)), "irradiance of light 'key'"),
+        (lambda: Sun("key", towards=(0, 0, 0)), "towards of light 'key'"),
+        (lambda: Sun("key", towards=(0, float("inf"), 0)), "towards of light 'key'"),
+        (lambda: Sun("key", angle=3.2), "angle of light 'key'"),
+        (lambda: Sun("key", casts_shadow=2), "casts_shadow of light 'key'"),
+        (lambda: Sun("key", multiple_importance=2), "multiple_importance of light 'key'"),
+        (lambda: Point("key", power=(1e30,) * 3), "power of light 'key'"),
+        (lambda: Point("key", position=(0, 0, 1e19)), "position of light 'key'"),
+        (lambda: Point("key", radius=-1), "radius of light 'key'"),
+        (lambda: Point("key", hidden_from={"shadows"}), "light 'key'"),
+        (lambda: Spot("key"), "matrix of light 'key'"),
+        (lambda: Spot("key", matrix=EYE * float("nan")), "matrix of light 'key'"),
+        (lambda: Spot("key", matrix=EYE[:3]), "matrix of light 'key'"),
+        (lambda: Spot("key", matrix=EYE, blend=1.1), "blend of light 'key'"),
+        (lambda: Spot("key", matrix=EYE, angle=-0.1), "angle of light 'key'"),
+        (lambda: Area("key", matrix=EYE * 1e19), "matrix of light 'key'"),
+        (lambda: Area("key", matrix=EYE, size=(1, -1)), "size of light 'key'"),
+        (lambda: Area("key", matrix=EYE, size=(1, 2, 3)), "size of light 'key'"),
+        (lambda: Area("key", matrix=EYE, spread=0), "spread of light 'key'"),
+        (lambda: Area("key", matrix=EYE, spread=3.2), "spread of light 'key'"),
+        (lambda: World((1, 2)), "radiance of the world"),
+        (lambda: World((1, 2, 3), hidden_from={"eye"}), "the world"),
+        (lambda: World(backdrop=World(hidden_from={"camera"})), "backdrop of the world"),
+    ],
+)
+def test_a_lamp_that_cannot_be_is_refused_by_name(make, named):
+    with pytest.raises(InputError, match=named) as refused:
+        make()
+    assert "\n" not in str(refused.value)
+
+
+def test_half_a_turn_in_float32_is_half_a_turn():
+    half = float(np.float32(np.pi))
+    assert half > np.pi and Sun("sun", angle=half).angle == np.pi == Spot("spot", matrix=EYE, angle=half).angle
+
+
+def test_the_direction_to_a_sun_is_of_unit_length_at_any_scale():
+    for scale in (1e-300, 1.0, 1e300):
+        assert np.linalg.norm(Sun("sun", towards=(scale, -2 * scale, 2 * scale)).towards) == pytest.approx(1, rel=1e-15)
+
+
+def test_the_area_of_a_lamp_is_that_in_the_world():
+    matrix = np.diag([2.0, -3.0, 5.0, 1.0])
+    assert Area("area", matrix=matrix, size=(1, 0.5)).area == pytest.approx(3)
+    assert Area("area", matrix=matrix, size=(1, 0.5), ellipse=True).area == pytest.approx(3 * np.pi / 4)
+    sheared = EYE.copy()
+    sheared[0, 1] = 7
+    assert Area("area", matrix=sheared).area == pytest.approx(1)
+
+
+@pytest.mark.parametrize(
+    ("lamp", "dark"),
+    [
+        (Sun("lamp", irradiance=(0, 0, 0)), True),
+        (Sun("lamp", irradiance=(0, 0, 1e-30)), False),
+        (Point("lamp", power=(0, 0, 0)), True),
+        (Point("lamp"), False),
+        (Spot("lamp", matrix=np.diag([1.0, 1, 0, 1])), True),
+        (Spot("lamp", matrix=EYE), False),
+        (Area("lamp", matrix=EYE, size=(0, 1)), True),
+        (Area("lamp", matrix=np.diag([0.0, 1, 1, 1])), True),
+        (Area("lamp", matrix=np.diag([1.0, 1, 0, 1])), True),
+        (Area("lamp", matrix=EYE), False),
+    ],
+)
+def test_what_has_no_power_no_area_or_no_direction_is_dark(lamp, dark):
+    assert lamp.is_dark == dark
+
+
+def test_every_kind_of_ray_may_be_hidden_from():
+    assert Sun("sun", hidden_from=RAYS).hidden_from == World(hidden_from=RAYS).hidden_from == frozenset(RAYS)
