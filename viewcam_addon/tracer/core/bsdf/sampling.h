@@ -28,7 +28,7 @@ template <class T> inline Vec3Of<T> cone_direction(Vec3Of<T> axis, Scalar<T> spr
 }
 
 // 1 − cos of angles up to a right one: a light that is far away fills a cone whose cosine is 1 to the last bit.
-inline double one_minus_cosine(double squared_sine) { return squared_sine / (1 + std::sqrt(1 - squared_sine)); }
+template <class T> inline T one_minus_cosine(T squared_sine) { return squared_sine / (1.0 + sqrt(1.0 - squared_sine)); }
 
 // About the cosine under which what reaches `reach` round a place is seen, 0 only if all of it is below the horizon.
 // height: of the place above the surface's plane. distance: of the place.

@@ -37,6 +37,10 @@ template <class T> struct LightSampleOf {
     }
 };
 using LightSample = LightSampleOf<double>;
+template <class T> inline LightSampleOf<T> select(Mask<T> mask, const LightSampleOf<T>& a, const LightSampleOf<T>& b) {
+    return {select(mask, a.direction, b.direction), select(mask, a.distance, b.distance), select(mask, a.weight, b.weight), select(mask, a.pdf, b.pdf),
+            select(mask, a.cosine, b.cosine)};
+}
 
 // A ray that may run into lights, its direction unit. escaped: whether it meets no surface. start: from where its length counts.
 struct LightRay {

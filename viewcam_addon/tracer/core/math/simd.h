@@ -129,6 +129,7 @@ template <class Of> inline auto gather4(const Of& of) {
 }
 
 inline bool any(long4 mask) { return bits(mask); }
+inline bool all(long4 mask) { return bits(mask) == 15; }
 // The bits of numbers, and numbers of bits.
 inline uint64_t bits_of(double x) { return std::bit_cast<uint64_t>(x); }
 inline ulong4 bits_of(double4 x) { return (ulong4)x; }

@@ -58,21 +58,22 @@ inline double cos(double angle) { return sincos_of_turns(angle * (0.5 / PI)).cos
 
 namespace detail {
 // The arc sine of 0 ≤ x ≤ ½.
-inline double asin_of_small(double x) {
+template <class T> inline T asin_of_small(T x) {
     static constexpr double ASIN[] = {0.16666666666666666,  0.07500000000000118,  0.044642857142551895, 0.03038194447553234,
                                       0.02237215744350722,  0.017352816540325496, 0.01396378001220357,  0.011566459612121669,
                                       0.009621842970100282, 0.009319560794767446, 0.0030448799094556773, 0.019554513336123378,
                                       -0.01924167174674304, 0.02961201126495512};
-    double squared = x * x;
+    T squared = x * x;
     return x + x * (squared * polynomial(squared, ASIN));
 }
 }  // namespace detail
 
 // Of what is rounded to beyond ±1, as of ±1.
-inline double asin(double x) {
-    double size = std::fabs(x);
-    double angle = size <= 0.5 ? detail::asin_of_small(size) : PI / 2 - 2 * detail::asin_of_small(std::sqrt(larger((1 - size) / 2, 0.0)));
-    return std::copysign(angle, x);
+template <class T> inline T asin(T x) {
+    T size = abs(x);
+    Mask<T> is_small(size <= 0.5);
+    T angle = detail::asin_of_small(select(is_small, size, sqrt(max((1.0 - size) / 2.0, T{}))));
+    return copysign(select(is_small, angle, PI / 2 - 2.0 * angle), x);
 }
 inline double acos(double x) {
     if (std::fabs(x) <= 0.5) return PI / 2 - asin(x);

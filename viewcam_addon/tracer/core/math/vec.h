@@ -20,6 +20,8 @@ inline double sqrt(double a) { return std::sqrt(a); }
 inline double select(bool mask, double a, double b) { return mask ? a : b; }
 inline double copysign(double size, double sign) { return std::copysign(size, sign); }
 inline bool any(bool mask) { return mask; }
+inline bool all(bool mask) { return mask; }
+inline double abs(double a) { return std::fabs(a); }
 
 // Of numbers, or of double4 where four are computed at once (simd.h).
 template <class T> struct Vec2Of {
