@@ -22,12 +22,12 @@ TURN, EYE = KNOWN.opencv.ravel().tolist(), KNOWN.e.tolist()
 def transforms():
     document = json.loads(cameras.write([Camera("good", CAMERAS["plain"]), Camera("bad", CAMERAS["plain"])], "transforms"))
     lens = {key: document.pop(key) for key in ("fl_x", "fl_y", "cx", "cy", "w", "h", "camera_angle_x", "camera_angle_y")}
-    for frame, more in zip(document["frames"], ({}, {"camera_model": "OPENCV_FISHEYE", "k1": 0.1}), strict=True):
+    for frame, more in zip(document["frames"], ({}, {"camera_model": "EQUIRECTANGULAR"}), strict=True):
         frame.update(lens | more)
     return json.dumps(document)
 
 
-def colmap(model="2 OPENCV_FISHEYE 640 360 300 300 320 180 0.01 0 0 0"):
+def colmap(model="2 EQUIRECTANGULAR 640 360 640 360"):
     return {
         "cameras.txt": f"1 PINHOLE 640 360 600 600 320 180\n{model}\n",
         "images.txt": "1 1 0 0 0 0 0 4 1 good.png\n\n2 1 0 0 0 0.1 0 4 2 bad.png\n\n",
@@ -44,12 +44,12 @@ def colmap_binary(tmp_path):
 
 def kalibr():
     both = "\n  resolution: [640, 360]\n  intrinsics: [600, 600, 320, 180]\n  distortion_coeffs: [0, 0, 0, 0]\n"
-    return f"good:{both}  distortion_model: radtan\nbad:{both}  distortion_model: equidistant\n"
+    return f"good:{both}  distortion_model: radtan\nbad:{both}  distortion_model: fov\n"
 
 
 def opencv():
     k = {"K": [[600, 0, 320], [0, 600, 180], [0, 0, 1]], "image_size": [640, 360]}
-    return json.dumps({"good": k, "bad": k | {"dist": [-0.3, 0.1, 0, 0]}})
+    return json.dumps({"good": k, "bad": k | {"model": "omni"}})
 
 
 def skewed():
@@ -88,26 +88,18 @@ def openmvg():
             "views": [{"key": i, "value": data(filename=f"{name}.jpg", id_intrinsic=i, id_pose=i)} for i, name in NAMED],
             "intrinsics": [
                 {"key": i, "value": {"polymorphic_id": i + 1, "polymorphic_name": kind} | data(**lens)}
-                for i, kind in enumerate(("pinhole", "fisheye"))
+                for i, kind in enumerate(("pinhole", "spherical"))
             ],
             "extrinsics": [{"key": i, "value": {"rotation": KNOWN.opencv.tolist(), "center": EYE}} for i in range(2)],
         }
     )
 
 
-def bundler(tmp_path):
-    pose = "1 0 0\n0 1 0\n0 0 1\n0 0 -4\n"
-    (tmp_path / "list.txt").write_text("good.jpg\nbad.jpg\n")
-    (tmp_path / "bundle.out").write_text(f"# Bundle file v0.3\n2 0\n600 0 0\n{pose}600 -0.2 0.1\n{pose}")
-    return tmp_path / "bundle.out"
-
-
 def realitycapture(tmp_path):
-    for name, bent in (("good", "0 0 0 0 0 0"), ("bad", "-0.2 0 0 0 0 0")):
+    for name, skew in (("good", "0"), ("bad", "0.1")):
         (tmp_path / f"{name}.xmp").write_text(
-            '<x xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#" xcr:FocalLength35mm="30" xcr:DistortionModel="brown3">'
-            f"<xcr:Rotation>1 0 0 0 1 0 0 0 1</xcr:Rotation><xcr:Position>1 2 3</xcr:Position>"
-            f"<xcr:DistortionCoeficients>{bent}</xcr:DistortionCoeficients></x>"
+            f'<x xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#" xcr:FocalLength35mm="30" xcr:Skew="{skew}">'
+            f"<xcr:Rotation>1 0 0 0 1 0 0 0 1</xcr:Rotation><xcr:Position>1 2 3</xcr:Position></x>"
         )
     return tmp_path
 
@@ -137,13 +129,13 @@ def mitsuba():
 
 NAMED = [*enumerate(("good", "bad"))]
 MIXED = (
-    *(transforms, colmap, colmap_binary, kalibr, opencv, skewed, metashape, meshroom, openmvg, bundler, realitycapture),
+    *(transforms, colmap, colmap_binary, kalibr, opencv, skewed, metashape, meshroom, openmvg, realitycapture),
     *(gltf, usd, three_js, mitsuba),
 )
 
 
 def given(make, folder) -> Path | str:
-    made = make(folder) if make in (colmap_binary, bundler, realitycapture) else make()
+    made = make(folder) if make in (colmap_binary, realitycapture) else make()
     if isinstance(made, dict):
         for name, text in made.items():
             (folder / name).write_text(text)
@@ -165,11 +157,11 @@ def test_one_camera_that_is_no_pinhole_keeps_none_of_the_others_back(tmp_path, m
 
 
 def test_where_all_are_no_pinholes_the_first_is_named():
-    with pytest.raises(InputError, match="OPENCV_FISHEYE"):
+    with pytest.raises(InputError, match="EQUIRECTANGULAR"):
         cameras.read(
             transforms()
-            .replace("PINHOLE", "OPENCV_FISHEYE")
-            .replace('"file_path": "good.png"', '"file_path": "good.png", "camera_model": "OPENCV_FISHEYE"')
+            .replace("PINHOLE", "EQUIRECTANGULAR")
+            .replace('"file_path": "good.png"', '"file_path": "good.png", "camera_model": "EQUIRECTANGULAR"')
         )
 
 

@@ -1,6 +1,7 @@
 """Formats that are only read: files made here by each format's own rule, from the camera's axes alone, are the same camera."""
 
 import json
+import re
 import struct
 
 import numpy as np
@@ -143,11 +144,12 @@ def test_metashapes_chunk_says_once_more_where_its_component_stands():
         cameras.read(text.replace('component_id="0"', 'component_id="1"'))
 
 
-def test_metashapes_distortion_is_refused_with_its_pixels_or_taken_without():
+def test_metashapes_distortion_is_kept_and_told_with_its_pixels_or_left_out():
     known = Known("plain")
     text = metashape(known, "<k1>-0.1</k1><p1>0.001</p1>")
-    with pytest.raises(InputError, match=r"corner by [\d.]+ pixels"):
-        cameras.read(text)
+    (bent,) = cameras.read(text)
+    assert bent.lens.radial[0] == -0.1 and bent.lens.tangential == (0, 0.001)  # Metashape's p1 is OpenCV's p2
+    assert any(re.search(r"moves the picture's corner by [\d.]+ pixels", note) for note in bent.notes)
     (camera,) = cameras.read(text, options=Options(without_distortion=True))
     assert any("left out" in note and "pixels" in note for note in camera.notes)
 
@@ -353,7 +355,7 @@ def test_nukes_chan_is_no_trajectory_of_tum(tmp_path, angles):
             cameras.read((tmp_path / "a.chan").read_text(), options=Options(base=CAMERAS["plain"]))
 
 
-def test_euroc_cameras_that_are_fisheyes_are_refused_even_without_coefficients(tmp_path):
+def test_euroc_cameras_that_are_fisheyes_are_so_even_without_coefficients(tmp_path):
     (tmp_path / "state").mkdir()
     (tmp_path / "cam0").mkdir()
     data = tmp_path / "state" / "data.csv"
@@ -361,9 +363,12 @@ def test_euroc_cameras_that_are_fisheyes_are_refused_even_without_coefficients(t
     sensor = "T_BS:\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nresolution: [640, 480]\n"
     sensor += "intrinsics: [500, 500, 320, 240]\ndistortion_model: {}\ndistortion_coefficients: [0, 0, 0, 0]\n"
     (tmp_path / "cam0" / "sensor.yaml").write_text(sensor.format("radial-tangential"))
-    assert cameras.read(data)[0].pinhole.eye == (1, 2, 3)
+    (straight,) = cameras.read(data)
+    assert straight.pinhole.eye == (1, 2, 3) and straight.lens is None
     (tmp_path / "cam0" / "sensor.yaml").write_text(sensor.format("equidistant"))
-    with pytest.raises(InputError, match="equidistant"):
+    assert cameras.read(data)[0].lens.projection == "equidistant"
+    (tmp_path / "cam0" / "sensor.yaml").write_text(sensor.format("omni"))
+    with pytest.raises(InputError, match="omni"):
         cameras.read(data)
 
 
@@ -470,8 +475,6 @@ K = {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "image_size": [640, 480]}
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        ({"k1": 0.1}, "corner by"),
-        ({"distortion": [0.1, 0, 0, 0]}, "corner by"),
         ({"radial_distortion": [0.1, 0.2]}, "radialdistortion"),
         ({"kc": [0.1, 0.2]}, "kc"),
         ({"R": [0.1, 0.2, 0.3], "t": [0, 0, 0]}, "rotation vector"),
@@ -481,8 +484,8 @@ K = {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "image_size": [640, 480]}
         ({"R": np.eye(3).tolist(), "rvec": [0, 0, 1], "t": [0, 0, 0]}, "different rotations"),
         ({"K": [[500, 0, 0], [0, 500, 0], [320, 240, 1]]}, "transpose"),
         ({"K": [[500, 2, 320], [0, 500, 240], [0, 0, 1]]}, "skew"),
-        ({"model": "fisheye"}, "fisheye"),
-        ({"camera_model": "pinhole", "distortion_model": "equidistant", "distortion_coeffs": [0, 0, 0, 0]}, "equidistant"),
+        ({"model": "omni"}, "omni"),
+        ({"model": "fisheye", "dist": [0.1, 0, 0, 0, 0]}, "fisheye has four"),
         ({"distortion_model": "fov"}, "fov"),
         ({"cam_to_robot_transform": np.eye(4).tolist()}, "whose axes"),
         ({"binning_x": 1.5}, "whole number of pixels"),

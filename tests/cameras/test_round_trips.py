@@ -309,11 +309,11 @@ def test_of_several_codes_one_that_is_cut_off_after_its_name_is_told_by_it(form)
 def test_a_folder_with_files_of_others_says_which_were_not_read(tmp_path):
     cameras.save([Camera(name, CAMERAS["plain"]) for name in ("left", "right")], tmp_path, "ros")
     (tmp_path / "settings.yaml").write_text("rate: 30\n")
-    (tmp_path / "fisheye.yml").write_text((tmp_path / "left.yaml").read_text().replace("plumb_bob", "equidistant"))
+    (tmp_path / "omni.yml").write_text((tmp_path / "left.yaml").read_text().replace("plumb_bob", "omni"))
     found = cameras.read(tmp_path)
     assert [camera.name for camera in found] == ["left", "right"]
     assert all(any("settings.yaml" in note for note in camera.notes) for camera in found)
-    assert all(any("fisheye" in note for note in camera.notes) for camera in found)
+    assert all(any("omni" in note for note in camera.notes) for camera in found)
     assert cameras.read(tmp_path, format="ros") == found
 
 

@@ -82,6 +82,19 @@ def _crate() -> bytes:
         return (Path(folder) / "a.usdc").read_bytes()
 
 
+def _lenses() -> dict[str, str]:
+    models = [
+        "OPENCV 640 360 600 600 320 180 -0.1 0.02 0.001 0.002", "OPENCV_FISHEYE 640 360 300 300 320 180 0.1 0 0 0",
+        "FOV 640 360 600 600 320 180 0.9", "DIVISION 640 360 600 600 320 180 -0.2", "EUCM 640 360 600 600 320 180 0.5 1.2",
+        "FULL_OPENCV 640 360 600 600 320 180 0.1 -0.05 0.01 -0.02 0.03 0.05 0.01 0.02",
+    ]  # fmt: skip
+    return {
+        ".": "",
+        "cameras.txt": "".join(f"{number} {model}\n" for number, model in enumerate(models)),
+        "images.txt": "".join(f"{number} 1 0 0 0 0 0 4 {number} {number}.png\n\n" for number in range(len(models))),
+    }
+
+
 def _ros() -> str:
     return published.ros("flow", (1280, 800), (2, 2), (320, 200, 640, 480))
 
@@ -156,4 +169,6 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "chan": {"a.chan": "1 0 1 5 0 0 0 45\n2 0 1 5 0 0 0 45\n"},
         "transforms_applied": {"a.json": json.dumps(documents.documents()[1])},
         "metashape_bent": {"a.xml": published.metashape(known, "<k1>-0.01</k1>")},
+        "colmap_lenses": _lenses(),
+        "opencv_fisheye": {"a.json": json.dumps({**published.K, "model": "fisheye", "dist": [0.1, -0.02, 0.005, 0]})},
     }  # fmt: skip

@@ -33,6 +33,7 @@ SMALL_SECONDS, SMALL_MEMORY = 5.0, 2**30
 """For a file of cameras or labels; of computing, and beyond what this process has to begin with."""
 
 LONGEST = 1500  # characters of a sentence, which may name files
+CORNERS = np.array([[x, y] for x in (-0.5, 0.0, 0.5) for y in (-0.3, 0.0, 0.3)])  # of a picture, in the plane at distance 1
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 14, "width": 16, "height": 12}
 IDENTITY = np.eye(4).tolist()
@@ -402,6 +403,8 @@ def cameras_of(name: str) -> Feed:
             for line in (camera.name, *camera.notes):
                 if len(line) > LONGEST or not all(map(str.isprintable, line.split(" "))):
                     raise Said(f"a name or note is no line of a few characters that show: {line[:200]!r}")
+            if camera.lens is not None:
+                camera.lens.folds(camera.lens.undistort(CORNERS))
         try:
             cameras.write([Camera(f"{i}", each.pinhole) for i, each in enumerate(found[:3])], chance.choice(cameras.writable()))
         except InputError as error:
@@ -506,7 +509,7 @@ CAMERAS = (
     *("fspy", "metashape", "metashape_bent", "realitycapture", "meshroom", "openmvg", "bundler", "llff", "polycam", "scanner"),
     *("record3d", "gaussian_splatting", "ros", "ros_window", "opencv", "opencv_json", "opencv_xml", "opencv_npz", "kalibr"),
     *("tum", "kitti", "euroc", "chan", "three_js", "mitsuba", "mitsuba_dictionary", "pov_ray", "pbrt", "matrices", "look_at"),
-    *("vtk", "textbook", "looks", "looks_gl", "looks_vtk", "text", "text_of_people"),
+    *("vtk", "textbook", "looks", "looks_gl", "looks_vtk", "text", "text_of_people", "colmap_lenses", "opencv_fisheye"),
 )
 """The kinds of camera_files.py, which makes them only when it is asked."""
 

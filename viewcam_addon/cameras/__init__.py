@@ -8,7 +8,8 @@
     camera.py       Camera and Options
     axes.py         the one place of conventions: axes, pixels, world
     source.py       what is read from: text, file, folder; JSON and XML without their dangers
-    distortion.py   what a lens bends, in pixels at the corner
+    distortion.py   lenses: what they do with a pinhole's picture
+    undistortion.py photographs without their lens
     and a module for each format
 
 A format is a module in `FORMATS` with
@@ -58,6 +59,7 @@ from . import (
     bundler,
     colmap,
     colmap_binary,
+    distortion,
     fspy,
     gaussian_splatting,
     gltf,
@@ -288,6 +290,8 @@ def write(cameras: Iterable[Camera], format: str, options: Options | None = None
     cameras = [moved_back(camera, options) for camera in cameras]
     if not cameras:
         raise InputError("there is no camera to write: give one at least")
+    for camera in cameras:
+        distortion.refuse(camera.lens, camera.pinhole.plane, camera.name, _module(format, "write").TITLE)
     written: str | dict[str, str | bytes] = _module(format, "write").write(cameras, options)
     return written
 

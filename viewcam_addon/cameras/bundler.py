@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming
-from .camera import Camera, LeftOut, Options
+from .camera import Camera, Options
 from .source import Source, flat, image_size, numbered_lines, table
 
 TITLE = "Bundler"
@@ -38,33 +38,37 @@ def read(source: Source, options: Options) -> list[Camera]:
     paths = paths if len(paths) == len(blocks) else [f"camera {index}" for index in range(len(blocks))]
     names = naming.distinct(paths)
     placed = [index for index, (f, _, _) in enumerate(blocks[:, 0].tolist()) if f]
-    left_out, lenses = LeftOut(), {}
-    for index in placed:
-        with left_out.unless_pinhole(names[index]):
-            lenses[index] = _lens(blocks[index, 0].tolist(), source, paths[index], names[index], options)
+    lenses = {index: _lens(blocks[index, 0].tolist(), source, paths[index], names[index], options) for index in placed}
     turns, translations = blocks[[*lenses], 1:4] * _OPENCV[:, None], blocks[[*lenses], 4] * _OPENCV
     matrices = axes.from_worlds_to_cameras(turns, translations, [names[index] for index in lenses])
     poses = axes.pinholes(matrices, [plane for plane, *_ in lenses.values()], [names[index] for index in lenses])
     cameras = [
-        Camera(names[index], pinhole, stated, (*notes, *more), paths[index] if naming.has_suffix(paths[index]) else None)
-        for (index, (_, stated, notes)), (pinhole, more) in zip(lenses.items(), poses, strict=True)
+        Camera(
+            names[index],
+            pinhole,
+            stated,
+            (*notes, *more),
+            paths[index] if naming.has_suffix(paths[index]) else None,
+            lens=lens,
+        )
+        for (index, (_, stated, lens, notes)), (pinhole, more) in zip(lenses.items(), poses, strict=True)
     ]
     lost = len(blocks) - len(placed)
     if lost and not placed:
         raise InputError(f"none of the {lost} cameras of {source.name} was placed: let Bundler place them first")
     told = (f"{lost} cameras that were not placed were left out",) if lost else ()
-    return [camera.noted(*told) for camera in left_out.told(cameras)]
+    return [camera.noted(*told) for camera in cameras]
 
 
 def _lens(
     numbers: list[float], source: Source, path: str, name: str, options: Options
-) -> tuple[ViewPlane, bool, tuple[str, ...]]:
-    """The view plane, whether its size is the picture's, and notes. numbers : f, k1, k2."""
+) -> tuple[ViewPlane, bool, distortion.Lens | None, tuple[str, ...]]:
+    """The view plane, whether its size is the picture's, the lens, and notes. numbers : f, k1, k2."""
     f, k1, k2 = numbers
     if f < 0:
         raise InputError(f"{name} of {source.name} has the focal length {f:g}: give one above 0")
     size = image_size(source.path.parent / path) if source.path else None
     width, height = size or options.size_or_refuse(name)
     plane = axes.view_plane(f, f, width / 2, height / 2, (width, height))
-    lens = {"k1": k1, "k2": k2}
-    return plane, size is not None, distortion.settle(lens, distortion.opencv(lens), plane, name, options)
+    lens = distortion.opencv({"k1": k1, "k2": k2})
+    return plane, size is not None, *distortion.settle(lens, plane, name, options.without_distortion)

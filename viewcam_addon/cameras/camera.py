@@ -8,6 +8,7 @@ from typing import NoReturn
 from .. import checks
 from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
+from .distortion import Lens
 
 AXES = {
     "as_is": "As they are: the numbers stay those of the file",
@@ -31,7 +32,8 @@ _NAMED = 8
 class Camera:
     """A named, complete camera.
 
-    name : as the file has it, or made from its number. pinhole : all of it. size_stated : whether the file says how many
+    name : as the file has it, or made from its number. pinhole : all of it, but for the lens: it shows the undistorted picture.
+    lens : what bends the picture that was taken; None where nothing does. size_stated : whether the file says how many
     pixels the picture has, or tells it by the picture itself; else they are those of `Options`. notes : sentences on what was
     in the file and did not come along, or how it was taken. image : the picture's path, as the file has it. picture : the
     picture itself, encoded, where the file holds it. time : seconds, where the file says when. left_out : (name, sentence) of
@@ -46,6 +48,7 @@ class Camera:
     picture: bytes | None = field(default=None, repr=False)
     time: float | None = None
     left_out: tuple[tuple[str, str], ...] = field(default=(), repr=False)
+    lens: Lens | None = None
 
     def noted(self, *notes: str) -> "Camera":
         """This camera with more notes, each of them once."""
@@ -60,10 +63,10 @@ class Options:
     says none. pixel_aspect : width of a pixel over its height, where a file says none. view_plane : the intrinsics where a
     file says none. base : the camera whose values stand where a text says only some. angle_unit : one of ANGLES, where a text
     says none. pixel : one of PIXELS, in place of what the format has by habit. pose : one of POSES, where a name does not say
-    which way a matrix goes. without_distortion : take a camera without its
-    distortion. unmirrored : take a camera that mirrors its picture without that. original_world : undo the turn and scale
-    that a file says were applied to its world. size_fits : whether the size is that of whatever scene is open, whose shape
-    gives way to that of a text's camera, and not the picture's own.
+    which way a matrix goes. without_distortion : take a camera without its lens. unmirrored : take a camera that mirrors its
+    picture without that. original_world : undo the turn and scale that a file says were applied to its world. size_fits :
+    whether the size is that of whatever scene is open, whose shape gives way to that of a text's camera, and not the
+    picture's own.
 
     Raises
     ------
@@ -159,7 +162,7 @@ def choose(cameras: list[Camera], name: str | None = None) -> Camera:
 
 
 class NoPinholeError(InputError):
-    """A camera is well said, and is no pinhole: a fisheye, a panorama, a lens that bends, skew."""
+    """A camera is well said, and is no pinhole: a panorama, a lens that nobody knows, skew."""
 
 
 def not_a_pinhole(what: str, kind: str) -> NoReturn:

@@ -18,7 +18,6 @@ src/colmap/scene/reconstruction_io_text.cc and _binary.cc (what parts a line: a 
 """
 
 import itertools
-import math
 import re
 import struct
 from collections.abc import Iterable, Iterator, Sequence
@@ -48,8 +47,11 @@ MODELS: dict[str, tuple[int, tuple[str, ...]]] = {
     "FOV": (7, ("fx", "fy", "cx", "cy", "omega")),
     "SIMPLE_RADIAL_FISHEYE": (8, ("f", "cx", "cy", "k")),
     "RADIAL_FISHEYE": (9, ("f", "cx", "cy", "k1", "k2")),
-    "THIN_PRISM_FISHEYE": (10, ("fx", "fy", "cx", "cy", *"abcdefgh")),
-    "RAD_TAN_THIN_PRISM_FISHEYE": (11, ("fx", "fy", "cx", "cy", *"abcdefghijkl")),
+    "THIN_PRISM_FISHEYE": (10, ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "sx1", "sy1")),
+    "RAD_TAN_THIN_PRISM_FISHEYE": (
+        11,
+        ("fx", "fy", "cx", "cy", "k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1", "s0", "s1", "s2", "s3"),
+    ),
     "SIMPLE_DIVISION": (12, ("f", "cx", "cy", "k")),
     "DIVISION": (13, ("fx", "fy", "cx", "cy", "k")),
     "SIMPLE_FISHEYE": (14, ("f", "cx", "cy")),
@@ -110,7 +112,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         intrinsic, images = _text_cameras(files[0]), [*_text_images(files[1])]
     told = suffix == ".bin" and _files(source, folder, ".txt")
     notes = ("The folder has the model as text, too: the binary one counts",) if told else ()
-    planes: dict[int, tuple[ViewPlane, tuple[str, ...]]] = {}
+    planes: dict[int, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}
     left_out, taken = LeftOut(), []
     for image, name in zip(images, naming.distinct([image.name for image in images]), strict=True):
         if image.camera not in intrinsic:
@@ -121,7 +123,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             taken.append((image, name))
     poses = _poses([image for image, _ in taken], planes)
     cameras = [
-        Camera(name, pinhole, True, (*notes, *planes[image.camera][1], *more), image.name)
+        Camera(name, pinhole, True, (*notes, *planes[image.camera][2], *more), image.name, lens=planes[image.camera][1])
         for (image, name), (pinhole, more) in zip(taken, poses, strict=True)
     ]
     return left_out.told(cameras)
@@ -169,9 +171,9 @@ def _files(source: Source, folder: Sequence[str], suffix: str) -> list[Source]:
     return found if all(found) else []
 
 
-def _plane(intrinsic: _Intrinsics, what: str, options: Options) -> tuple[ViewPlane, tuple[str, ...]]:
+def _plane(intrinsic: _Intrinsics, what: str, options: Options) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
     names = MODELS[intrinsic.model][1]
-    if "FISHEYE" in intrinsic.model or intrinsic.model in ("EUCM", "EQUIRECTANGULAR"):
+    if intrinsic.model == "EQUIRECTANGULAR":
         not_a_pinhole(what, f"of the camera model {intrinsic.model}")
     if len(intrinsic.parameters) != len(names):
         raise InputError(
@@ -183,14 +185,30 @@ def _plane(intrinsic: _Intrinsics, what: str, options: Options) -> tuple[ViewPla
         raise InputError(f"{what} has the focal length {min(f_x, f_y):g}: give one above 0")
     plane = axes.view_plane(f_x, f_y, values["cx"], values["cy"], (intrinsic.width, intrinsic.height))
     bent = {name: value for name, value in values.items() if name not in _STRAIGHT}
-    return plane, distortion.settle(bent, _lens(intrinsic.model, bent), plane, f"{what} ({intrinsic.model})", options)
+    return plane, *distortion.settle(
+        _lens(intrinsic.model, bent), plane, f"{what} ({intrinsic.model})", options.without_distortion
+    )
 
 
 def _lens(model: str, values: dict[str, float]) -> distortion.Lens:
-    if model == "FOV":
-        return distortion.radial(lambda r: math.atan(2 * r * math.tan(values["omega"] / 2)) / values["omega"])
-    if "DIVISION" in model:
-        return distortion.radial(lambda r: (1 - math.sqrt(1 - 4 * values["k"] * r * r)) / (2 * values["k"] * r))
+    """The lens of a model's coefficients, by their names in MODELS."""
+    terms, numbers = tuple(values.items()), tuple(values.values())
+    match model:
+        case "FOV":
+            return distortion.Lens(terms, "fov", numbers) if values["omega"] else distortion.opencv({})
+        case "SIMPLE_DIVISION" | "DIVISION":
+            return distortion.division(values["k"])
+        case "EUCM":
+            return distortion.Lens(terms, "eucm", numbers)
+        case "THIN_PRISM_FISHEYE":
+            k1, k2, p1, p2, k3, k4, s1, s3 = numbers
+            prism = (s1, 0.0, s3, 0.0)
+            return distortion.Lens(terms, "equidistant", radial=(k1, k2, k3, k4), tangential=(p1, p2), prism=prism)
+        case "RAD_TAN_THIN_PRISM_FISHEYE":  # whose p0 and p1 are OpenCV's p2 and p1
+            radial, (p2, p1), prism = numbers[:6], numbers[6:8], numbers[8:]
+            return distortion.Lens(terms, "equidistant", radial=radial, tangential=(p1, p2), prism=prism, radial_first=True)
+    if "FISHEYE" in model:
+        return distortion.Lens(terms, "equidistant", radial=numbers)
     return distortion.opencv(values)
 
 
@@ -349,6 +367,27 @@ def _points(tracks: Tracks | None, images: int) -> tuple[list[str], str]:
         f"{number} {_spaced(*position)} {_spaced(*colour)} 0.0 {' '.join(track)}\n"
         for number, (position, colour, track) in enumerate(told, start=1)
     )
+
+
+def points_without_tracks(source: Source) -> str:
+    """The lines of points3D.txt of a model's points, for pictures in which they are elsewhere; empty where there are none."""
+    if (found := model(source)) is None:
+        return ""
+    folder, suffix = found
+    file = source.file(*folder, f"points3D{suffix}")
+    if file is None:
+        return ""
+    if suffix == ".txt":
+        rows = [line.split()[:8] for line in _lines(file) if line.strip() and not line.startswith("#")]
+        if any(len(row) < 8 for row in rows):
+            raise InputError(f"{file.name} has a line that is not POINT3D_ID X Y Z R G B ERROR …: export it again")
+        return "".join(f"{' '.join(row)}\n" for row in rows)
+    reader, lines = _Reader(file), []
+    for _ in range(reader.numbers("Q")[0]):
+        number, x, y, z, *colour, error, tracked = reader.numbers("Q3d3BdQ")
+        reader.skip(8 * tracked)
+        lines.append(f"{number} {_spaced(x, y, z, *colour, error)}\n")
+    return "".join(lines)
 
 
 def comments(cameras: Iterable[Camera]) -> str:

@@ -7,15 +7,13 @@ its corner before. Pixels that are not square divided the other way before 1.2.1
 Source: AliceVision's src/aliceVision/sfmDataIO/jsonIO.cpp and camera/IntrinsicScaleOffset.cpp.
 """
 
-import math
-
 import numpy as np
 
 from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming
-from .camera import Camera, LeftOut, Options, not_a_pinhole
+from .camera import Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
 from .source import Record, Source, number
 
 TITLE = "Meshroom and AliceVision .sfm"
@@ -53,14 +51,14 @@ def read(source: Source, options: Options) -> list[Camera]:
         )
     told = (f"{len(views) - len(placed)} views without a pose were left out",) if len(placed) < len(views) else ()
     paths = [str(view.get("path") or f"view {view.get('viewId')}") for view in placed]
-    planes: dict[str, tuple[ViewPlane, tuple[str, ...]]] = {}
+    planes: dict[str, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}
     left_out, cameras = LeftOut(), []
     for view, path, name in zip(placed, paths, naming.distinct(paths), strict=True):
         with left_out.unless_pinhole(name):
             intrinsic = str(view.get("intrinsicId"))
             if intrinsic not in planes:
                 planes[intrinsic] = _plane(intrinsics[intrinsic], version, options)
-            plane, notes = planes[intrinsic]
+            plane, lens, notes = planes[intrinsic]
             if "rigId" in view and str(view.get("isPoseIndependant")).lower() in ("false", "0"):
                 raise InputError(
                     f"view {checks.shown(name)} is of a rig, on whose pose its cameras stand: give each a pose of its own"
@@ -72,7 +70,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             )  # column by column is its transpose, row by row
             matrix[:3, 3] = pose.numbers("center", 3)
             pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
-            cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), path))
+            cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), path, lens=lens))
     return left_out.told(cameras)
 
 
@@ -85,7 +83,9 @@ def _version(document: Record) -> tuple[int, ...]:
     return tuple(int(number(document.called("version"), part, 0, 1e6)) for part in numbers) if isinstance(numbers, list) else ()
 
 
-def _plane(intrinsic: Record, version: tuple[int, ...], options: Options) -> tuple[ViewPlane, tuple[str, ...]]:
+def _plane(
+    intrinsic: Record, version: tuple[int, ...], options: Options
+) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
     kind = str(intrinsic.get("type") or "pinhole")
     if kind not in _PINHOLES:
         not_a_pinhole(intrinsic.place, f"of the type {checks.shown(kind)}")
@@ -113,17 +113,22 @@ def _plane(intrinsic: Record, version: tuple[int, ...], options: Options) -> tup
     notes: tuple[str, ...] = ()
     if height > width and "pxFocalLength" not in intrinsic:
         notes = (f"{intrinsic.place} is of upright pictures: its focal length was taken for that of the sensor's width",)
-    return plane, notes + _of_lens(intrinsic, kind, plane, options)
+    lens, told = _of_lens(intrinsic, kind, plane, options)
+    return plane, lens, notes + told
 
 
-def _of_lens(intrinsic: Record, kind: str, plane: ViewPlane, options: Options) -> tuple[str, ...]:
+def _of_lens(
+    intrinsic: Record, kind: str, plane: ViewPlane, options: Options
+) -> tuple[distortion.Lens | None, tuple[str, ...]]:
     given = intrinsic.values.get("distortionParams") or []
     numbers = intrinsic.numbers("distortionParams", len(given)) if isinstance(given, list) and given else ()
     if not any(numbers):
-        return ()
-    lens = str(intrinsic.get("distortionType") or kind)
-    if lens not in _LENSES:
-        terms = {f"parameter {i}": value for i, value in enumerate(numbers, start=1)}
-        return distortion.settle(terms, lambda _x, _y: (math.inf, math.inf), plane, f"{intrinsic.place} ({lens})", options)
-    values = dict(zip(_LENSES[lens], numbers, strict=False))
-    return distortion.settle(values, distortion.opencv(values), plane, intrinsic.place, options)
+        return None, ()
+    model = str(intrinsic.get("distortionType") or kind)
+    if model not in _LENSES:
+        said = f"{intrinsic.place} has lens distortion of the unknown model {checks.shown(model)}"
+        if options.without_distortion:
+            return None, (f"{said}, which was left out",)
+        raise NoPinholeError(f"{said}, which no pinhole has: undistort the pictures, or choose to take it without distortion")
+    values = dict(zip(_LENSES[model], numbers, strict=False))
+    return distortion.settle(distortion.opencv(values), plane, intrinsic.place, options.without_distortion)

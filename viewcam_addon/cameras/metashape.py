@@ -3,8 +3,7 @@
 A camera's transform is from its axes (x right, y down, z into the view) to its component, and that one's to the world. The
 chunk's own transform is that of its active component once more, or stands alone in files without components. The principal
 point is an offset from the picture's middle, whose first pixel's centre is (0.5, 0.5). b1 is what the distance across has more
-than the other, b2 is skew, which no pinhole has. P1 and P2 are OpenCV's p2 and p1. Skew is told and left out as lens distortion
-is.
+than the other, b2 is skew, which is of the lens. P1 and P2 are OpenCV's p2 and p1.
 
 A camera of a rig that has no transform of its own has a master, whose axes are those of its sensor's rotation and location: the
 rotation takes its axes to the master's, the location is its eye there.
@@ -14,6 +13,7 @@ Source: the Metashape manual's camera model, and its exported files; of rigs the
 """
 
 import contextlib
+import dataclasses
 from xml.etree import ElementTree
 
 import numpy as np
@@ -44,7 +44,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             for component in chunk.iter("component")
             if component.find("transform") is not None
         }
-        planes: dict[str | None, tuple[ViewPlane, tuple[str, ...]]] = {}
+        planes: dict[str | None, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}
         sensors = {sensor.get("id"): sensor for sensor in chunk.iter("sensor")}
         cameras = {camera.get("id"): camera for camera in chunk.iter("camera")}
         for camera in chunk.iter("camera"):
@@ -60,7 +60,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             with left_out.unless_pinhole(naming.stem(label)):
                 if sensor not in planes:
                     planes[sensor] = _plane(sensors[sensor], options)
-                plane, notes = planes[sensor]
+                plane, lens, notes = planes[sensor]
                 numbers = flat(f"the transform of {what}", own)
                 if len(numbers) != 16:
                     raise InputError(f"the transform of {what} has {len(numbers)} numbers: it should have 16")
@@ -73,7 +73,7 @@ def read(source: Source, options: Options) -> list[Camera]:
                     notes = (*notes, f"{what} is of a rig: it was placed on its master {checks.shown(master.get('label'))}")
                 pinhole, more = axes.pinhole(_without_scale(axes.of_opencv(matrix)), plane, what)
                 image = label if naming.has_suffix(label) else None
-                found.append(Camera(naming.stem(label), pinhole, True, (*notes, *more), image))
+                found.append(Camera(naming.stem(label), pinhole, True, (*notes, *more), image, lens=lens))
     found = left_out.told(found)
     if lost and not found:
         raise InputError(f"none of the {lost} cameras of {source.name} is aligned: align them in Metashape first")
@@ -124,9 +124,9 @@ def _without_scale(matrix: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, tuple[str, ...]]:
+def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
     what = f"sensor {checks.shown(sensor.get('label') or sensor.get('id'))}"
-    if sensor.get("type", "frame") != "frame":
+    if sensor.get("type", "frame") not in ("frame", "fisheye"):
         not_a_pinhole(what, f"of the type {checks.shown(sensor.get('type'))}")
     found = [each for each in sensor.findall("calibration") if each.find("f") is not None]
     adjusted = [each for each in found if each.get("class") == "adjusted"] or found
@@ -152,17 +152,16 @@ def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, tu
         across, focal, size[0] / 2 + values.get("cx", 0.0), size[1] / 2 + values.get("cy", 0.0), tuple(size)
     )
     bent = {name: values[name] for name in (*_LENS, "b2") if name in values}
-    brown = distortion.opencv(
+    lens = distortion.opencv(
         {
             **{name: bent.get(name, 0.0) for name in ("k1", "k2", "k3")},
             "r8": bent.get("k4", 0.0),
             "p1": bent.get("p2", 0.0),
             "p2": bent.get("p1", 0.0),
-        }
+        },
+        bent,
+        skew=bent.get("b2", 0.0) / across,
     )
-
-    def lens(x: float, y: float) -> distortion.Point:
-        x, y = brown(x, y)
-        return x + values.get("b2", 0.0) / across * y, y
-
-    return plane, distortion.settle(bent, lens, plane, what, options)
+    if sensor.get("type") == "fisheye":
+        lens = dataclasses.replace(lens, projection="equidistant")
+    return plane, *distortion.settle(lens, plane, what, options.without_distortion)

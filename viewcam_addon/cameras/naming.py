@@ -1,15 +1,22 @@
-"""Names: of cameras that have only a picture's path, and of the pictures that datasets name."""
+"""Names: of cameras that have only a picture's path, and of the pictures that datasets name, and where these are.
 
+A picture is looked for by its name beside the file and in the folders where data sets keep theirs. Rejected: paths that lead
+elsewhere, since a file from anybody should make a program open nothing of whoever reads it, and no share of the network.
+"""
+
+import contextlib
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 from .. import checks
 from ..errors import InputError
 from .camera import Camera
 
 _NAMED = 3  # files in a sentence
+_PLACES = (".", "images", "..", "../images", "../..", "../../images")
+_SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".JPG", ".PNG")
 _PICTURES = (
     ".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".webp", ".bmp", ".hdr", ".tga", ".ppm", ".pgm", ".heic", ".dng",
     ".avif",
@@ -45,10 +52,34 @@ def image_of(camera: Camera) -> str:
     """The path by which a dataset names the camera's picture: the file's own inside its folder, or its name alone."""
     if camera.image is None:
         return f"{camera.name}.png"
-    path = camera.image
+    return inside(camera.image)
+
+
+def inside(path: str) -> str:
+    """A path that stays inside its folder: the path itself, or the name alone of one that leads elsewhere."""
     while path.startswith("./"):
         path = path[2:]
     return path.rpartition("/")[2] if path.startswith("/") or ".." in path.split("/") or ":" in path else path
+
+
+def picture_of(camera: Camera, folder: Path) -> Path | None:
+    """The file of a camera's picture, or None where there is none near the camera's own file.
+
+    folder : where that file stands.
+    """
+    return near(image_of(camera) if camera.image is None else camera.image, folder)
+
+
+def near(path: str, folder: Path) -> Path | None:
+    """The file that a data set's file names by a path, or None where there is none near it. folder : where that file stands."""
+    path = inside(path.replace("\\", "/"))
+    for name in dict.fromkeys((path, path.rpartition("/")[2])):
+        for place in _PLACES:
+            for suffix in _SUFFIXES:
+                with contextlib.suppress(OSError, ValueError):  # a name that no file can have
+                    if name and (file := folder / place / f"{name}{suffix}").is_file():
+                        return file.resolve()
+    return None
 
 
 def check_image(file: object) -> None:

@@ -50,9 +50,8 @@ _DISTORTION = (
     "distortioncoefficients", "distcoeffs", "dist", "distortion", "distcoef", "distcoeff", "d", "distortioncoeffs", "dist0",
 )  # fmt: skip
 _OTHER_DISTORTION = re.compile(r"dist(?!ance)|radial|tangential|^kc$|^[kp][1-6]$")
-_OTHER_LENS = re.compile(
-    r"fisheye|equidistant|omni|mei|u?cm$|kannala|kb\d|spherical|ortho|fov|division|double|^ds$|theta|equirect|panoram|cylind"
-)
+_FISHEYE = re.compile(r"^(?:opencv_?)?fisheye|equidistant|kannala|^kb4?$")
+_OTHER_LENS = re.compile(r"fisheye|omni|mei|u?cm$|kb\d|spherical|ortho|fov|division|double|^ds$|theta|equirect|panoram|cylind")
 # Of what may be a pose in words that nobody knows; Kalibr's T_cam_imu is none.
 _MAY_BE_POSE = re.compile(r"pose|extrin|rotation|rot$|transf|transl|2cam|2world|toworld|tocam|w2|c2|rvec|tvec|position|quat")
 _NO_POSE = ("tcamimu", "timushift", "rectificationmatrix", "projectionmatrix", "p")
@@ -348,9 +347,24 @@ def coefficients(numbers: Sequence[float], what: str) -> dict[str, float]:
     return dict(zip(NAMES, numbers, strict=False))
 
 
-def settled(numbers: dict[str, float], plane: ViewPlane, what: str, options: Options) -> tuple[str, ...]:
-    """The notes on OpenCV's distortion, or its refusal."""
-    return distortion.settle(numbers, distortion.opencv(numbers), plane, what, options)
+def settled(
+    numbers: Sequence[float] | dict[str, float], is_fisheye: bool, plane: ViewPlane, what: str, options: Options
+) -> tuple[distortion.Lens | None, tuple[str, ...]]:
+    """The lens of OpenCV's coefficients, in its order or by name, and notes.
+
+    is_fisheye : whether they are those of `cv2.fisheye`, k1 … k4.
+
+    Raises
+    ------
+    InputError
+        if there are more than the model has.
+    """
+    if not isinstance(numbers, dict):
+        numbers = dict(zip(("k1", "k2", "k3", "k4"), numbers, strict=False)) if is_fisheye else coefficients(numbers, what)
+    if is_fisheye and not numbers.keys() <= {"k1", "k2", "k3", "k4"}:
+        raise InputError(f"{what} has {', '.join(numbers)}: OpenCV's fisheye has k1, k2, k3 and k4")
+    lens = distortion.fisheye(numbers) if is_fisheye else distortion.opencv(numbers)
+    return distortion.settle(lens, plane, what, options.without_distortion)
 
 
 def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
@@ -362,7 +376,7 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
         if they are no camera, or leave open what it is.
     """
     what = f"camera {checks.shown(name)}"
-    refuse_other_lens(values, what)
+    is_fisheye = says_fisheye(values, what)
     if {"t", "hw"} <= values.keys():
         return _of_infinigen(name, values, what, options)
     if (k := _first(values, _K)) is None:
@@ -372,10 +386,11 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     size, stated = _size(values, what, options)
     plane = plane_of_k(_numbers("K", k), size, half_pixel(options), what)
     plane, windowed = of_window(plane, values, what)
-    notes = told_of_half_pixel(options, "OpenCV") + windowed + settled(_coefficients(values, what), plane, what, options)
+    lens, told = settled(_coefficients(values, what, is_fisheye), is_fisheye, plane, what, options)
+    notes = told_of_half_pixel(options, "OpenCV") + windowed + told
     matrix, more = _pose(values, what, options)
     pinhole, more_of_pose = axes.pinhole(matrix, plane, what)
-    return Camera(name, pinhole, stated, (*notes, *more, *more_of_pose))
+    return Camera(name, pinhole, stated, (*notes, *more, *more_of_pose), lens=lens)
 
 
 def _of_infinigen(name: str, values: Mapping[str, Any], what: str, options: Options) -> Camera:
@@ -387,20 +402,32 @@ def _of_infinigen(name: str, values: Mapping[str, Any], what: str, options: Opti
     return Camera(name, pinhole, True, (told, *notes))
 
 
-def refuse_other_lens(values: Mapping[str, Any], what: str) -> None:
-    """Raise InputError if a model that the values name is none of a pinhole, whatever its coefficients are."""
-    for key, value in values.items():
-        is_model = plain(key) in ("cameramodel", "distortionmodel", "model", "distortiontype") and isinstance(value, str)
-        if is_model and _OTHER_LENS.search(value.lower()):
-            not_a_pinhole(what, f"of the model {checks.shown(value)}")
+def says_fisheye(values: Mapping[str, Any], what: str) -> bool:
+    """True if a model that the values name is OpenCV's fisheye.
+
+    Raises
+    ------
+    InputError
+        if one of them is none that is known, whatever its coefficients are.
+    """
+    models = [
+        value
+        for key, value in values.items()
+        if plain(key) in ("cameramodel", "distortionmodel", "model", "distortiontype") and isinstance(value, str)
+    ]
+    is_fisheye = [bool(_FISHEYE.search(model.lower())) for model in models]
+    for model, known in zip(models, is_fisheye, strict=True):
+        if not known and _OTHER_LENS.search(model.lower()):
+            not_a_pinhole(what, f"of the model {checks.shown(model)}")
+    return any(is_fisheye)
 
 
 def refuse_unknown_distortion(values: Mapping[str, Any], what: str) -> None:
     """Raise InputError if there is a distortion in words that nobody knows."""
-    _coefficients(_by_name(values), what)
+    _coefficients(_by_name(values), what, False)
 
 
-def _coefficients(values: Mapping[str, Any], what: str) -> dict[str, float]:
+def _coefficients(values: Mapping[str, Any], what: str, is_fisheye: bool) -> Sequence[float] | dict[str, float]:
     """The distortion, in a list or as keys of their own.
 
     Raises
@@ -409,7 +436,10 @@ def _coefficients(values: Mapping[str, Any], what: str) -> dict[str, float]:
         if there is one in words that nobody knows.
     """
     given = _first(values, _DISTORTION)
-    found = coefficients(_numbers("the distortion", given), what) if given is not None else {}
+    listed = _numbers("the distortion", given) if given is not None else ()
+    if is_fisheye and len(listed) > 4:
+        raise InputError(f"{what} has {len(listed)} distortion coefficients: OpenCV's fisheye has four")
+    found: dict[str, float] = {}
     for name, value in values.items():
         if name in _DISTORTION or not _OTHER_DISTORTION.search(name) or isinstance(value, str) or value is None:
             continue
@@ -420,7 +450,7 @@ def _coefficients(values: Mapping[str, Any], what: str) -> dict[str, float]:
             raise InputError(
                 f"{what} says {name}, which may be lens distortion: call it distortion_coefficients, in OpenCV's order"
             )
-    return found
+    return found if given is None else listed
 
 
 def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple[int, int], bool]:

@@ -20,7 +20,8 @@ TITLE = "OpenMVG sfm_data.json"
 
 _NONE = str(2**32 - 1)
 _LENSES = {"disto_k1": ("k1",), "disto_k3": ("k1", "k2", "k3"), "disto_t2": ("k1", "k2", "k3", "p1", "p2")}
-_PINHOLES = ("pinhole", "pinhole_radial_k1", "pinhole_radial_k3", "pinhole_brown_t2")
+_FISHEYE = ("k1", "k2", "k3", "k4")
+_PINHOLES = ("pinhole", "pinhole_radial_k1", "pinhole_radial_k3", "pinhole_brown_t2", "fisheye")
 
 
 def recognises(source: Source) -> bool:
@@ -53,23 +54,23 @@ def read(source: Source, options: Options) -> list[Camera]:
     told: tuple[str, ...] = (f"{lost} views without a pose were left out",) if lost else ()
     if not options.pixel:
         told += ("OpenMVG does not say from where it counts pixels: the principal point was taken from the picture's corner",)
-    planes: dict[int, tuple[ViewPlane, tuple[str, ...]]] = {}
+    planes: dict[int, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}
     left_out, cameras = LeftOut(), []
     for (path, pose, kind, data), name in zip(found, naming.distinct([path for path, *_ in found]), strict=True):
         with left_out.unless_pinhole(name):
             if id(data) not in planes:
                 planes[id(data)] = _plane(data, kind, options)
-            plane, notes = planes[id(data)]
+            plane, lens, notes = planes[id(data)]
             matrix = np.eye(4)
             matrix[:3, :3] = np.array(pose.numbers("rotation", 9)).reshape(3, 3).T
             matrix[:3, 3] = pose.numbers("center", 3)
             pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
             image = f"{root}/{path}" if isinstance(root, str) and root else path
-            cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), image))
+            cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), image, lens=lens))
     return left_out.told(cameras)
 
 
-def _plane(data: Record, kind: str, options: Options) -> tuple[ViewPlane, tuple[str, ...]]:
+def _plane(data: Record, kind: str, options: Options) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
     if kind not in _PINHOLES:
         not_a_pinhole(data.place, f"of the type {checks.shown(kind)}")
     inner = data.record("value0") if "value0" in data and "focal_length" not in data else data
@@ -77,8 +78,11 @@ def _plane(data: Record, kind: str, options: Options) -> tuple[ViewPlane, tuple[
     c_x, c_y = inner.numbers("principal_point", 2)
     half = opencv.half_pixel(options, "corner")
     plane = axes.view_plane(f, f, c_x + half, c_y + half, (inner.size("width"), inner.size("height")))
+    if kind == "fisheye":
+        lens = distortion.fisheye(dict(zip(_FISHEYE, data.numbers("fisheye", len(_FISHEYE)), strict=True)))
+        return plane, *distortion.settle(lens, plane, data.place, options.without_distortion)
     key = next((key for key in _LENSES if key in data), None)
     if key is None:
-        return plane, ()
+        return plane, None, ()
     numbers = dict(zip(_LENSES[key], data.numbers(key, len(_LENSES[key])), strict=True))
-    return plane, distortion.settle(numbers, distortion.opencv(numbers), plane, data.place, options)
+    return plane, *distortion.settle(distortion.opencv(numbers), plane, data.place, options.without_distortion)

@@ -8,8 +8,6 @@ Source: exported files, and nerfstudio's realitycapture_utils.py. Other readers 
 upright pictures; a note says so.
 """
 
-import math
-
 import numpy as np
 
 from ..errors import InputError
@@ -67,7 +65,7 @@ def _camera(source: Source, options: Options) -> Camera:
         notes += (f"{what} is of an upright picture: its focal length was taken for that of the longer side",)
     bent = flat(f"the distortion of {what}", values.get("DistortionCoeficients") or values.get("DistortionCoefficients") or "0")
     numbers = dict(zip(_LENS, bent, strict=False))
-    notes += distortion.settle(numbers, _lens(values.get("DistortionModel", ""), numbers), plane, what, options)
+    lens, told = distortion.settle(_lens(values.get("DistortionModel", ""), numbers), plane, what, options.without_distortion)
     turn, eye = flat(f"Rotation of {what}", values["Rotation"]), flat(f"Position of {what}", values["Position"])
     if len(turn) != 9 or len(eye) != 3:
         raise InputError(f"{what} has {len(turn)} numbers of a rotation and {len(eye)} of a position: it should have 9 and 3")
@@ -75,20 +73,20 @@ def _camera(source: Source, options: Options) -> Camera:
     matrix[:3, :3] = np.array(turn).reshape(3, 3).T
     matrix[:3, 3] = eye
     pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, what)
-    return Camera(naming.stem(name), pinhole, stated, (*notes, *more), image)
+    return Camera(naming.stem(name), pinhole, stated, (*notes, *told, *more), image, lens=lens)
 
 
 def _lens(model: str, numbers: dict[str, float]) -> distortion.Lens:
-    k = numbers.get("k1", 0.0)
-    if model == "division" and k:
-        return distortion.radial(lambda r: (1 - math.sqrt(1 - 4 * k * r * r)) / (2 * k * r))
+    if model == "division" and "k1" in numbers:
+        return distortion.division(numbers["k1"], "k1") if numbers["k1"] else distortion.opencv({})
     return distortion.opencv(
         {
             **{name: numbers.get(name, 0.0) for name in ("k1", "k2", "k3")},
             "r8": numbers.get("k4", 0.0),
             "p1": numbers.get("t2", 0.0),
             "p2": numbers.get("t1", 0.0),
-        }
+        },
+        numbers,
     )
 
 

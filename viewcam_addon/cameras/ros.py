@@ -34,7 +34,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     document = Record(source.yaml, source.name)
     name = str(document.values.get("camera_name") or "camera")
     what = f"camera {checks.shown(name)}"
-    opencv.refuse_other_lens(document.values, what)
+    is_fisheye = opencv.says_fisheye(document.values, what)
     k = document.record("camera_matrix").numbers("data", 9)
     if k[0] == 0:
         raise InputError(f"{what} is not calibrated, its K[0] is 0: calibrate it")
@@ -45,10 +45,11 @@ def read(source: Source, options: Options) -> list[Camera]:
     if "distortion_coefficients" in document:
         inner = document.record("distortion_coefficients")
         numbers = inner.get("data") if "data" in inner else []
-        notes += opencv.settled(
-            opencv.coefficients(Record({"data": numbers}, what).numbers("data", len(numbers)), what), plane, what, options
-        )
+        numbers = Record({"data": numbers}, what).numbers("data", len(numbers))
+        lens, told = opencv.settled(numbers[:4] if is_fisheye else numbers, is_fisheye, plane, what, options)
+        notes += told
     else:
+        lens = None
         opencv.refuse_unknown_distortion(document.values, what)
     if "rectification_matrix" in document:
         turn = np.array(document.record("rectification_matrix").numbers("data", 9)).reshape(3, 3)
@@ -56,7 +57,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             notes += (f"{what} is one of a rectified pair: this is the raw picture's camera, not the rectified one's",)
     notes += (f"{what} has no pose, which ROS keeps in tf: it stands at the origin and looks along z, y down",)
     pinhole, more = axes.pinhole(axes.from_world_to_camera(np.eye(3), (0, 0, 0), what), plane, what)
-    return [Camera(name, pinhole, True, (*notes, *more))]
+    return [Camera(name, pinhole, True, (*notes, *more), lens=lens)]
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str | dict[str, str]:

@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, opencv
 from .camera import Camera, Options
+from .distortion import Lens
 from .source import Record, Source, numbered_lines, table
 
 TITLE = "trajectories of TUM, KITTI and EuRoC"
@@ -46,9 +47,9 @@ def read(source: Source, options: Options) -> list[Camera]:
         raise InputError(f"{source.name} has {rows.shape[1]} numbers in a line: a pose has at least 8")
     if len(rows) > _MOST:
         raise InputError(f"{source.name} has {len(rows)} poses: give at most {_MOST}")
-    mounted, plane, notes = np.eye(4), None, (_WHOSE,)
+    mounted, plane, lens, notes = np.eye(4), None, None, (_WHOSE,)
     if kind == "EuRoC":
-        mounted, plane, notes = _sensor(source, options)
+        mounted, plane, lens, notes = _sensor(source, options)
     plane = options.view_plane or plane or options.plane_or_refuse(source.name)
     stated = kind == "EuRoC" and options.view_plane is None
     whats = [f"pose {index}" for index in range(len(rows))]
@@ -64,7 +65,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     found = axes.pinholes(axes.of_opencv(matrices @ mounted)[:, :3], [plane] * len(rows), whats)
     digits = max(4, len(str(len(rows) - 1)))
     return [
-        Camera(f"pose_{index:0{digits}d}", pinhole, stated, (*notes, *more), time=time)
+        Camera(f"pose_{index:0{digits}d}", pinhole, stated, (*notes, *more), time=time, lens=lens)
         for index, ((pinhole, more), time) in enumerate(zip(found, times.tolist(), strict=True))
     ]
 
@@ -98,7 +99,7 @@ def _is_of_chan(row: list[float]) -> bool:
     return len(row) == 8 and row[0].is_integer() and math.hypot(*row[4:]) > 1.1 and 1.1 < row[7] < 180
 
 
-def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | None, tuple[str, ...]]:
+def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | None, Lens | None, tuple[str, ...]]:
     """Where EuRoC's cam0 stands on the body, and how it sees."""
     file = next((found for up in ("..", "../..") if (found := source.file(*up.split("/"), "cam0", "sensor.yaml"))), None)
     if file is None:
@@ -108,7 +109,7 @@ def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | N
     values = Record(file.yaml, str(file.path))
     beside = source.file("sensor.yaml")
     own = Record(beside.yaml, str(beside.path)) if beside else None
-    opencv.refuse_other_lens(values.values, "cam0")
+    is_fisheye = opencv.says_fisheye(values.values, "cam0")
     mounted = np.array(values.record("T_BS").numbers("data", 16)).reshape(4, 4)
     if own and "T_BS" in own:  # where what was tracked, as a Vicon marker, stands on the body
         turn, at = np.hsplit(np.array(own.record("T_BS").numbers("data", 16)).reshape(4, 4)[:3], [3])
@@ -116,11 +117,11 @@ def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | N
         back[:3] = np.hstack([turn.T, -turn.T @ at])
         mounted = back @ mounted
     if options.view_plane or "intrinsics" not in values:
-        return mounted, None, ()
+        return mounted, None, None, ()
     f_x, f_y, c_x, c_y = values.numbers("intrinsics", 4)
     size = tuple(int(side) for side in values.numbers("resolution", 2))
     half = opencv.half_pixel(options)
     plane = axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
     numbers = values.numbers("distortion_coefficients", 4) if "distortion_coefficients" in values else ()
-    notes = opencv.settled(opencv.coefficients(numbers, "cam0"), plane, "cam0", options)
-    return mounted, plane, (*notes, *opencv.told_of_half_pixel(options, "EuRoC"))
+    lens, notes = opencv.settled(numbers, is_fisheye, plane, "cam0", options)
+    return mounted, plane, lens, (*notes, *opencv.told_of_half_pixel(options, "EuRoC"))

@@ -42,7 +42,8 @@ AABB_SCALES = tuple(2**exponent for exponent in range(8))
 
 _POSES = ("transform_matrix", "transform_matrix_start")
 _PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "PERSPECTIVE")
-_OTHER_CAMERAS = ("is_fisheye", "ftheta_p0", "latlong", "equirectangular", "orthographic")
+_FISHEYES = ("OPENCV_FISHEYE", "FISHEYE")
+_OTHER_CAMERAS = ("ftheta_p0", "latlong", "equirectangular", "orthographic")
 _NOT_READ = ("k", "intrinsic", "intrinsics", "intrinsic_matrix", "camera_intrinsics", "camera_matrix", "cam_k")
 _LENS = ("k1", "k2", "k3", "k4", "p1", "p2")  # the order of distortion_params, too
 _AXES = ("opengl", "blender", "nerf", "nerfstudio")
@@ -137,7 +138,7 @@ def _cameras(source: Source, options: Options) -> list[Camera]:
     paths = [frame.text("file_path", f"frame {i}").replace("\\", "/") for i, frame in enumerate(frames)]
     undone = _applied(top) if options.original_world else None
     told = () if options.original_world else _told_of_world(top)
-    planes: dict[object, tuple[ViewPlane, bool, tuple[str, ...]]] = {}
+    planes: dict[object, tuple[ViewPlane, bool, distortion.Lens | None, tuple[str, ...]]] = {}
     left_out, cameras = LeftOut(), []
     for frame, path, name in zip(frames, paths, naming.distinct(paths), strict=True):
         both = _merged(top, frame)
@@ -148,20 +149,19 @@ def _cameras(source: Source, options: Options) -> list[Camera]:
         with left_out.unless_pinhole(name):
             if key not in planes:
                 planes[key] = _plane(both, source, path, options)
-            plane, stated, notes = planes[key]
+            plane, stated, lens, notes = planes[key]
             matrix = _matrix(frame)
             pinhole, more = axes.pinhole(matrix if undone is None else undone(matrix), plane, frame.place)
             image = path if naming.has_suffix(path) or "file_path" not in frame else f"{path}.png"
             time = frame.number("time") if "time" in frame else None
-            cameras.append(
-                Camera(name, pinhole, stated, (*told, *notes, *more), image if "file_path" in frame else None, time=time)
-            )
+            image = image if "file_path" in frame else None
+            cameras.append(Camera(name, pinhole, stated, (*told, *notes, *more), image, time=time, lens=lens))
     return left_out.told(cameras)
 
 
 def _merged(top: Record, frame: Record) -> Record:
     """The frame's keys and those at the top, which must not contradict each other."""
-    for key in (*_INTRINSICS, *_LENS, "distortion_params", "camera_model", *_OTHER_CAMERAS):
+    for key in (*_INTRINSICS, *_LENS, "distortion_params", "camera_model", "is_fisheye", *_OTHER_CAMERAS):
         if key in top and key in frame and top.get(key) != frame.get(key):
             raise InputError(
                 f"{key} is {checks.shown(top.get(key))} at the top of the file and {checks.shown(frame.get(key))} in "
@@ -175,13 +175,16 @@ _FOCAL = {"x": ("fl_x", "x_fov", "camera_angle_x"), "y": ("fl_y", "y_fov", "came
 _INTRINSICS = ("w", "h", "cx", "cy", *_FOCAL["x"], *_FOCAL["y"])
 
 
-def _plane(both: Record, source: Source, path: str, options: Options) -> tuple[ViewPlane, bool, tuple[str, ...]]:
-    """The view plane, whether its size is the file's, and notes."""
-    model = both.values.get("camera_model")
-    if model is not None and str(model).upper() not in _PINHOLES:
-        not_a_pinhole(both.place, f"of the camera model {checks.shown(model)}")
-    if (kind := both.get("camera_type")) is not None and str(kind).upper() not in _PINHOLES:
-        not_a_pinhole(both.place, f"of the camera type {checks.shown(kind)}")
+def _plane(
+    both: Record, source: Source, path: str, options: Options
+) -> tuple[ViewPlane, bool, distortion.Lens | None, tuple[str, ...]]:
+    """The view plane, whether its size is the file's, the lens, and notes."""
+    for key in ("camera_model", "camera_type"):
+        model = both.values.get(key)
+        if model is not None and str(model).upper() not in (*_PINHOLES, *_FISHEYES):
+            not_a_pinhole(both.place, f"of the {key.replace('_', ' ')} {checks.shown(model)}")
+    is_fisheye = any(str(both.values.get(key)).upper() in _FISHEYES for key in ("camera_model", "camera_type"))
+    is_fisheye |= bool(both.values.get("is_fisheye"))
     if unread := next((key for key in both.values if key.lower() in _NOT_READ), None):
         raise InputError(
             f"{both.place} has {unread}, which programs read differently: write fl_x, fl_y, cx and cy in its place"
@@ -203,15 +206,16 @@ def _plane(both: Record, source: Source, path: str, options: Options) -> tuple[V
     focal = {along: _focal(both, along, side) for along, side in zip("xy", size, strict=True)}
     if not any(focal.values()):
         if options.view_plane or options.base:
-            return options.plane_or_refuse(both.place), False, ()
+            return options.plane_or_refuse(both.place), False, None, ()
         raise InputError(f"{both.place} has neither fl_x nor camera_angle_x: it can't be a camera without")
     f_x, f_y = focal["x"] or focal["y"], focal["y"] or focal["x"]
     plane = axes.view_plane(f_x, f_y, both.number("cx", size[0] / 2), both.number("cy", size[1] / 2), size)
     numbers = {key: both.number(key, 0.0) for key in _LENS}
     if "distortion_params" in both:
         numbers = dict(zip(_LENS, both.numbers("distortion_params", 6), strict=True))
-    lens = distortion.opencv(numbers | {"k4": 0.0, "r8": numbers["k4"]})
-    return plane, stated, distortion.settle(numbers, lens, plane, both.place, options)
+    brown = numbers | {"k4": 0.0, "r8": numbers["k4"]}
+    lens = distortion.fisheye(numbers) if is_fisheye else distortion.opencv(brown, numbers)
+    return plane, stated, *distortion.settle(lens, plane, both.place, options.without_distortion)
 
 
 def _size(both: Record, source: Source, path: str, options: Options) -> tuple[tuple[int, int], bool]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from .. import argument_types as types
 from .. import cameras
+from ..cameras import distortion
 from ..errors import InputError
 from ..jobs import lists, makers
 from ..jobs.folder import Outputs
@@ -151,6 +152,8 @@ def _shots(options: argparse.Namespace, renderer: Any) -> Sequence[Job]:
         found = cameras.read(options.shots, options=options_of(options))
         for note in dict.fromkeys(note for camera in found for note in camera.notes):
             options.events.tell("note", command=options.command, text=note)
+        for camera in found:
+            distortion.refuse(camera.lens, camera.pinhole.plane, camera.name, "a render")
         return makers.from_pinholes((camera.name, camera.pinhole) for camera in found)
     if options.cameras is not None:
         return makers.from_cameras(options.cameras, renderer.cameras, spaces=not options.transforms)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .. import argument_types as types
 from .. import cameras
-from ..cameras import Camera, Options
+from ..cameras import Camera, Options, undistortion
 from ..cameras.sidecar import record
 from ..errors import InputError
 from ..pinhole import ViewPlane
@@ -29,6 +29,10 @@ def add_options(added: argparse.ArgumentParser) -> None:
     added.add_argument("--to", choices=cameras.writable(), help="write them in this format")
     added.add_argument("--out", metavar="FILE", type=types.path, help="where to; a folder for some formats (default: printed)")
     add_reading_options(added)
+    text = "write the pictures without their lens, and their cameras as pinholes, into this new folder"
+    added.add_argument("--undistort", metavar="OUT", type=types.path, help=f"{text} (--to transforms or colmap)")
+    text = "how much of it may be empty: 0 (default): nothing; 1: as much as shows all of each photograph"
+    added.add_argument("--blank", type=types.share, metavar="B", default=0.0, help=f"for --undistort: {text}")
     added.add_argument("--out-axes", choices=[*cameras.AXES], default="as_is", help="the axes of what is written")
     added.add_argument("--out-scale", type=types.above_zero, metavar="S", default=1.0, help="1 unit written is S units here")
 
@@ -82,6 +86,8 @@ def options_of(options: argparse.Namespace) -> Options:
 def run(options: argparse.Namespace) -> Result:
     if options.list and options.to:
         raise InputError("--list and --to say each what to do with the cameras: give one of them")
+    if options.undistort:
+        return _undistort(options)
     if options.out and not options.to:
         raise InputError("--out says where to, but not in which format: give --to")
     given = sys.stdin.read(_MOST_CHARACTERS) if options.file == "-" else Path(options.file)
@@ -107,6 +113,25 @@ def run(options: argparse.Namespace) -> Result:
     count = "1 camera" if len(found) == 1 else f"{len(found)} cameras"
     say(f"{count}, as {cameras.FORMATS[options.to].TITLE}: {options.out}")
     return 0, result | {"written": [str(path) for path in written]}
+
+
+def _undistort(options: argparse.Namespace) -> Result:
+    dataset = Path(options.file)
+    if options.file == "-" or options.list or options.out or options.camera is not None:
+        raise InputError("--undistort writes all of a data set into its folder: give the data set, and leave the others out")
+    if options.axes != "as_is" or options.scale != 1 or options.original_world:
+        raise InputError("--undistort leaves the world as it is, for its points' sake: turn and scale what it has written")
+    found = cameras.read(dataset, format=options.format, options=options_of(options))
+    form = options.to or ("transforms" if cameras.recognised(dataset) == "transforms" else "colmap")
+    if form not in undistortion.FORMS:
+        raise InputError(f"--undistort writes {' or '.join(undistortion.FORMS)}: give --to one of these")
+    for note in dict.fromkeys(note for camera in found for note in camera.notes):
+        options.events.tell("note", command=options.command, text=note)
+    written = undistortion.save(found, dataset, options.undistort, form, options.blank)
+    sizes = ", ".join(dict.fromkeys(f"{each.pinhole.width} × {each.pinhole.height}" for each in written))
+    bent = sum(camera.lens is not None for camera in found)
+    say(f"{len(written)} pictures, {bent} of them undistorted ({sizes}): {options.undistort}")
+    return 0, {"cameras": [{"name": each.name, **_said(each)} for each in written]}
 
 
 def _said(camera: Camera) -> dict:

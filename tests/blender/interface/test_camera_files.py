@@ -11,8 +11,7 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon import cameras as formats
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender.interface import camera_files
-from viewcam_addon.blender.scenes import import_cameras
-from viewcam_addon.cameras import Camera, Options
+from viewcam_addon.cameras import Camera, Options, naming
 from viewcam_addon.pinhole import Pinhole
 
 
@@ -100,7 +99,7 @@ def test_no_file_makes_blender_open_a_picture_that_is_elsewhere(scene, tmp_path)
     (camera,) = around(1)
     for path in (str(secret), "../secret/picture.png"):
         other = Camera(camera.name, camera.pinhole, image=path)
-        assert import_cameras.picture_of(other, tmp_path / "given") is None
+        assert naming.picture_of(other, tmp_path / "given") is None
 
 
 def test_polycams_picture_is_found_from_whichever_folder_is_imported(tmp_path):
@@ -111,7 +110,7 @@ def test_polycams_picture_is_found_from_whichever_folder_is_imported(tmp_path):
     (camera,) = around(1)
     camera = Camera(camera.name, camera.pinhole, image="keyframes/images/123.jpg")
     for given in (tmp_path, tmp_path / "keyframes", tmp_path / "keyframes" / "cameras"):
-        assert import_cameras.picture_of(camera, given) == folder / "123.jpg"
+        assert naming.picture_of(camera, given) == folder / "123.jpg"
 
 
 def test_an_fspy_project_brings_its_picture(scene, tmp_path):

@@ -5,13 +5,9 @@ asked: the scene's camera if it has one, and its size, into which each camera is
 
 A flight is plain keyframes of location, rotation and lens, as Bake writes them. Rejected: curves of the four values, which hold
 eye and look-at in float32 each, and the direction between them in fewer digits.
-
-A picture is looked for by its name beside the file and in the folders where data sets keep theirs. Rejected: paths that lead
-elsewhere, since a file from anybody should make Blender open nothing of whoever imports it, and no share of the network.
 """
 
 import contextlib
-import dataclasses
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -22,14 +18,12 @@ import numpy as np
 
 from ... import intrinsics, rotation
 from ...cameras import Camera
-from ...cameras.naming import image_of
+from ...cameras.naming import picture_of
 from ...errors import InputError
 from .. import camera as cameras
 from .. import datablocks, picture, pose, versions
 from ..temporary_settings import Overrides
 
-_PLACES = (".", "images", "..", "../images", "../..", "../../images")
-_SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".JPG", ".PNG")
 _OF_DATA = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height")
 
 
@@ -207,18 +201,3 @@ class _CameraImport:
         if image not in known:
             self._overrides.afterwards(bpy.data.batch_remove, [image])
         return image
-
-
-def picture_of(camera: Camera, folder: Path) -> Path | None:
-    """The file of a camera's picture, or None where there is none near the camera's own file.
-
-    folder : where that file stands.
-    """
-    path = image_of(dataclasses.replace(camera, image=camera.image.replace("\\", "/")))
-    for name in dict.fromkeys((path, path.rpartition("/")[2])):
-        for place in _PLACES:
-            for suffix in _SUFFIXES:
-                with contextlib.suppress(OSError, ValueError):  # a name that no file can have
-                    if name and (file := folder / place / f"{name}{suffix}").is_file():
-                        return file.resolve()
-    return None

@@ -1,0 +1,181 @@
+"""Lenses, both ways, as OpenCV and COLMAP have them, and every reader's as its own program counts its coefficients."""
+
+import json
+
+import numpy as np
+import pytest
+
+from viewcam_addon import cameras
+from viewcam_addon.cameras import Options, distortion
+from viewcam_addon.errors import InputError
+
+from . import test_mixed_files as mixed
+from . import test_read_only_formats as files
+
+RANDOM = np.random.default_rng(31)
+POINTS = RANDOM.uniform(-0.5, 0.5, (1000, 2))  # a field of view of 53°, twice the corners of most lenses
+OPENCV = [0.1, -0.05, 0.01, -0.02, 0.03, 0.05, 0.01, 0.02, 0.01, -0.02, 0.03, 0.01, 0.1, -0.2]
+ROUNDING = 64 * 2.0**-53  # of a polynomial of twenty terms, each below 1
+THEIR_INVERSE = 1e-9  # calibrated: where pycolmap's and OpenCV's own iterations end
+
+# Extra coefficients of each model of COLMAP, and how wide a view it is asked about, in half widths of POINTS.
+COLMAP = {
+    "SIMPLE_RADIAL": ([-0.2], 1),
+    "RADIAL": ([-0.2, 0.05], 1),
+    "OPENCV": ([-0.2, 0.05, 0.003, -0.002], 1),
+    "FULL_OPENCV": ([0.1, -0.05, 0.01, -0.02, 0.03, 0.05, 0.01, 0.02], 1),
+    "OPENCV_FISHEYE": ([0.05, -0.02, 0.005, -0.001], 3),
+    "FOV": ([0.9], 3),
+    "SIMPLE_RADIAL_FISHEYE": ([0.05], 3),
+    "RADIAL_FISHEYE": ([0.05, -0.01], 3),
+    "THIN_PRISM_FISHEYE": ([0.1, -0.05, 0.01, -0.02, 0.03, 0.01, 0.02, -0.01], 2),
+    "RAD_TAN_THIN_PRISM_FISHEYE": ([0.1, -0.05, 0.02, 0.01, -0.005, 0.002, 0.01, -0.02, 0.01, 0.02, -0.01, 0.03], 2),
+    "SIMPLE_DIVISION": ([-0.2], 3),
+    "DIVISION": ([0.2], 1),
+    "SIMPLE_FISHEYE": ([], 3),
+    "FISHEYE": ([], 3),
+    "EUCM": ([0.5, 1.2], 3),
+}
+
+
+def of_colmap(model, folder):
+    extra, wide = COLMAP[model]
+    names = cameras.FORMATS["colmap"].MODELS[model][1]
+    straight = {"f": 600.0, "fx": 600.0, "fy": 610.0, "cx": 310.0, "cy": 190.0}
+    numbers = [straight[name] for name in names if name in straight] + extra
+    (folder / "cameras.txt").write_text(f"1 {model} 640 360 {' '.join(map(repr, numbers))}\n")
+    (folder / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n")
+    (camera,) = cameras.read(folder)
+    return camera, numbers, POINTS * wide
+
+
+@pytest.mark.parametrize("model", COLMAP)
+def test_a_lens_of_colmap_moves_points_there_and_back_as_pycolmap_does(tmp_path, model):
+    pycolmap = pytest.importorskip("pycolmap")
+    camera, numbers, points = of_colmap(model, tmp_path)
+    theirs = pycolmap.Camera(model=model, width=640, height=360, params=numbers)
+    (d_x, d_y), (c_x, c_yb) = camera.pinhole.distance, camera.pinhole.principal_point
+    moved = theirs.img_from_cam(np.c_[points, np.ones(len(points))])
+    ours = camera.lens.distort(points) * [d_x, d_y] + [c_x, 360 - c_yb]
+    assert np.abs(ours - moved).max() < 1000 * ROUNDING, "pixels"
+    back = camera.lens.undistort((moved - [c_x, 360 - c_yb]) / [d_x, d_y])
+    assert np.abs(back - points).max() < 1e-11, "at distance 1"
+    assert np.abs(theirs.cam_from_img(moved) - back).max() < THEIR_INVERSE
+    assert not camera.lens.folds(points).any()
+
+
+def test_opencvs_fourteen_coefficients_move_points_as_opencv_does():
+    cv2 = pytest.importorskip("cv2")
+    document = {"K": np.eye(3).tolist(), "size": [4, 4], "dist": OPENCV}
+    document["K"] = [[100, 0, 2], [0, 100, 2], [0, 0, 1]]
+    (camera,) = cameras.read(json.dumps(document))
+    moved, _ = cv2.projectPoints(np.c_[POINTS, np.ones(len(POINTS))], np.zeros(3), np.zeros(3), np.eye(3), np.array(OPENCV))
+    assert np.abs(camera.lens.distort(POINTS) - moved[:, 0]).max() < ROUNDING
+    assert np.abs(camera.lens.undistort(moved[:, 0]) - POINTS).max() < 1e-11
+
+
+@pytest.mark.parametrize("model", ["equidistant", "fisheye", "kannala_brandt4"])
+def test_a_fisheye_of_kalibr_and_opencv_is_opencvs(model):
+    cv2 = pytest.importorskip("cv2")
+    k = [0.05, -0.02, 0.005, -0.001]
+    (camera,) = cameras.read(json.dumps({**files.K, "distortion_model": model, "distortion_coeffs": k}))
+    points = 3 * POINTS
+    moved, _ = cv2.fisheye.projectPoints(
+        np.c_[points, np.ones(len(points))][:, None], np.zeros(3), np.zeros(3), np.eye(3), np.array(k)
+    )
+    assert np.abs(camera.lens.distort(points) - moved[:, 0]).max() < ROUNDING
+    assert np.abs(camera.lens.undistort(moved[:, 0]) - points).max() < 1e-11
+
+
+BROWN = {"k1": -0.2, "k2": 0.05, "k3": -0.01, "p1": 0.003, "p2": -0.002}
+
+
+def metashape():
+    """By Agisoft's manual x′ = x (1 + K1 r² + …) + P1 (r² + 2x²) + 2 P2 x y: its P1 is OpenCV's p2."""
+    tags = "".join(
+        f"<{name}>{BROWN[brown]}</{name}>" for name, brown in zip(("k1", "k2", "k3", "p1", "p2"), _SWAPPED, strict=True)
+    )
+    return files.metashape(files.Known("plain"), tags)
+
+
+_SWAPPED = ("k1", "k2", "k3", "p2", "p1")
+
+
+def meshroom():
+    document = json.loads(mixed.meshroom())
+    document["intrinsics"][0] |= {"distortionType": "brown", "distortionParams": [*map(str, BROWN.values())]}
+    return json.dumps(document)
+
+
+def openmvg():
+    document = json.loads(mixed.openmvg())
+    data = document["intrinsics"][0]["value"]["ptr_wrapper"]["data"]
+    data["disto_t2"] = [*BROWN.values()]
+    return json.dumps(document)
+
+
+def nerfstudio():
+    document = json.loads(mixed.transforms())
+    document["frames"] = [document["frames"][0] | BROWN | {"camera_model": "OPENCV"}]
+    return json.dumps(document)
+
+
+def realitycapture():
+    """Its tangential terms are swapped against OpenCV's (camorph 1.0)."""
+    numbers = " ".join(str(BROWN[name]) for name in ("k1", "k2", "k3")) + f" 0 {BROWN['p2']} {BROWN['p1']}"
+    return (
+        '<x xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#" xcr:FocalLength35mm="30" xcr:DistortionModel="brown3t2">'
+        "<xcr:Rotation>1 0 0 0 1 0 0 0 1</xcr:Rotation><xcr:Position>1 2 3</xcr:Position>"
+        f"<xcr:DistortionCoeficients>{numbers}</xcr:DistortionCoeficients></x>"
+    )
+
+
+@pytest.mark.parametrize("make", [metashape, meshroom, openmvg, nerfstudio, realitycapture])
+def test_brown_and_conradys_lens_is_opencvs_by_every_programs_names(make):
+    cv2 = pytest.importorskip("cv2")
+    camera = cameras.read(make(), options=Options(size=(640, 360)))[0]
+    numbers = np.array([BROWN[name] for name in ("k1", "k2", "p1", "p2", "k3")])
+    moved, _ = cv2.projectPoints(np.c_[POINTS, np.ones(len(POINTS))], np.zeros(3), np.zeros(3), np.eye(3), numbers)
+    assert np.abs(camera.lens.distort(POINTS) - moved[:, 0]).max() < ROUNDING
+    assert any("pinhole of the undistorted picture" in note for note in camera.notes)
+
+
+def test_bundlers_radial_terms_are_colmaps(tmp_path):
+    pose = "1 0 0\n0 1 0\n0 0 1\n0 0 -4\n"
+    (camera,) = cameras.read(f"# Bundle file v0.3\n1 0\n600 -0.2 0.05\n{pose}", options=Options(size=(640, 360)))
+    assert camera.lens == of_colmap("RADIAL", tmp_path)[0].lens
+
+
+@pytest.mark.parametrize("model", ["OPENCV_FISHEYE", "FISHEYE"])
+def test_nerfstudios_fisheye_is_colmaps(tmp_path, model):
+    document = json.loads(mixed.transforms())
+    k = COLMAP["OPENCV_FISHEYE"][0]
+    terms = dict(zip(("k1", "k2", "k3", "k4"), k, strict=True))
+    key = "camera_model" if model == "OPENCV_FISHEYE" else "camera_type"
+    document["frames"] = [document["frames"][0] | terms | {key: model}]
+    (camera,) = cameras.read(json.dumps(document))
+    assert camera.lens == of_colmap("OPENCV_FISHEYE", tmp_path)[0].lens
+
+
+def test_a_picture_that_no_lens_shows_is_no_point():
+    barrel = distortion.opencv({"k1": -0.3})  # r (1 − 0.3 r²) turns back at r = 1.054, where it is 0.703
+    assert np.isnan(barrel.undistort([[0.71, 0.0]])).all() and not np.isnan(barrel.undistort([[0.70, 0.0]])).any()
+    assert barrel.folds([[1.06, 0.0], [1.04, 0.0], [3.0, 0.0], [0.0, 0.0]]).tolist() == [True, False, True, False]
+    fisheye = distortion.fisheye({})
+    assert np.isnan(fisheye.undistort([[1.58, 0.0]])).all()  # more than a quarter turn from the axis
+
+
+@pytest.mark.parametrize("form", cameras.writable())
+def test_no_format_that_has_no_lens_drops_one(tmp_path, form):
+    camera, *_ = of_colmap("OPENCV", tmp_path)
+    with pytest.raises(InputError, match="lens distortion"):
+        cameras.write([camera], form)
+
+
+def test_an_unknown_lens_is_refused_or_left_out_and_said_so():
+    document = json.loads(meshroom())
+    document["intrinsics"][0]["distortionType"] = "3deanamorphic4"
+    with pytest.raises(InputError, match="3deanamorphic4"):
+        cameras.read(json.dumps(document))
+    camera = cameras.read(json.dumps(document), options=Options(without_distortion=True))[0]
+    assert camera.lens is None and any("3deanamorphic4" in note for note in camera.notes)

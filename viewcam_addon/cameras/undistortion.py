@@ -1,0 +1,260 @@
+"""Photographs without their lens: the pinhole that is cut from what a lens shows, and its picture, masks and depth maps.
+
+The pinhole's focal length and axis are the lens's own; its size is COLMAP's choice, by how much of the picture may stay empty.
+Pixels are interpolated between the four nearest in float64; masks and depths are the nearest one, since what lies between two
+objects is neither. OpenCV decodes and encodes files: 8 and 16 bits, colors and alpha as they are.
+
+Rejected: `cv2.remap`, whose places are whole 32nds of a pixel.
+
+Source: COLMAP's src/colmap/image/undistortion.cc and warp.cc.
+"""
+
+import dataclasses
+import importlib
+import importlib.util
+import io
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from .. import npy
+from ..errors import InputError
+from ..files import read_bytes, written_whole
+from ..pinhole import ViewPlane
+from . import colmap, naming, transforms
+from .camera import Camera
+from .distortion import Lens
+from .source import Source
+
+FORMS = ("transforms", "colmap")
+_SCALES = (0.2, 2.0)  # of the picture's sides, at least and at most: COLMAP's
+_BAND = 2**20  # pixels that are computed at a time
+_FOLDERS = {"mask_path": "masks", "depth_file_path": "depths"}  # by the keys of a frame
+
+
+def undistorted(lens: Lens, plane: ViewPlane, blank: float = 0.0) -> ViewPlane:
+    """The view plane of the picture without the lens, as large as COLMAP makes it.
+
+    plane : of the photograph. blank : 0: no pixel is empty, 1: none of the photograph's is cut off; between them some.
+
+    Raises
+    ------
+    InputError
+        if the photograph's border shows nothing that lies before the camera.
+    """
+    (d_x, d_y), (c_x, c_yb), width, height = plane.distance, plane.principal_point, plane.width, plane.height
+    c_y = height - c_yb
+    columns, rows = np.arange(width) + 0.5, np.arange(height) + 0.5
+
+    def border(x: Any, y: Any, along: int) -> tuple[float, float]:
+        """The least and the largest x or y of the pinhole's points that one side of the photograph shows, in pixels."""
+        points = np.stack(np.broadcast_arrays((x - c_x) / d_x, (y - c_y) / d_y), axis=-1)
+        places = lens.undistort(points)[:, along] * (d_x, d_y)[along] + (c_x, c_y)[along]
+        places = places[np.isfinite(places)]
+        if not len(places):
+            raise InputError("a side of the photograph shows nothing that lies before the camera: crop the photograph")
+        return float(places.min()), float(places.max())
+
+    scales = []
+    sides = (
+        (c_x, width, border(0.5, rows, 0), border(width - 0.5, rows, 0)),
+        (c_y, height, border(columns, 0.5, 1), border(columns, height - 0.5, 1)),
+    )
+    for center, size, (first_least, first_most), (last_least, last_most) in sides:
+        if not (first_most < center < last_least and 0 < center < size - 0.5):
+            raise InputError("the photograph's middle lies outside of what its lens shows: no picture can be cut from it")
+        whole = min(center / (center - first_least), (size - 0.5 - center) / (last_most - center))
+        filled = max(center / (center - first_most), (size - 0.5 - center) / (last_least - center))
+        scales.append(min(max(1 / (whole * blank + filled * (1 - blank)), _SCALES[0]), _SCALES[1]))
+    new_width, new_height = (int(max(1.0, scale * size)) for scale, size in zip(scales, (width, height), strict=True))
+    new_c_y = c_y * new_height / height
+    return ViewPlane(plane.distance, (c_x * new_width / width, new_height - new_c_y), new_width, new_height)
+
+
+def places(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> Iterator[tuple[slice, np.ndarray]]:
+    """Rows of the undistorted picture, and where in the photograph each of their pixels' centers is seen.
+
+    plane : of the photograph. cut : of the picture. Places are (rows, columns, 2), from the corner, y down; NaN where the lens
+    shows none.
+    """
+    columns = (np.arange(cut.width) + 0.5 - cut.principal_point[0]) / cut.distance[0]
+    center = cut.height - cut.principal_point[1]
+    step = max(1, _BAND // cut.width)
+    for start in range(0, cut.height, step):
+        rows = slice(start, min(start + step, cut.height))
+        down = (np.arange(rows.start, rows.stop) + 0.5 - center) / cut.distance[1]
+        points = np.stack(np.meshgrid(columns, down), axis=-1)
+        found = lens.distort(points)
+        found[lens.folds(points)] = np.nan
+        yield rows, found * plane.distance + [plane.principal_point[0], plane.height - plane.principal_point[1]]
+
+
+def resampled(photograph: np.ndarray, lens: Lens, plane: ViewPlane, cut: ViewPlane, nearest: bool = False) -> np.ndarray:
+    """The picture without the lens, black where the photograph has nothing.
+
+    photograph : (height, width) or (height, width, channels), rows from the top. nearest : takes the nearest pixel's number,
+    of masks and depths.
+    """
+    picture = np.zeros((cut.height, cut.width, *photograph.shape[2:]), photograph.dtype)
+    limits = np.array(photograph.shape[1::-1])
+    for rows, at in places(lens, plane, cut):
+        at = at if nearest else at - 0.5
+        with np.errstate(invalid="ignore"):
+            seen = ((at >= 0) & (at < limits if nearest else at <= limits - 1)).all(axis=-1)
+        x, y = at[seen].T
+        if nearest:
+            picture[rows][seen] = photograph[y.astype(int), x.astype(int)]
+            continue
+        left, top = (np.minimum(np.floor(each).astype(int), limit - 2) for each, limit in zip((x, y), limits, strict=True))
+        across, down = ((each - least).reshape(-1, *[1] * (photograph.ndim - 2)) for each, least in ((x, left), (y, top)))
+        upper, lower = ((1 - across) * photograph[row, left] + across * photograph[row, left + 1] for row in (top, top + 1))
+        mixed = (1 - down) * upper + down * lower
+        picture[rows][seen] = np.rint(mixed) if photograph.dtype.kind == "u" else mixed
+    return picture
+
+
+def save(cameras: Sequence[Camera], dataset: Path, out: Path, form: str, blank: float = 0.0) -> list[Camera]:
+    """Write the undistorted pictures of a data set, and its cameras as pinholes; returns these.
+
+    dataset : the file or folder of which the cameras were read, near which their pictures are. out : a folder, new or empty.
+    form : one of FORMS: transforms.json with masks and depth maps, or sparse/0 with COLMAP's points, beside images/.
+
+    Raises
+    ------
+    InputError
+        if OpenCV is missing, a picture is not there or of another size than its camera, or the folder is not empty.
+    """
+    if importlib.util.find_spec("cv2") is None:
+        raise InputError("pictures are read and written by OpenCV: pip install opencv-python-headless")
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(f"{out} is there and not an empty folder: give a new one")
+    naming.checked(cameras, "a data set")
+    try:
+        return _save(cameras, dataset, out, form, blank)
+    except BaseException:
+        shutil.rmtree(out, ignore_errors=True)
+        raise
+
+
+def _save(cameras: Sequence[Camera], dataset: Path, out: Path, form: str, blank: float) -> list[Camera]:
+    folder = dataset if dataset.is_dir() else dataset.parent
+    beside = _beside(dataset, cameras)
+    files = [naming.picture_of(camera, folder) for camera in cameras]
+    if missing := [naming.image_of(camera) for camera, file in zip(cameras, files, strict=True) if file is None]:
+        raise InputError(f"{naming.several(missing)} can't be found beside {dataset} nor in images/: put the pictures there")
+    cut_planes: dict[tuple[Lens, ViewPlane], ViewPlane] = {}
+    written, frames = [], []
+    for camera, file, others in zip(cameras, files, beside, strict=True):
+        plane, name = camera.pinhole.plane, naming.image_of(camera).removeprefix("images/")
+        if camera.lens is not None and (camera.lens, plane) not in cut_planes:
+            cut_planes[camera.lens, plane] = undistorted(camera.lens, plane, blank)
+        cut = plane if camera.lens is None else cut_planes[camera.lens, plane]
+        targets = {key: Path(_FOLDERS[key], name).with_suffix(other.suffix) for key, other in others.items()}
+        for source, target in ((file, Path("images", name)), *((others[key], targets[key]) for key in others)):
+            _convert(cast(Path, source), out / target, camera, cut, nearest=source is not file)
+        frames.append({key: target.as_posix() for key, target in targets.items()})
+        pinhole = dataclasses.replace(
+            camera.pinhole, distance=cut.distance, principal_point=cut.principal_point, width=cut.width, height=cut.height
+        )
+        image = f"images/{name}" if form == "transforms" else name
+        written.append(dataclasses.replace(camera, pinhole=pinhole, lens=None, image=image))
+    if form == "transforms":
+        document = transforms.document(written)
+        if (scale := _depth_scale(dataset)) is not None:
+            document = {"depth_unit_scale_factor": scale} | document
+        document["frames"] = [frame | more for frame, more in zip(document["frames"], frames, strict=True)]
+        texts = {transforms.FILE: transforms.text(document)}
+    else:
+        texts = {f"sparse/0/{name}": text for name, text in colmap.texts(written).items()}
+        texts["sparse/0/points3D.txt"] += colmap.points_without_tracks(Source(dataset))
+    for name, text in texts.items():
+        with written_whole(out / name) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+    return written
+
+
+def _depth_scale(dataset: Path) -> float | None:
+    """The scale of the depth maps that transforms.json says, None where it says none."""
+    scale = _document(dataset).get("depth_unit_scale_factor")
+    return scale if isinstance(scale, int | float) else None
+
+
+def _document(dataset: Path) -> Mapping[str, Any]:
+    """The content of the data set's transforms.json; empty where there is none."""
+    file = dataset / transforms.FILE if dataset.is_dir() else dataset
+    return Source(file).document if file.is_file() and file.suffix == ".json" else {}
+
+
+def _beside(dataset: Path, cameras: Sequence[Camera]) -> list[dict[str, Path]]:
+    """The masks and depth maps of the cameras' pictures, by the keys that transforms.json has for them.
+
+    They are those that it names; of another data set the masks in masks/, called as the pictures, with .png added or in place
+    of their suffix.
+    """
+    folder = dataset if dataset.is_dir() else dataset.parent
+    listed = _document(dataset).get("frames")
+    frames = {str(frame.get("file_path")): frame for frame in listed or () if isinstance(frame, dict)}
+    found = []
+    for camera in cameras:
+        name = naming.inside(naming.image_of(camera))
+        beside: dict[str, Path] = {}
+        for key in _FOLDERS:
+            path = frames.get(camera.image or "", {}).get(key)
+            if isinstance(path, str):
+                if (near := naming.near(path, folder)) is None:
+                    raise InputError(f"{path} of {name} is not beside {dataset}: put it there, or take it out of the file")
+                beside[key] = near
+        masks = (naming.near(f"masks/{each}.png", folder) for each in (name, name.rpartition(".")[0]))
+        if not frames and (mask := next(filter(None, masks), None)):
+            beside["mask_path"] = mask
+        found.append(beside)
+    return found
+
+
+def _convert(file: Path, target: Path, camera: Camera, cut: ViewPlane, nearest: bool) -> None:
+    """Write the file's picture, numbers of .npy among them, without the camera's lens; a copy where there is none."""
+    data = read_bytes(file)
+    if camera.lens is not None:
+        pixels = _decoded(data, file)
+        plane = camera.pinhole.plane
+        if pixels.shape[1::-1] != (plane.width, plane.height):
+            sizes = f"{pixels.shape[1]} × {pixels.shape[0]} pixels and its camera {plane.width} × {plane.height}"
+            raise InputError(f"{file} has {sizes}: give the pictures that the cameras were calibrated with")
+        data = _encoded(resampled(pixels, camera.lens, plane, cut, nearest), file)
+    with written_whole(target) as temporary:
+        temporary.write_bytes(data)
+
+
+def _decoded(data: bytes, file: Path) -> np.ndarray:
+    if file.suffix.lower() == ".npy":
+        try:
+            pixels = npy.read(data)
+        except ValueError as error:
+            raise InputError(f"{file} is no array of numbers ({error}): write it again") from None
+    else:
+        cv2 = importlib.import_module("cv2")
+        try:
+            pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        except cv2.error:
+            pixels = None
+    if pixels is None or pixels.ndim not in (2, 3) or min(pixels.shape[:2]) < 2:
+        raise InputError(f"{file} is no picture that OpenCV reads: convert it to PNG")
+    return pixels
+
+
+def _encoded(pixels: np.ndarray, file: Path) -> bytes:
+    if file.suffix.lower() == ".npy":
+        packed = io.BytesIO()
+        np.save(packed, pixels)
+        return packed.getvalue()
+    cv2 = importlib.import_module("cv2")
+    try:
+        is_encoded, data = cv2.imencode(file.suffix.lower(), pixels)
+    except cv2.error:
+        is_encoded = False
+    if not is_encoded:
+        raise InputError(f"OpenCV writes no {file.suffix} of {file.name}: convert the pictures to PNG")
+    return data.tobytes()
