@@ -192,6 +192,45 @@ def test_edges_give_the_turn_and_the_lens_and_the_eye_stays(axes):
     assert math.dist(match.pinhole.eye, match.pinhole.look_at) == pytest.approx(math.dist(LIKE.eye, LIKE.look_at))
 
 
+def edges_of(camera, axes="XYZ"):
+    """Three edges of a box along each axis, as a camera sees them, the first of which begins at (-2, -2, -1)."""
+    edges = []
+    for i, axis in enumerate(axes):
+        for side, top in ((-2, -1), (2, -1), (-2, 1)):
+            start = np.roll([-2.0, side, top], i) if i else np.array([-2.0, side, top])
+            ends = np.column_stack(camera.project(np.array([start, start + 4 * np.eye(3)["XYZ".index(axis)]]))[:2])
+            edges.append((axis, *ends.tolist()))
+    return edges
+
+
+@pytest.mark.parametrize("distance", [None, 1700.0])
+def test_one_known_length_gives_the_place_as_well(distance):
+    known = photo_match.KnownEdge(0, 4.0, (-2, -2, -1))
+    found = photo_match.from_edges(edges_of(CAMERA), LIKE, distance=distance, known=known).pinhole
+    np.testing.assert_allclose(found.eye, CAMERA.eye, atol=1e-8)
+    np.testing.assert_allclose(found.basis(), CAMERA.basis(), atol=1e-9)
+    twice = photo_match.KnownEdge(0, 8.0, (-2, -2, -1))
+    far = photo_match.from_edges(edges_of(CAMERA), LIKE, distance=distance, known=twice).pinhole
+    np.testing.assert_allclose(np.subtract(far.eye, (-2, -2, -1)), 2 * np.subtract(CAMERA.eye, (-2, -2, -1)), atol=1e-8)
+
+
+def test_a_known_lens_is_kept_and_makes_the_turn_more_certain():
+    rng = np.random.default_rng(5)
+    edges = [(axis, *(np.array(ends) + rng.normal(size=(2, 2)))) for axis, *ends in edges_of(CAMERA, "XY")]
+    free, kept = (photo_match.from_edges(edges, LIKE, distance=distance) for distance in (None, 1700.0))
+    assert kept.pinhole.distance == (1700.0, 1700.0) and kept.distance_between == (1700.0, 1700.0)
+    assert kept.pixels["distance"] == 0 and kept.pixels["look_at"] < free.pixels["look_at"]
+    assert free.distance_between[0] < free.distance_between[1]
+
+
+def test_a_known_lens_is_kept_by_points_and_rectangles():
+    pixels = np.column_stack(CAMERA.project(RECTANGLE)[:2])
+    found = photo_match.from_rectangle(pixels, (3, 2), LIKE, distance=1700.0).pinhole
+    np.testing.assert_allclose(found.eye, CAMERA.eye, atol=1e-6)
+    wrong = photo_match.from_rectangle(pixels, (3, 2), LIKE, distance=2000.0)
+    assert wrong.pinhole.distance == (2000.0, 2000.0) and wrong.error > 1, "another lens does not fit"
+
+
 def test_a_principal_point_beside_the_middle_is_taken_as_it_is():
     shifted = Pinhole(CAMERA.eye, CAMERA.look_at, CAMERA.up, 1700.0, WIDTH, HEIGHT, (800.0, 600.0))
     like = Pinhole(LIKE.eye, LIKE.look_at, LIKE.up, 1500.0, WIDTH, HEIGHT, (800.0, 600.0))

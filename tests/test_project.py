@@ -91,7 +91,7 @@ BLENDER_ROOMS = {
     "rendering": "versions temporary_settings another_blender datablocks scenes",
     "interface": (
         "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold causes "
-        "pose conversion camera own_picture scenes rendering jobs"
+        "pose conversion camera dataset_cameras own_picture scenes rendering jobs"
     ),
     "jobs": "versions temporary_settings opening datablocks camera resolution scenes rendering",
 }

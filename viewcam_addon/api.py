@@ -162,8 +162,8 @@ def compare(
 
         def coincident() -> CoincidentLight:
             level = of.attributes.get("level", "path")
-            light, pairs = makes_tracer().coincident_light(level, SAMPLES_OF_COINCIDENT, 0, ROUNDINGS[-1])
-            return CoincidentLight(Image(light), pairs)
+            light, pairs, seen_otherwise = makes_tracer().coincident_light(level, SAMPLES_OF_COINCIDENT, 0, ROUNDINGS[-1])
+            return CoincidentLight(Image(light), pairs, seen_otherwise)
 
         lit = replace(radiance.compare(of, pictures, camera, test_samples, coincident), stated=stated)
         names = tuple(dict.fromkeys((*shown.not_modelled, *lit.taken_out.names)))
@@ -171,7 +171,12 @@ def compare(
             return lit
         surfaces = makes_tracer().pixels_of(shown.not_modelled)
         surfaces |= {name: surfaces.get(name, False) | lit.taken_out.pixels for name in lit.taken_out.names}
-        return replace(lit, not_modelled=not_modelled(names, surfaces, of, pictures, whole, camera))
+        parts = not_modelled(names, surfaces, of, pictures, whole, camera)
+        one_place, otherwise = (
+            [name for name in some if name not in shown.not_modelled]
+            for some in (lit.taken_out.in_one_place, lit.taken_out.seen_otherwise)
+        )
+        return replace(lit, not_modelled=parts.sorted_by(one_place, otherwise))
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
     by = renderer or renderers.CYCLES

@@ -1,7 +1,8 @@
 """A camera from a photograph: from edges that run along known axes, or from points whose places are known.
 
 Pixels count from the lower left corner of the picture, with centres at + 0.5. The principal point is given (the picture's
-middle, unless it is known better) and pixels are square. What is unknown is d, the turn of the camera and, for points, the eye.
+middle, unless it is known better) and pixels are square. What is unknown is d, unless the lens is known, the turn of the camera
+and the eye: points tell it, and so does one edge of known length and place.
 
 An edge is where the picture of a straight line begins and ends; which way it was drawn says which way its axis points, and so
 two axes are enough for one camera without a mirror image. All of an axis' edges meet in its vanishing point, and by how far
@@ -28,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import checks
 from .errors import InputError
-from .pinhole import Pair, Pinhole, Triple
+from .pinhole import Pair, Pinhole, Triple, check_distance
 
 Array = NDArray[np.float64]
 
@@ -76,21 +77,36 @@ class Solution:
     covariance: Array
 
 
+@dataclass(frozen=True)
+class KnownEdge:
+    """An edge whose place and size in the world are known.
+
+    edge : its number among the edges. length : world units, > 0. start : where it begins, world space.
+    """
+
+    edge: int
+    length: float
+    start: Triple = (0.0, 0.0, 0.0)
+
+
 def from_edges(
     edges: Sequence[tuple[str, ArrayLike, ArrayLike]],
     like: Pinhole,
     precision: float = 1.0,
+    distance: float | None = None,
+    known: KnownEdge | None = None,
 ) -> Match:
     """The camera whose picture has these edges.
 
     edges : (axis, start, end), at least two along each of two axes. axis : "X", "Y" or "Z". start, end : (2,) pixels, drawn
     towards where the axis points. like : its eye, distance to the look-at point, size and principal point are kept.
-    precision : of start and end, pixels, one standard deviation.
+    precision : of start and end, pixels, one standard deviation. distance : d in pixels where the lens is known.
+    known : the edge whose length and place say how far away the camera stands, and where; without it its eye is kept.
 
     Raises
     ------
     InputError
-        if edges are missing or contradict one another, or leave the lens open.
+        if edges are missing or contradict one another, or leave the lens open, or if no camera sees the known one so.
     """
     precision = checks.number("precision", precision, least=1e-9)
     named = [axis for axis, *_ in edges]
@@ -104,19 +120,47 @@ def from_edges(
     ends = checks.array("edges", [[start, end] for _, start, end in used])
     if (np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) < 1.0).any():
         raise InputError("an edge is shorter than a pixel: draw it along more of the line")
-    solution, is_mirrored = solve_edges(ends - np.array(like.principal_point), axes, _half(like))
+    solution, is_mirrored = solve_edges(ends - np.array(like.principal_point), axes, _half(like), _known_distance(distance))
     if is_mirrored:
         raise InputError("the edges' directions are those of a mirrored picture: draw each towards where its axis points")
-    eye = np.array(like.eye)
+    eye = np.array(like.eye) if known is None else _eye_of(known, edges, solution, like)
     solution = Solution(solution.rotation, eye, solution.distance, solution.residuals, solution.covariance)
-    return _match(solution, like, precision, math.dist(like.eye, like.look_at), len(used) - 4, None)
+    spare = len(used) - (4 if distance is None else 3)
+    return _match(solution, like, precision, math.dist(like.eye, like.look_at), spare, None)
 
 
-def from_points(points: ArrayLike, pixels: ArrayLike, like: Pinhole, precision: float = 1.0) -> Match:
+def _known_distance(distance: float | None) -> float | None:
+    if distance is None:
+        return None
+    distance = checks.number("distance", distance)
+    check_distance(distance)
+    return distance
+
+
+def _eye_of(known: KnownEdge, edges: Sequence[tuple[str, ArrayLike, ArrayLike]], solution: Solution, like: Pinhole) -> Array:
+    """Where the camera stands that sees an edge of known length begin in a known place."""
+    length = checks.number("length", known.length)
+    if length <= 0:
+        raise InputError(f"the known edge has a length of {length:g}: give one above 0")
+    axis, *ends = edges[known.edge]
+    pixels = checks.array("edges", ends) - np.array(like.principal_point)
+    rays = np.column_stack([pixels, [-solution.distance] * 2]) @ solution.rotation
+    # end · second ray − start · first ray is the edge, the shares of the rays by least squares.
+    along = length * np.eye(3)[_AXES.index(axis)]
+    (start, end), *_ = np.linalg.lstsq(np.column_stack([-rays[0], rays[1]]), along, rcond=None)
+    if not (start > 0 and end > 0):
+        raise InputError(f"the edge along {axis} whose length is known does not lie before the camera: draw it anew")
+    return np.array(checks.vector("start", known.start, 3)) - start * rays[0]
+
+
+def from_points(
+    points: ArrayLike, pixels: ArrayLike, like: Pinhole, precision: float = 1.0, distance: float | None = None
+) -> Match:
     """The camera that sees points of known place.
 
     points : (n, 3) world space; at least four in one plane, or six. pixels : (n, 2), where they are in the picture.
     like : its size, principal point and distance to the look-at point are kept. precision : of pixels, as for from_edges.
+    distance : d in pixels where the lens is known.
 
     Raises
     ------
@@ -133,9 +177,10 @@ def from_points(points: ArrayLike, pixels: ArrayLike, like: Pinhole, precision: 
         raise InputError(f"{len(points)} points are too few: give four in one plane, or six in space")
     if spread[1] <= _FLAT * spread[0]:
         raise InputError("the points lie on one line: give some beside it")
-    solution = solve_points(points, pixels - np.array(like.principal_point), _half(like), is_flat)
+    middle = np.array(like.principal_point)
+    solution = solve_points(points, pixels - middle, _half(like), is_flat, _known_distance(distance))
     away = float(np.mean((points - solution.eye) @ -solution.rotation[2]))
-    return _match(solution, like, precision, away, 2 * len(points) - 7, away)
+    return _match(solution, like, precision, away, 2 * len(points) - (7 if distance is None else 6), away)
 
 
 def from_rectangle(
@@ -145,11 +190,13 @@ def from_rectangle(
     precision: float = 1.0,
     origin: Triple = (0.0, 0.0, 0.0),
     axes: str = "XY",
+    distance: float | None = None,
 ) -> Match:
     """The camera that sees a rectangle of known sides.
 
     corners : (4, 2) pixels: that at the origin, then around, first along the first axis. sides : lengths along both axes, world
     units. origin : world space. axes : the two that the sides run along, as "XY" on the floor or "XZ" on a wall.
+    distance : d in pixels where the lens is known.
 
     Raises
     ------
@@ -163,14 +210,16 @@ def from_rectangle(
         raise InputError(f"a rectangle has sides of {sides[0]:g} and {sides[1]:g}: give lengths above 0")
     first, second = (length * np.eye(3)[_AXES.index(axis)] for length, axis in zip(sides, axes, strict=True))
     places = np.array(checks.vector("origin", origin, 3)) + np.array([0 * first, first, first + second, second])
-    return from_points(places, corners, like, precision)
+    return from_points(places, corners, like, precision, distance)
 
 
-def solve_edges(ends: Array, axes: NDArray[np.int_], half: float) -> tuple[Solution, NDArray[np.bool_]]:
+def solve_edges(
+    ends: Array, axes: NDArray[np.int_], half: float, known_distance: float | None = None
+) -> tuple[Solution, NDArray[np.bool_]]:
     """The cameras of edges, and whether those that were drawn are of a mirrored picture.
 
     ends : (..., n, 2, 2): edge, end, pixels from the principal point. axes : (n,) which of the world's axes each runs along.
-    half : of the picture's larger side, pixels.
+    half : of the picture's larger side, pixels. known_distance : d in pixels where the lens is known.
     """
     found = np.unique(axes)
     scaled = np.concatenate([ends / half, np.ones((*ends.shape[:-1], 1))], axis=-1)
@@ -184,6 +233,8 @@ def solve_edges(ends: Array, axes: NDArray[np.int_], half: float) -> tuple[Solut
         above, below = above - across * away, below + away * away
     square = np.where(below > 0.0, above / np.where(below > 0.0, below, 1.0), _LONGEST**2)
     distance = np.sqrt(np.clip(square, _SHORTEST**2, _LONGEST**2))
+    if known_distance is not None:
+        distance = np.full_like(distance, known_distance / half)
     seen = vanishing * np.stack([1 / distance, 1 / distance, -np.ones_like(distance)], axis=-1)[..., None, :]
     seen /= np.linalg.norm(seen, axis=-1, keepdims=True)
     # What moves along an axis moves in the picture by V − p W, where (V, W) is its vanishing point.
@@ -200,24 +251,30 @@ def solve_edges(ends: Array, axes: NDArray[np.int_], half: float) -> tuple[Solut
         return _edge_residuals(ends, directions, rotation, distance)
 
     eye = np.zeros((*distance.shape, 3))
-    return _refined(measured, rotation, eye, distance * half, 4), is_mirrored
+    start = distance * half if known_distance is None else np.full_like(distance, known_distance)
+    return _refined(measured, rotation, eye, start, 4, is_lens_known=known_distance is not None), is_mirrored
 
 
-def solve_points(points: Array, pixels: Array, half: float, is_flat: bool) -> Solution:
+def solve_points(points: Array, pixels: Array, half: float, is_flat: bool, known_distance: float | None = None) -> Solution:
     """The cameras that see points. points : (..., n, 3). pixels : (..., n, 2) from the principal point. half : see above.
 
-    is_flat : whether the points lie in a plane, where four are enough.
+    is_flat : whether the points lie in a plane, where four are enough. known_distance : see above.
     """
     centre = points.mean(axis=-2, keepdims=True)
     scale = np.sqrt(((points - centre) ** 2).sum(axis=-1).mean(axis=-1))[..., None, None]
     local, scaled = (points - centre) / scale, pixels / half
     rotation, shift, distance = (_pose_of_a_plane if is_flat else _pose_in_space)(local, scaled)
+    if known_distance is not None:  # and farther away by as much as the lens is longer
+        shift[..., 2] *= known_distance / half / distance
+        distance = np.full_like(distance, known_distance / half)
     eye = centre[..., 0, :] - scale[..., 0] * np.einsum("...ij,...i->...j", rotation, shift)
+
+    start = distance * half if known_distance is None else np.full_like(distance, known_distance)
 
     def measured(rotation: Array, eye: Array, distance: Array) -> tuple[Array, Array]:
         return _point_residuals(points, pixels, rotation, eye, distance, scale[..., 0, 0])
 
-    return _refined(measured, rotation, eye, distance * half, 7, scale[..., 0, 0])
+    return _refined(measured, rotation, eye, start, 7, scale[..., 0, 0], known_distance is not None)
 
 
 _AXES = "XYZ"
@@ -310,18 +367,22 @@ def _refined(
     distance: Array,
     unknowns: int,
     scale: Array | float = 1.0,
+    is_lens_known: bool = False,
 ) -> Solution:
-    """The least squares near a start. scale : of the eye's parameters, world units."""
+    """The least squares near a start. scale : of the eye's parameters, world units. is_lens_known : the start's is right."""
     scale = np.broadcast_to(scale, distance.shape)
+    asked = [parameter for parameter in range(unknowns) if parameter != 3 or not is_lens_known]
     damping = np.full(distance.shape, 1e-4)
     residual, jacobian = measured(rotation, eye, distance)
     cost = (residual**2).sum(axis=-1)
     for _ in range(_STEPS):
-        normal = np.swapaxes(jacobian, -1, -2) @ jacobian
-        gradient = np.einsum("...mp,...m->...p", jacobian, residual)
+        slopes = jacobian[..., asked]
+        normal = np.swapaxes(slopes, -1, -2) @ slopes
+        gradient = np.einsum("...mp,...m->...p", slopes, residual)
         diagonal = np.einsum("...pp->...p", normal)
-        damped = normal + (damping[..., None] * diagonal + 1e-300)[..., None] * np.eye(unknowns)
-        step = -_solved(damped, gradient)
+        damped = normal + (damping[..., None] * diagonal + 1e-300)[..., None] * np.eye(len(asked))
+        step = np.zeros((*distance.shape, unknowns))
+        step[..., asked] = -_solved(damped, gradient)
         step[..., 3] = np.clip(step[..., 3], -1.0, 1.0)
         tried_rotation = _turned(rotation, step[..., :3])
         tried_distance = distance * np.exp(step[..., 3])
@@ -339,13 +400,15 @@ def _refined(
         damping = np.where(better, np.maximum(damping / 10.0, 1e-15), np.minimum(damping * 10.0, 1e12))
         if (np.abs(step).max(axis=-1) < _CONVERGED).all():
             break
-    normal = np.swapaxes(jacobian, -1, -2) @ jacobian
+    slopes = jacobian[..., asked]
+    normal = np.swapaxes(slopes, -1, -2) @ slopes
     size = np.sqrt(np.maximum(np.einsum("...pp->...p", normal), 1e-300))
     both = size[..., :, None] * size[..., None, :]
     values, vectors = np.linalg.eigh(normal / both)
     # Where a step changes nothing (lens and distance of a plane seen head-on) all is open.
     variances = np.where(values[..., :1] > _OPEN, 1.0 / np.maximum(values, _OPEN), 1e300)
-    covariance = np.einsum("...pk,...k,...qk->...pq", vectors, variances, vectors) / both
+    covariance = np.zeros((*distance.shape, unknowns, unknowns))  # of a known lens
+    covariance[..., np.array(asked)[:, None], asked] = np.einsum("...pk,...k,...qk->...pq", vectors, variances, vectors) / both
     if unknowns > 4:
         units = np.concatenate([np.ones((*distance.shape, 4)), np.repeat(scale[..., None], 3, axis=-1)], axis=-1)
         covariance = covariance * units[..., :, None] * units[..., None, :]

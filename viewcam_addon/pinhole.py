@@ -171,7 +171,7 @@ class Pinhole:
         return self._plane
 
     @cached_property
-    def _view(self) -> tuple[Pair, Pair, float]:
+    def _view(self) -> tuple[Pair, Pair, Triple, float]:
         return _view_of_one(self.eye, self.look_at, self.up)
 
     @cached_property
@@ -208,7 +208,11 @@ class Pinhole:
         """sin θ of the angle θ between the view and up, at most 1, to full precision however small it is; 0 if singular
         or below float64's range.
         """
-        return self._view[2]
+        apart, across, unit_up, largest = self._view
+        if not largest:
+            return 0.0
+        relative_lengths = [exact.length(each) / exact.largest_component(each) for each in (across[0], unit_up, apart[0])]
+        return min(largest * relative_lengths[0] / (relative_lengths[1] * relative_lengths[2]), 1.0)
 
     def roll_uncertainty(self, precision: float = 2.0**-24) -> float:
         """The roll that rounding the inputs can cause, in radians, at most π.
@@ -406,15 +410,17 @@ def canonical_axes(up: Triple, looking_down: bool) -> tuple[Triple, Triple, Trip
     return tuple(tuple(component + 0.0 for component in axis) for axis in axes)  # + 0.0 makes −0.0 a plain zero
 
 
-def _axes_of_one(up: Triple, apart: Pair, across: Pair, _sine: float) -> tuple[Triple, Triple, Triple]:
+def _axes_of_one(up: Triple, apart: Pair, across: Pair, unit_up: Triple, _largest: float) -> tuple[Triple, Triple, Triple]:
     if any(across[0]):
         return _orthonormal(apart, across)
-    (unit_up,) = exact.scaled_to_one(up)
     return canonical_axes(up, looking_down=sum(a * b for a, b in zip(unit_up, apart[0], strict=True)) > 0)
 
 
-def _view_of_one(e: Triple, l: Triple, up: Triple) -> tuple[Pair, Pair, float]:
-    """e − l and up × (e − l) as pairs high + low whose largest component is about 1, and sin θ of the view and up."""
+def _view_of_one(e: Triple, l: Triple, up: Triple) -> tuple[Pair, Pair, Triple, float]:
+    """e − l and up × (e − l) as pairs high + low, and up, all of a largest component of about 1.
+
+    The fourth value is the largest component that the product would have if that of up and of e − l were 1.
+    """
     safe = _is_moderate(e, l)
     if safe:
         unit_up, apart, across, safe = _view(e, l, up)
@@ -424,12 +430,7 @@ def _view_of_one(e: Triple, l: Triple, up: Triple) -> tuple[Pair, Pair, float]:
     else:
         (unit_up,) = exact.scaled_to_one(up)
         apart, across, largest = exact.whole_number_cross(up, e, l)
-    if not largest:
-        return apart, across, 0.0
-    across = tuple(exact.scaled_to_one(*across))
-    relative_lengths = [exact.length(vector) / exact.largest_component(vector) for vector in (across[0], unit_up, apart[0])]
-    sine = largest * relative_lengths[0] / (relative_lengths[1] * relative_lengths[2])
-    return apart, across, min(sine, 1.0)
+    return apart, tuple(exact.scaled_to_one(*across)) if largest else across, unit_up, largest
 
 
 def _basis_of_many(e: tuple, l: tuple, up: tuple) -> tuple[tuple, Array]:
@@ -476,9 +477,14 @@ def _check_up(up: Triple) -> None:
         raise InputError("up is (0, 0, 0): it has no direction, give the vector that shall point up in the picture")
 
 
-def _check_poses(e: Array, l: Array, up: Array) -> None:
+def make_views(e: Array, l: Array, up: Array) -> NDArray[np.bool_]:
+    """True where eye, look-at and up, (..., 3) each, make a view: all numbers are finite, eye ≠ look-at and up ≠ 0."""
     finite = np.isfinite(e).all(-1) & np.isfinite(l).all(-1) & np.isfinite(up).all(-1)
-    for i in np.flatnonzero(~finite | (e == l).all(-1) | ~up.any(-1)):
+    return finite & (e != l).any(-1) & up.any(-1)
+
+
+def _check_poses(e: Array, l: Array, up: Array) -> None:
+    for i in np.flatnonzero(~make_views(e, l, up)):
         try:
             pose = [checks.vector(name, vector[i], 3) for name, vector in (("eye", e), ("look_at", l), ("up", up))]
             _check_pose(*pose)

@@ -11,7 +11,7 @@ Every matrix is (3, 3) float64 and takes column vectors: its columns are the ima
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,13 +161,15 @@ def skew(matrix: Array) -> float:
     return float(np.abs((columns.T @ columns)[[0, 0, 1], [1, 2, 2]]).max())
 
 
-def largest_error(matrix: Iterable, axes: Array) -> float:
-    """The largest difference between the axes of a (4, 4) matrix, of whatever length, and those wanted: (3, 3), as columns."""
-    largest = 0.0
-    for *column, _, wanted in zip(*matrix, axes.T.tolist(), strict=False):
-        size = math.hypot(*column) or 1.0
-        largest = max(largest, *[abs(number / size - other) for number, other in zip(column, wanted, strict=True)])
-    return largest
+def largest_error(matrices: Array, axes: Array) -> Array:
+    """The largest difference between the axes of (..., 4, 4) matrices, of whatever length, and those wanted.
+
+    axes : (..., 3, 3), as columns. Returns (...).
+    """
+    columns = matrices[..., :3, :3]
+    sizes = np.sqrt(np.einsum("...ij,...ij->...j", columns, columns))
+    sizes[sizes == 0] = 1.0
+    return np.abs(columns / sizes[..., None, :] - axes).max(axis=(-2, -1))
 
 
 def float64(numbers: Iterable) -> Array:
@@ -186,8 +188,7 @@ def has_inverse(matrix: Array) -> bool:
     return bool(np.isfinite(matrix).all() and np.linalg.det(matrix) != 0)
 
 
-@dataclass(frozen=True)
-class Channels:
+class Channels(NamedTuple):
     """All that says where a Blender object stands relative to what carries it, as it is stored.
 
     mode : an order of Euler angles, "QUATERNION" or "AXIS_ANGLE". rotation : its numbers in this mode, and delta_rotation those
@@ -201,6 +202,12 @@ class Channels:
     delta_location: tuple[float, float, float]
     delta_rotation: tuple[float, ...]
     delta_scale: tuple[float, float, float]
+
+    @property
+    def is_plain(self) -> bool:
+        """True without deltas and without a negative scale: then location and rotation are where an object stands."""
+        deltas = self.delta_rotation[1:] if self.mode == "QUATERNION" else self.delta_rotation
+        return self.delta_scale == (1, 1, 1) and min(self.scale) > 0 and not any(self.delta_location) and not any(deltas)
 
     @property
     def full_scale(self) -> Array:
@@ -217,7 +224,7 @@ class Channels:
         """(3, 3): the rotation that Blender applies after the object's own."""
         numbers = self.delta_rotation
         if not any(numbers) and self.mode != "QUATERNION":  # none, or no turn
-            return np.eye(3)
+            return IDENTITY[:3, :3]
         return from_quaternion(numbers) if self.mode == "QUATERNION" else from_euler(numbers, self.mode)
 
     def bringing_to(self, pinhole: Pinhole, parent: Array) -> tuple[tuple[float, ...], Array, tuple[float, ...]]:
@@ -225,7 +232,7 @@ class Channels:
 
         parent : (4, 4), invertible, from the camera's own channels to world space.
         """
-        is_free = np.array_equal(parent, IDENTITY)  # as most cameras are, which need no linear algebra
+        is_free = parent is IDENTITY or np.array_equal(parent, IDENTITY)  # as most cameras are: no linear algebra
         wanted = pinhole.picture_axes().T * (1, 1, -1)
         scale, signs = float64(self.scale), self.signs
         local = wanted if is_free else np.linalg.solve(parent[:3, :3], wanted)

@@ -79,3 +79,36 @@ def test_a_blend_that_does_not_tell_which_camera_took_a_picture_is_refused(camer
         dataset_cameras.of_pictures(["r_1", "r_2"], tmp_path / "a.blend")
     with pytest.raises(InputError, match="called otherwise"):
         dataset_cameras.of_pictures(["left"], tmp_path / "a.blend")
+
+
+def test_an_animated_camera_is_written_for_another_program_without_rendering(flight, tmp_path, capsys):
+    blend, found = flight
+    words = ["camera", str(blend), "--frames", f"1..{COUNT}", "--to", "colmap", "--out", str(tmp_path / "path")]
+    assert cli.main(words) == 0 and f"{COUNT} cameras" in capsys.readouterr().out
+    written = formats.read(tmp_path / "path")
+    assert [camera.pinhole for camera in written] == [camera.pinhole for camera in found]
+    assert len({camera.name for camera in written}) == COUNT
+
+
+def test_all_cameras_of_a_blend_are_listed_and_one_that_is_not_there_is_told(flight, capfd):
+    blend, _ = flight
+    assert cli.main(["camera", str(blend), "--list"]) == 0
+    assert "Camera: 320 × 180" in capfd.readouterr().out
+    for words in (["--camera", "Other"], ["--camera", "Other", "--frames", "1..2"]):
+        assert cli.main(["camera", str(blend), *words]) == 2
+        assert "'Other'" in capfd.readouterr().err
+    assert cli.main(["camera", "a.json", "--frames", "1..2"]) == 2
+    assert "those of a .blend" in capfd.readouterr().err
+
+
+def test_file_export_writes_each_frame_and_leaves_the_scene_at_its_own(flight, tmp_path):
+    _, found = flight
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end, scene.render.resolution_percentage = 2, COUNT, 100
+    scene.frame_set(3, subframe=0.25)
+    path = tmp_path / "path.json"
+    assert bpy.ops.viewcam.export_cameras(filepath=str(path), format="transforms", which="FRAMES") == {"FINISHED"}
+    assert (scene.frame_current, scene.frame_subframe) == (3, 0.25)
+    written = formats.read(path)
+    assert [camera.pinhole.eye for camera in written] == [camera.pinhole.eye for camera in found[1:]]
+    assert all((camera.pinhole.width, camera.pinhole.height) == (640, 360) for camera in written)

@@ -22,7 +22,7 @@ BY_BLENDER = {
     "on_frame_change",
     "_edit_of",
 }  # what Blender calls as it evaluates, and as a property is stored
-MOST = 26
+MOST = 28
 
 
 def walk_of(action):

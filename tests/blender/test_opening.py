@@ -49,6 +49,7 @@ COMMANDS = {
         jobs.both_sides(Job(blend=blend, frame=2, trust=trust, level="direct", samples=1), [out / "b.exr"]).ledger
     ),
     "audit": lambda blend, out, trust: list(dataset_cameras.of_pictures(["2"], blend, trust)[0].notes),
+    "camera": lambda blend, out, trust: list(dataset_cameras.of_file(blend, [("frame_2", 2)], trust=trust)[0].notes),
 }
 
 

@@ -1,5 +1,6 @@
 """Lenses, both ways, as OpenCV and COLMAP have them, and every reader's as its own program counts its coefficients."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -165,7 +166,40 @@ def test_a_picture_that_no_lens_shows_is_no_point():
     assert np.isnan(fisheye.undistort([[1.58, 0.0]])).all()  # more than a quarter turn from the axis
 
 
-@pytest.mark.parametrize("form", cameras.writable())
+@pytest.mark.parametrize("form", ["colmap", "colmap_binary"])
+@pytest.mark.parametrize("model", COLMAP)
+def test_a_lens_that_is_written_for_colmap_is_the_same_to_pycolmap(tmp_path, model, form):
+    pycolmap = pytest.importorskip("pycolmap")
+    camera, numbers, points = of_colmap(model, tmp_path)
+    cameras.save([camera], tmp_path / "out", form)
+    (back,) = cameras.read(tmp_path / "out")
+    assert back.lens == camera.lens and back.pinhole == camera.pinhole
+    (tmp_path / "out" / "points3D.txt").touch()
+    (theirs,) = pycolmap.Reconstruction(tmp_path / "out").cameras.values()
+    given = pycolmap.Camera(model=model, width=640, height=360, params=numbers)
+    seen, expected = (each.img_from_cam(np.c_[points, np.ones(len(points))]) for each in (theirs, given))
+    assert np.abs(seen - expected).max() < 1000 * ROUNDING, theirs.model
+
+
+@pytest.mark.parametrize("model", ["SIMPLE_RADIAL", "OPENCV", "OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE"])
+def test_a_lens_that_is_written_for_nerfstudio_comes_back(tmp_path, model):
+    camera, *_ = of_colmap(model, tmp_path)
+    text = cameras.write([camera], "transforms")
+    (back,) = cameras.read(text)
+    assert back.lens == camera.lens and back.pinhole == camera.pinhole
+    assert json.loads(text)["camera_model"] == ("OPENCV_FISHEYE" if "FISHEYE" in model else "OPENCV")
+
+
+@pytest.mark.parametrize("form", ["transforms", "colmap"])
+def test_a_lens_that_a_format_has_no_model_of_is_refused(tmp_path, form):
+    camera, *_ = of_colmap("EUCM", tmp_path)
+    skewed = distortion.opencv({"k1": 0.1}, skew=0.01)
+    lens = skewed if form == "colmap" else camera.lens
+    with pytest.raises(InputError, match="no model of"):
+        cameras.write([dataclasses.replace(camera, lens=lens)], form)
+
+
+@pytest.mark.parametrize("form", [form for form in cameras.writable() if not hasattr(cameras.FORMATS[form], "LENSES")])
 def test_no_format_that_has_no_lens_drops_one(tmp_path, form):
     camera, *_ = of_colmap("OPENCV", tmp_path)
     with pytest.raises(InputError, match="lens distortion"):

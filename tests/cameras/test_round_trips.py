@@ -1,6 +1,7 @@
 """Whatever the camera, the format and the options: written and read back with the same options it is the same camera."""
 
 import dataclasses
+import itertools
 import json
 import math
 import re
@@ -325,3 +326,39 @@ def test_what_is_written_remembers_axes_and_scale_and_says_so_where_others_are_c
     (as_written,), (otherwise,) = cameras.read(path, options=given), cameras.read(path)
     assert not any("was written with" in note for note in as_written.notes)
     assert any("axes=y_up scale=0.01" in note for note in otherwise.notes)
+
+
+def test_y_down_is_half_a_turn_from_y_up_and_comes_back():
+    below = Pinhole((1, 2, 3), (0, 0, 1), (0, -1, 0), 600, 640, 360)
+    text = cameras.write([Camera("a", below)], "opencv")
+    (camera,) = cameras.read(text, options=Options(axes="y_down", scale=2.0))
+    assert camera.pinhole.eye == (2, 6, -4) and camera.pinhole.up == (0, 0, 1)
+    (again,) = cameras.read(cameras.write([camera], "opencv", Options(axes="y_down", scale=2.0)), options=Options())
+    assert again.pinhole.eye == (1, 2, 3) and again.pinhole.up == (0, -1, 0)
+
+
+@pytest.mark.parametrize("tilt", [(0.2, -0.5, 1.0), (0.0, 1.0, 0.0), (0.3, 0.1, -1.0), (0.0, 0.0, -1.0)])
+def test_a_world_is_leveled_by_its_cameras_as_nerfstudio_does(tilt):
+    """Cameras around an axis, upright to it: the mean of their up is the axis but for its length."""
+    rotations = pytest.importorskip("scipy.spatial.transform")
+    turn, _ = rotations.Rotation.align_vectors([tilt], [(0, 0, 1)])
+    angles = np.linspace(0, 2 * np.pi, 8, endpoint=False)
+    eyes = np.stack([7 * np.cos(angles), 7 * np.sin(angles), np.full(8, 3.0)], axis=-1)
+    made = [
+        Camera(f"{i}", Pinhole(tuple(eye), tuple(turn.apply((0, 0, 1))), tilt, 600, 640, 360))
+        for i, eye in enumerate(turn.apply(eyes))
+    ]
+    found = cameras.read(cameras.write(made, "transforms"), options=Options(up_from="cameras"))
+    ups = np.mean([camera.pinhole.picture_axes()[1] for camera in found], axis=0)
+    assert ups / np.linalg.norm(ups) == pytest.approx((0, 0, 1), abs=1e-14)
+    assert [camera.pinhole.eye[2] for camera in found] == pytest.approx([3.0] * 8, abs=1e-13)
+    between = [np.linalg.norm(np.subtract(a.pinhole.eye, b.pinhole.eye)) for a, b in itertools.pairwise(found)]
+    assert between == pytest.approx(np.linalg.norm(np.diff(eyes, axis=0), axis=1), rel=1e-13), "no world is stretched"
+    degrees = np.degrees(np.arccos(tilt[2] / np.linalg.norm(tilt)))
+    assert all(any(f"turned by {degrees:.4g}°" in note for note in camera.notes) for camera in found)
+
+
+def test_cameras_whose_ups_cancel_out_level_nothing():
+    made = [Camera(f"{up}", Pinhole((7, 0, 0), (0, 0, 0), (0, 0, up), 600, 640, 360)) for up in (-1, 1)]
+    with pytest.raises(InputError, match="cancel out"):
+        cameras.read(cameras.write(made, "transforms"), options=Options(up_from="cameras"))

@@ -32,8 +32,24 @@ def test_what_is_not_modelled_is_named_with_its_share_and_fails_under_strict_alo
         "passed": True,
         "answer": "same_but",
         "sentence": answer.sentence,
-        "not_modelled": {"count": 2, "names": [HAIR, FOG], "share": 0.125, "shown": 0.1},
+        "not_modelled": {
+            "count": 2,
+            "names": [HAIR, FOG],
+            "share": 0.125,
+            "shown": 0.1,
+            "in_one_place": [],
+            "seen_otherwise": [],
+        },
     }
+
+
+def test_what_is_modelled_and_still_said_nothing_of_is_told_as_what_it_is():
+    found = NotModelled((HAIR, "Floor", "Carpet", "Lamp"), 0.25).sorted_by(("Floor", "Carpet", "Unseen"), ("Lamp",))
+    answer = answered(True, "The same picture", "over 9 pixels.", found)
+    assert answer.headline == (
+        "The same picture, but for 1 object that is not modelled and 2 objects with surfaces in one place "
+        "and 1 shadow that not all rays see (Hair, Floor, Carpet and 1 more; 25 % of the picture)"
+    )
 
 
 def test_what_differs_is_different_whatever_is_not_modelled():

@@ -59,7 +59,7 @@ def tracer():
 
 @pytest.fixture(scope="module")
 def coincident(tracer):
-    light, pairs = tracer.coincident_light("path", SAMPLES, 0, ROUNDINGS[-1])
+    light, pairs, _ = tracer.coincident_light("path", SAMPLES, 0, ROUNDINGS[-1])
     return CoincidentLight(Image(light), pairs)
 
 
@@ -113,7 +113,7 @@ def test_nothing_is_taken_out_where_the_pictures_are_the_same(reference):
 
 def test_nothing_is_taken_out_where_no_two_surfaces_are_in_one_place(honest):
     tracer = Tracer(a_scene(lift=-1e-3), 2)
-    light, pairs = tracer.coincident_light("path", SAMPLES, 0, ROUNDINGS[-1])
+    light, pairs, _ = tracer.coincident_light("path", SAMPLES, 0, ROUNDINGS[-1])
     assert not pairs and not light["Combined"][..., :3].any()
     reference = Image(tracer.render_light("path", 256, 0), CAMERA, {"samples": "256"})
     assert not radiance.compare(reference, honest, CAMERA, make_coincident=lambda: CoincidentLight(Image(light), pairs)).passed

@@ -4,7 +4,8 @@ blender [--enable-event-simulate] -p 0 0 1600 1000 --addons … --python engine_
 
 PART is `render`, with simulated events: picks the engine in the properties editor, looks into its panels, presses F12 and saves
 the result to OUT. Or it is `cancel`, without them, since Blender then hears no others: makes FILE heavy, presses F12, then
-Escape by xdotool, and writes the seconds until Blender says that the render was cancelled to OUT, for each of some times.
+Escape by xdotool, and writes the seconds until Blender says that the render was cancelled to OUT, for each of some times. Or it
+is `view`: turns the viewport in Rendered shading, and writes to OUT how many pictures a second there are.
 Leaves with status 0, or 5 and a traceback.
 """
 
@@ -18,11 +19,13 @@ import bpy
 from bpy.app.handlers import persistent
 
 sys.path.append(str(Path(__file__).parent))
+from mathutils import Euler
 from panel_in_a_window import ROW, move, region, start, window
 
 PART, FILE, OUT = sys.argv[sys.argv.index("--") + 1 :]
 TRACED_FOR = 2.0  # seconds that a heavy render goes on before it is cancelled
 CANCELLED = 6  # times
+TURNS = 20  # of the view
 
 told, ended = [], []
 
@@ -117,6 +120,41 @@ def cancel():
     Path(OUT).write_text(json.dumps(seconds))
 
 
+def view():
+    """Rendered shading: surfaces while the view turns, light once it rests, and no step of Blender's waits for it."""
+    bpy.context.scene.render.engine = "VIEWCAM"
+    area, part = region("VIEW_3D", "WINDOW")
+    space = area.spaces.active
+    space.region_3d.view_perspective = "CAMERA"
+    yield
+    space.shading.type = "RENDERED"
+    package = type(bpy.context.scene.virtual_pinhole_reference).__module__.removesuffix("render_settings")
+    pictures = sys.modules[f"{package}rendering.live_view"]
+    ends = time.monotonic() + 60
+    while not any(each.samples > 1 for each in pictures.LiveView._all) and time.monotonic() < ends:
+        yield
+    (live,) = pictures.LiveView._all
+    assert live.picture.shape[:2] == (part.height, part.width) and live.samples > 1
+    space.region_3d.view_perspective = "PERSP"
+    started, number, longest = time.monotonic(), live.number, 0.0
+    for _ in range(TURNS):
+        space.region_3d.view_rotation.rotate(Euler((0.0, 0.0, 0.02)))
+        area.tag_redraw()
+        before = live.number
+        while live.number == before and time.monotonic() < ends:
+            step = time.monotonic()
+            yield
+            longest = max(longest, time.monotonic() - step)
+    seconds = time.monotonic() - started
+    Path(OUT).write_text(json.dumps({"pictures": (live.number - number) / seconds, "longest": longest}))
+    while live.samples < 2 and time.monotonic() < ends:
+        yield
+    assert live.samples >= 2, "the light does not come back"
+    space.shading.type = "SOLID"
+    yield
+    yield
+
+
 def wait_for(end):
     while not ended:
         yield
@@ -130,7 +168,7 @@ def steps():
     bpy.app.handlers.render_complete.append(on_complete)
     bpy.app.handlers.render_cancel.append(on_cancel)
     yield
-    yield from {"render": render, "cancel": cancel}[PART]()
+    yield from {"render": render, "cancel": cancel, "view": view}[PART]()
 
 
 start(steps)

@@ -3,8 +3,8 @@
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python panel_in_a_window.py
 
 A timer takes one step at a time, so that Blender handles the events and draws in between. Buttons are found by moving the mouse
-over them and asking Blender which property it is on: no coordinate is assumed but that the buttons stand below the choice of
-what happens at the pole.
+over them and asking Blender which property it is on: no coordinate is assumed but that two buttons stand below the choice of
+what happens at the pole, and that of a warning above the first value.
 Leaves with status 0, or 5 and a traceback.
 """
 
@@ -20,7 +20,7 @@ KEYS = {"-": "MINUS", "0": "ZERO", "1": "ONE", "3": "THREE", "5": "FIVE", "7": "
 _found_at = {}  # where a button was: looked at first
 NOWHERE = (600, 500)  # a place in the 3D viewport
 ROW = 9  # pixels between two looks for a button, less than half its height
-BELOW = 27  # pixels from the middle of the choice at the pole to that of the first row of buttons, and to the next row
+BELOW = 18  # pixels from where the choice at the pole is found, which is below its middle, to the row of buttons
 
 
 def window():
@@ -110,7 +110,15 @@ def same(one, other):
     return one[0] == other[0] and np.array_equal(one[1], other[1]) and one[2] == other[2]
 
 
+def unfold(panel):
+    """Register a panel anew, open; under a name of its own, since Blender remembers by its name that one was closed."""
+    bpy.utils.unregister_class(panel)
+    panel.bl_options, panel.bl_idname = set(), f"{panel.__name__}_open"
+    bpy.utils.register_class(panel)
+
+
 def open_the_panels():
+    unfold(bpy.types.VIEWCAM_PT_sidebar_options)
     view, sidebar = region("VIEW_3D", "UI")
     view.spaces.active.show_region_ui = True
     window().view_layer.objects.active = camera()
@@ -240,12 +248,12 @@ def press_the_buttons():
         camera().location = (1, 2, 3)
         yield
         assert values().numbers() == stated and tuple(camera().location) == (1, 2, 3)
-        yield from click(sidebar.x + sidebar.width * 0.2, y - 3 * BELOW)
+        yield from click(sidebar.x + sidebar.width * 0.2, y - BELOW)
         assert values().numbers() == stated
         is_at_its_values()
         camera().location = (1, 2, 3)
         yield
-        yield from click(sidebar.x + sidebar.width * 0.65, y - 3 * BELOW)
+        yield from click(sidebar.x + sidebar.width * 0.65, y - BELOW)
         assert tuple(values().eye) == (1, 2, 3), f"after Adopt Camera the eye is {tuple(values().eye)}"
         is_at_its_values()
     camera().location = (2, 1, 4)
@@ -272,15 +280,17 @@ def take_the_view_of_the_viewport():
 
 
 def use_another_up():
-    """Close to up the panel offers another one, in a button below the warning. It leaves the picture as it is."""
+    """Close to up the panel offers another one, in a button below the warning at its top. It leaves the picture as it is."""
     stated = tuple(values().eye), tuple(values().look_at), tuple(values().up)
     values().look_at, values().up, values().eye = (0.3, 0.2, 0), (0.1, 0.2, 1), (0.8, 1.2, 5.0001)
-    _, y = yield from find("pole", -1)
+    yield
+    yield
+    _found_at.clear()  # the warning moves all of them
+    _, y = yield from find("eye", 0)
     before, doubtful = state(), tuple(values().up)
     _, sidebar = region("VIEW_3D", "UI")
-    # Below the rows of buttons; how many lines the warning takes is not known.
-    for below in range(4 * BELOW, 9 * BELOW, ROW):
-        yield from click(sidebar.x + sidebar.width * 0.5, y - below)
+    for above in range(2 * ROW, 4 * ROW, ROW // 2):
+        yield from click(sidebar.x + sidebar.width * 0.5, y + above)
         if tuple(values().up) != doubtful:
             break
     else:
@@ -288,6 +298,7 @@ def use_another_up():
     assert abs(np.dot(state()[1][:3, 2], values().up)) < 1e-6, f"up {tuple(values().up)} is not perpendicular to the view"
     assert np.abs(state()[1] - before[1]).max() < 1e-6, "the picture has turned"
     values().eye, values().look_at, values().up = stated
+    _found_at.clear()
     yield
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 import bpy
 
 sys.path.append(str(Path(__file__).parent))
-from panel_in_a_window import NOWHERE, click, move, press, region, start, window
+from panel_in_a_window import NOWHERE, click, move, press, region, start, unfold, window
 from tour_hands import SIDEBAR, look, photograph
 
 FILE, FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
@@ -91,18 +91,10 @@ def ended(comparison):
     assert comparison._process.status() is not None
 
 
-def unfold(panel):
-    """Register a panel anew, open; under a name of its own, since Blender remembers by its name that one was closed."""
-    bpy.utils.unregister_class(panel)
-    panel.bl_options, panel.bl_idname = set(), f"{panel.__name__}_open"
-    bpy.utils.register_class(panel)
-
-
 def open_the_panel():
-    """The file, the sidebar's tab, and the sub-panel unfolded from the start."""
+    """The file and the sidebar's tab; the sub-panel is open from the start."""
     bpy.ops.wm.open_mainfile(filepath=str(FILE), load_ui=False)
     yield
-    unfold(proof.VIEWCAM_PT_sidebar_proof)
     view, sidebar = region(*SIDEBAR)
     view.spaces.active.show_region_ui = True
     window().view_layer.objects.active = bpy.context.scene.camera

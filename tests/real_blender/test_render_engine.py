@@ -91,3 +91,8 @@ def test_escape_cancels_a_heavy_render_within_a_second(host, lit_file, tmp_path)
     # The median: without a graphics card, Blender itself takes seconds to draw a new window, and hears no key meanwhile.
     seconds = json.loads((tmp_path / "seconds").read_text())
     assert statistics.median(seconds) < 1.0, seconds
+
+
+def test_in_rendered_shading_the_viewport_turns_and_light_comes_when_it_rests(real_blender, lit_file, tmp_path):
+    in_a_window(real_blender, "view", lit_file, tmp_path / "figures", simulated=True)
+    assert json.loads((tmp_path / "figures").read_text())["pictures"] > 0

@@ -27,7 +27,7 @@ from .camera import CameraSync
 def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
     targets.forget_shapes(depsgraph)
-    for block in _evaluated_cameras(depsgraph):
+    for block in CameraSync.carry(_evaluated_cameras(depsgraph), scene, depsgraph):
         _at_frame(block, scene, depsgraph)
     resolution.on_frame_change(scene, depsgraph)
 

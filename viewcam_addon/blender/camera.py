@@ -34,7 +34,7 @@ from .. import intrinsics, rotation
 from .. import roll as rolls
 from ..camera_values import HOLD, CameraValues, without_border
 from ..errors import InputError
-from ..pinhole import Pinhole, Triple
+from ..pinhole import Pinhole, Triple, basis, make_views
 from . import causes, conversion, datablocks, findings, hold, pose, preferences, storage, targets
 from .conversion import read, takes_part
 
@@ -235,6 +235,79 @@ class CameraSync:
         if is_driven and not is_moved:
             self.at_frame(scene, depsgraph)
 
+    @classmethod
+    def carry(
+        cls, cameras: list[bpy.types.Object], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
+    ) -> list[bpy.types.Object]:
+        """Bring those cameras, in one pass, of which a frame has changed the values and nothing else.
+
+        cameras : enabled ones, originals, that Blender has evaluated. Returns those that are left to `at_frame`.
+        """
+        if depsgraph.mode == "RENDER":
+            return cameras
+        left, moved = [], []
+        try:
+            picture = without_border(datablocks.frame_of(scene))
+        except InputError:  # no picture at all
+            return cameras
+        for camera_object in cameras:
+            sync = cls.of(camera_object)
+            values = sync._animated(picture, depsgraph)
+            if values is None:
+                left.append(camera_object)
+            elif values is not sync._values:
+                moved.append((sync, values))
+        poses = np.array([[each.eye, each.look_at, each.up] for _, each in moved]).reshape(-1, 3, 3)
+        valid = make_views(*poses.swapaxes(0, 1))
+        left += [sync.camera_object for (sync, _), is_valid in zip(moved, valid, strict=True) if not is_valid]
+        moved = [each for each, is_valid in zip(moved, valid, strict=True) if is_valid]
+        if moved:
+            left += cls._bring(moved, np.stack(basis(*poses[valid].swapaxes(0, 1)), axis=-1), scene)
+        return left
+
+    @classmethod
+    def _bring(
+        cls, moved: list[tuple["CameraSync", CameraValues]], axes: Array, scene: bpy.types.Scene
+    ) -> list[bpy.types.Object]:
+        """Place cameras that nothing carries by their new values. axes : (n, 3, 3), u, v and w as columns.
+
+        Returns those that have no such lens.
+        """
+        left, cameras = [], [sync.camera_object for sync, _ in moved]
+        modes = [sync._state[0].mode for sync, _ in moved]
+        turns = pose.set_rotations(cameras, modes, list(map(rotation.numbers, axes, modes)), axes)
+        locations = np.array([values.eye for _, values in moved]).astype(np.float32).tolist()
+        for (sync, values), location, turn in zip(moved, locations, turns, strict=True):
+            camera_object, before = sync.camera_object, sync._values
+            camera_object.location = location
+            if storage.is_focused_on_look_at(camera_object):
+                conversion.store(camera_object.data.dof, focus_distance=math.dist(values.eye, values.look_at))
+            channels = sync._state[0]._replace(location=tuple(location), rotation=turn)
+            sync._state, sync._values = (channels, *sync._state[1:]), values
+            sync._rests, sync._is_moving, sync._placed = (), False, ()
+            if (values.distance, values.zoom) != (before.distance, before.zoom):
+                try:
+                    sync.resized(scene)
+                    sync._agree()
+                except InputError:
+                    left.append(camera_object)
+        return left
+
+    def _animated(self, picture: intrinsics.Frame, depsgraph: bpy.types.Depsgraph) -> CameraValues | None:
+        """The values at a frame that can have changed nothing else of the camera, and which no curve asks for in another way.
+
+        Nothing carries the camera, and it stands where its values were last seen to agree with it. None of any other.
+        """
+        camera_object, before = self.camera_object, self._values
+        if before is None or before.pole == HOLD or before.follows or not before.set_for == before.counted_in == picture:
+            return None
+        if not self.is_untouched(by_values=True) or not self._state[0].is_plain or storage.asked_of(camera_object):
+            return None
+        evaluated = camera_object.evaluated_get(depsgraph)
+        if not evaluated.is_evaluated or camera_object.data.type != "PERSP":
+            return None
+        return storage.animated(evaluated, before)
+
     def at_frame(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         """Blender has evaluated an enabled camera at another frame: what the values decide there places it, the rest follows.
 
@@ -268,8 +341,9 @@ class CameraSync:
             camera_object.update_tag(refresh={"OBJECT", "DATA", "TIME"})
             camera_object.data.update_tag(refresh={"TIME"})
         else:
-            targets.connect(camera_object)  # one that was removed from the file leaves its driver
-            targets.mirror(camera_object, evaluated)
+            if camera_object.animation_data.drivers:
+                targets.connect(camera_object)  # one that was removed from the file leaves its driver
+                targets.mirror(camera_object, evaluated)
             if is_asked or values is not stood:  # else Blender has stored them itself
                 self._store_changed(storage.load(camera_object), values)
                 storage.forget_asked(camera_object, datablocks.LOOKS.values())

@@ -29,7 +29,7 @@ def _no_perspective(camera_object: bpy.types.Object) -> InputError:
     return InputError(f"camera {camera_object.name!r} is {kind}, no pinhole: set its lens type to Perspective")
 
 
-_VALUES = "virtual_pinhole."
+_VALUES = "virtual_pinhole"
 # Properties that are another look at a value, which is what is kept → that value. They can be animated like any other.
 LENSES = {
     "focal_length": "MILLIMETERS",
@@ -43,7 +43,7 @@ LOOKS = dict.fromkeys(LENSES, "distance") | {"roll": "up"}
 def is_animated(camera_object: bpy.types.Object) -> bool:
     """True if a keyframe, an NLA strip or a driver changes one of the values of the Virtual Pinhole, or a target does."""
     curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
-    return any(curve.data_path.startswith(_VALUES) for curve in curves)
+    return any(curve.data_path.startswith(f"{_VALUES}.") for curve in curves)
 
 
 def animated_values(camera_object: bpy.types.Object) -> set[str]:
@@ -51,18 +51,17 @@ def animated_values(camera_object: bpy.types.Object) -> set[str]:
 
     A point that follows a target is one of them.
     """
-    curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
-    found = {(curve.data_path.removeprefix(_VALUES), curve.array_index) for curve in curves if _counts(curve)}
-    return {("eye", "look_at")[index] if name == "followed" else LOOKS.get(name, name) for name, index in found}
+    names = set()
+    for curve in (*versions.animation_curves(camera_object), *versions.drivers(camera_object)):
+        owner, _, name = curve.data_path.partition(".")
+        if owner == _VALUES and not versions.is_muted(curve):
+            names.add(("eye", "look_at")[curve.array_index] if name == "followed" else LOOKS.get(name, name))
+    return names
 
 
 def has_driven_values(camera_object: bpy.types.Object) -> bool:
     """True if a driver, such as that of a target, has a say in the values."""
-    return any(curve.data_path.startswith(_VALUES) for curve in versions.drivers(camera_object))
-
-
-def _counts(curve: bpy.types.FCurve) -> bool:
-    return curve.data_path.startswith(_VALUES) and not versions.is_muted(curve)
+    return any(curve.data_path.startswith(f"{_VALUES}.") for curve in versions.drivers(camera_object))
 
 
 # What is checked once is not checked again as a camera moves.

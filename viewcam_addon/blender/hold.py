@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from .. import roll as rolls
 from ..camera_values import HOLD, CameraValues
-from ..pinhole import Pinhole
+from ..pinhole import Pinhole, make_views
 from . import storage, versions
 from .targets import POINTS, target_of
 
@@ -118,8 +118,7 @@ def _poses(stated: Array, curves: list[bpy.types.FCurve], frames: Array) -> Arra
 
 def _without_gaps(frames: Array, poses: Array) -> tuple[Array, Array]:
     """Only the frames whose values make a camera: the roll is carried across the others."""
-    eye, look_at, up = _vectors(poses)
-    valid = np.isfinite(poses).all(-1) & (eye != look_at).any(-1) & up.any(-1)
+    valid = make_views(*_vectors(poses))
     return frames[valid], poses[valid]
 
 

@@ -11,6 +11,7 @@ of an edit's time and makes a tenth of difference, and Blender's float32 arithme
 from one processor to another).
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
 
 import bpy
@@ -61,15 +62,37 @@ def set_rotation(camera_object: bpy.types.Object, turn: Array, before: Sequence[
     before : the numbers of the frame before, to be as near to as the rotation allows.
     """
     channels = channels_of(camera_object)
-    name = _ROTATIONS.get(channels.mode, "rotation_euler")
-    wanted = channels.delta @ turn * channels.signs
-    errors: dict[tuple[float, ...], float] = {}
-    for candidate in rotation.neighbours(rotation.numbers(turn, channels.mode, before)):
-        setattr(camera_object, name, candidate)
-        errors[candidate] = rotation.largest_error(camera_object.matrix_basis, wanted)
-        if errors[candidate] <= _ROUNDING:
-            return
-    setattr(camera_object, name, min(errors, key=errors.__getitem__))
+    numbers = rotation.numbers(turn, channels.mode, before)
+    set_rotations([camera_object], [channels.mode], [numbers], (channels.delta @ turn * channels.signs)[None])
+
+
+def set_rotations(
+    cameras: Sequence[bpy.types.Object], modes: Sequence[str], numbers: Sequence[tuple[float, ...]], axes: Array
+) -> list[tuple[float, ...]]:
+    """Rotate n cameras, each by its numbers in its mode or those beside them that float32 makes the better matrix of.
+
+    axes : (n, 3, 3), the axes wanted, as columns. Returns the numbers that were set.
+    """
+    names = [_ROTATIONS.get(mode, "rotation_euler") for mode in modes]
+    waiting = list(map(rotation.neighbours, numbers))
+    best, least = list(numbers), [np.inf] * len(cameras)
+    left, at_once = list(range(len(cameras))), 1
+    while left:
+        tried = [(i, candidate) for i in left for candidate in itertools.islice(waiting[i], at_once)]
+        matrices = []
+        for i, candidate in tried:
+            setattr(cameras[i], names[i], candidate)
+            matrices.append(cameras[i].matrix_basis.copy())
+        errors = rotation.largest_error(float64(matrices), axes[[i for i, _ in tried]]) if tried else ()
+        for (i, candidate), error in zip(tried, errors, strict=True):
+            if error < least[i]:
+                best[i], least[i] = candidate, error
+        at_once, last = 2 * at_once, dict(tried)
+        for i in left:
+            if last.get(i) != best[i]:
+                setattr(cameras[i], names[i], best[i])
+        left = [i for i in left if least[i] > _ROUNDING and i in last]
+    return best
 
 
 def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Array:

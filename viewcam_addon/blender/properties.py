@@ -283,7 +283,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         soft_min=1.0,
         soft_max=100000.0,
         step=5000,
-        precision=3,
+        precision=2,
         update=_on_distance,
         override={"LIBRARY_OVERRIDABLE"},
     )

@@ -63,11 +63,7 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
     The evaluated object of any depsgraph may be given as well.
     """
     group = camera_object.virtual_pinhole
-    exact, shown = _parsed(group.exact, 10), (*group.eye, *group.look_at, *group.up, group.distance)
-    numbers = shown
-    if exact:
-        columns = zip(*exact, _shown_values(exact[0]), shown, strict=True)
-        numbers = tuple([full if value in (short, zeroed) else value for full, short, zeroed, value in columns])
+    numbers, is_exact = _numbers(group)
     follows = tuple(name for name in ("eye", "look_at") if getattr(group, f"{name}_target"))
     asked = asked_of(camera_object)
     when_set = _parsed(group.when_set, 9) if group.pole == HOLD else None  # nobody else asks
@@ -85,10 +81,33 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
         hold_within=group.hold_within,
         held_roll=group.held_roll,
         view_when_set=(when_set[0][0:3], when_set[0][3:6], when_set[0][6:9]) if when_set else None,
-        precision=2.0**-53 if exact and numbers == exact[0] and not follows else 2.0**-24,
+        precision=2.0**-53 if is_exact and not follows else 2.0**-24,
         follows=follows,
         asked=tuple(asked.items()),
     )
+
+
+def animated(camera_object: bpy.types.Object, before: CameraValues) -> CameraValues:
+    """The values of a camera of which curves alone can have changed any since they were loaded: `before` itself if none has.
+
+    before : values that follow no target. The evaluated object may be given as well.
+    """
+    group = camera_object.virtual_pinhole
+    numbers, is_exact = _numbers(group)
+    if numbers == (*before.eye, *before.look_at, *before.up, before.distance) and group.zoom == before.zoom:
+        return before
+    precision = 2.0**-53 if is_exact else 2.0**-24
+    return before.animated(numbers[0:3], numbers[3:6], numbers[6:9], numbers[9], group.zoom, precision)
+
+
+def _numbers(group: bpy.types.PropertyGroup) -> tuple[tuple[float, ...], bool]:
+    """Eye, look-at, up and distance, ten numbers, and whether all of them are known in float64."""
+    exact, shown = _parsed(group.exact, 10), (*group.eye, *group.look_at, *group.up, group.distance)
+    if not exact:
+        return shown, False
+    columns = zip(*exact, _shown_values(exact[0]), shown, strict=True)
+    numbers = tuple([full if value in (short, zeroed) else value for full, short, zeroed, value in columns])
+    return numbers, numbers == exact[0]
 
 
 def ask(camera_object: bpy.types.Object, look: str, number: float) -> None:
@@ -212,7 +231,7 @@ def _as_shown(vector: tuple[float, ...]) -> tuple[float, ...]:
     return tuple([number if abs(number) > step else 0.0 for number in vector])
 
 
-@functools.lru_cache(maxsize=256)
+@functools.lru_cache(maxsize=4096)
 def _shown_values(numbers: tuple[float, ...]) -> tuple[float, ...]:
     """The numbers that the properties hold where the ten numbers of `exact` are stored."""
     shown = [*_as_shown(numbers[0:3]), *_as_shown(numbers[3:6]), *_as_shown(numbers[6:9]), numbers[9]]
@@ -220,7 +239,7 @@ def _shown_values(numbers: tuple[float, ...]) -> tuple[float, ...]:
         return tuple(np.array(shown, dtype=np.float32).tolist())
 
 
-@functools.lru_cache(maxsize=256)
+@functools.lru_cache(maxsize=4096)
 def _parsed(text: str, count: int) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
     """So many finite numbers from JSON, and what float32 makes of them; None if it holds anything else."""
     with contextlib.suppress(ValueError, RecursionError), np.errstate(over="ignore"):  # InputError is a ValueError

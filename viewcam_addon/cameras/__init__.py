@@ -24,6 +24,7 @@ A format is a module in `FORMATS` with
     READER                          of what only writes: the module that reads it
     notes_in(source) → texts        where a file that it wrote has this project's notes, if that is not its text
     read_again(cameras, options) → list[Camera]     where it takes its time: what `read` makes of what `write` gives
+    LENSES                          of what writes a camera's lens, too, and refuses itself what it can't say
     in_world(source, options) → Options             where a file says its own axes and unit: the options with these
 
 **To the bit.** A matrix or an angle holds fewer digits than the values of which it was made. So a writer puts these beside
@@ -89,8 +90,8 @@ from . import (
     usd,
     vtk,
 )
-from .axes import moved, moved_back
-from .camera import ANGLES, AXES, PIXELS, POSES, Camera, LeftOut, NoPinholeError, Options, choose
+from .axes import leveled, moved, moved_back
+from .camera import ANGLES, AXES, PIXELS, POSES, UPS, Camera, LeftOut, NoPinholeError, Options, choose
 from .source import Source
 
 __all__ = [
@@ -99,6 +100,7 @@ __all__ = [
     "FORMATS",
     "PIXELS",
     "POSES",
+    "UPS",
     "Camera",
     "Options",
     "choose",
@@ -178,18 +180,24 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
     with _told_of_damage(source, module.TITLE), np.errstate(all="ignore"):  # anything may stand in a file
         if format and not _recognises(module, source):
             raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
-        if source.is_folder and _in_folder(source, module):
-            return _each_of_folder(source, module, options)
-        parts = own.parts(source.text) if getattr(module, "SEVERAL", "") == "a text" else []
-        if not parts:
-            return _read(source, module, options)
-        sources = [source] if len(parts) == 1 else [Source(text) for _, text in parts]
-        cameras = []
-        for (name, _), part in zip(parts, sources, strict=True):
-            if not module.recognises(part):
-                raise InputError(f"{source.name} names the camera {checks.shown(name)} and has no such camera: export it again")
-            cameras += [replace(camera, name=name) for camera in _read(part, module, options)]
-        return cameras
+        found = _of_all(source, module, options)
+        return leveled(found) if options.up_from == "cameras" else found
+
+
+def _of_all(source: Source, module: ModuleType, options: Options) -> list[Camera]:
+    """The cameras of a text, a file or a folder."""
+    if source.is_folder and _in_folder(source, module):
+        return _each_of_folder(source, module, options)
+    parts = own.parts(source.text) if getattr(module, "SEVERAL", "") == "a text" else []
+    if not parts:
+        return _read(source, module, options)
+    sources = [source] if len(parts) == 1 else [Source(text) for _, text in parts]
+    cameras = []
+    for (name, _), part in zip(parts, sources, strict=True):
+        if not module.recognises(part):
+            raise InputError(f"{source.name} names the camera {checks.shown(name)} and has no such camera: export it again")
+        cameras += [replace(camera, name=name) for camera in _read(part, module, options)]
+    return cameras
 
 
 def _recognises(module: ModuleType, source: Source) -> bool:
@@ -290,9 +298,10 @@ def write(cameras: Iterable[Camera], format: str, options: Options | None = None
     cameras = [moved_back(camera, options) for camera in cameras]
     if not cameras:
         raise InputError("there is no camera to write: give one at least")
-    for camera in cameras:
-        distortion.refuse(camera.lens, camera.pinhole.plane, camera.name, _module(format, "write").TITLE)
-    written: str | dict[str, str | bytes] = _module(format, "write").write(cameras, options)
+    module = _module(format, "write")
+    for camera in () if hasattr(module, "LENSES") else cameras:
+        distortion.refuse(camera.lens, camera.pinhole.plane, camera.name, module.TITLE)
+    written: str | dict[str, str | bytes] = module.write(cameras, options)
     return written
 
 

@@ -17,7 +17,7 @@ every machine. Rejected: `@` of NumPy and Python's `sum`, whose order or precisi
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +30,13 @@ from .camera import Camera, Options
 Rows = list[list[float]]
 Quaternion = tuple[float, float, float, float]
 
+# By Options.axes: the turn of a point out of a file, and back into it.
+_TURNS: dict[str, tuple[Callable[[Triple], Triple] | None, Callable[[Triple], Triple] | None]] = {
+    "as_is": (None, None),
+    "y_up": (lambda p: (p[0], -p[2], p[1]), lambda p: (p[0], p[2], -p[1])),
+    "y_down": (lambda p: (p[0], p[2], -p[1]), lambda p: (p[0], -p[2], p[1])),
+}
+_NO_MEAN = 1e-6  # of the length of a mean of unit vectors
 # Of a rotation in a file, whose numbers have so many digits: what is worth a note, and what is none any more.
 _NOTED, _NO_ROTATION, _NO_QUATERNION = 1e-5, 2e-3, 1e-2
 _SCALED = 1e-3
@@ -281,19 +288,40 @@ def quaternion(rotation: Sequence[Sequence[float]]) -> Quaternion:
 
 def moved(camera: Camera, options: Options) -> Camera:
     """A camera out of a file, in the world that `options` asks for."""
-    return _in_world(camera, options.axes == "y_up", options.scale, lambda p: (p[0], -p[2], p[1]))
+    return _in_world(camera, _TURNS[options.axes][0], options.scale)
 
 
 def moved_back(camera: Camera, options: Options) -> Camera:
     """A camera on its way into a file: the inverse of `moved`."""
-    return _in_world(camera, options.axes == "y_up", 1 / options.scale, lambda p: (p[0], p[2], -p[1]))
+    return _in_world(camera, _TURNS[options.axes][1], 1 / options.scale)
 
 
-def _in_world(camera: Camera, turned: bool, scale: float, turn) -> Camera:
-    if not turned and scale == 1:
+def leveled(cameras: Sequence[Camera]) -> list[Camera]:
+    """The cameras in a world that is turned by the least angle after which the mean of their up, v, is z; each says so.
+
+    Raises
+    ------
+    InputError
+        if there is no such mean, as of cameras that stand upright and upside down.
+    """
+    up = np.mean([camera.pinhole.picture_axes()[1] for camera in cameras], axis=0)
+    length = math.hypot(*up)
+    if length < _NO_MEAN:
+        raise InputError("the cameras' up directions cancel out: none is the world's, leave out --up-from")
+    x, y, z = (up / length).tolist()
+    rows = np.diag([1.0, -1.0, -1.0])  # of the world that is upside down
+    if z > 0 or (x, y) != (0, 0):  # about up × z, by the angle between them: 1 + K + K² / (1 + cos)
+        cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
+        rows = np.identity(3) + cross + cross @ cross * (1 / (1 + z) if z > 0 else (1 - z) / (x * x + y * y))
+    told = f"The world was turned by {math.degrees(math.atan2(math.hypot(x, y), z)):.4g}°: the mean of the cameras' up is z"
+    return [_in_world(camera, lambda p: tuple((rows @ p).tolist()), 1.0).noted(told) for camera in cameras]
+
+
+def _in_world(camera: Camera, turn: Callable[[Triple], Triple] | None, scale: float) -> Camera:
+    if turn is None and scale == 1:
         return camera
     pinhole = camera.pinhole
-    e, l, up = ((turn(p) if turned else p) for p in (pinhole.eye, pinhole.look_at, pinhole.up))
+    e, l, up = ((turn(p) if turn else p) for p in (pinhole.eye, pinhole.look_at, pinhole.up))
     e, l = (tuple(scale * a + 0.0 for a in p) for p in (e, l))
     return dataclasses.replace(camera, pinhole=dataclasses.replace(pinhole, eye=e, look_at=l, up=tuple(a + 0.0 for a in up)))
 

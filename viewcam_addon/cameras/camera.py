@@ -13,6 +13,7 @@ from .distortion import Lens
 AXES = {
     "as_is": "As they are: the numbers stay those of the file",
     "y_up": "Y up in the file, Z up here: (x, y, z) there is (x, −z, y) here",
+    "y_down": "Y down in the file, as COLMAP's worlds often have it, Z up here: (x, y, z) there is (x, z, −y) here",
 }
 PIXELS = {
     "corner": "(0, 0) is the picture's corner and the first pixel's centre is (0.5, 0.5)",
@@ -24,6 +25,7 @@ POSES = {
     "w2c_opengl": "World to camera, x right, y up, z back: OpenGL, Blender",
     "c2w_opengl": "Camera to world, x right, y up, z back: OpenGL, Blender, NeRF",
 }
+UPS = {"cameras": "The mean of the cameras' up is Z here: all are turned by the least angle that makes it so"}
 ANGLES = {"degrees": "Degrees", "radians": "Radians"}
 _NAMED = 8
 
@@ -66,7 +68,8 @@ class Options:
     which way a matrix goes. without_distortion : take a camera without its lens. unmirrored : take a camera that mirrors its
     picture without that. original_world : undo the turn and scale that a file says were applied to its world. size_fits :
     whether the size is that of whatever scene is open, whose shape gives way to that of a text's camera, and not the
-    picture's own.
+    picture's own. up_from : one of UPS, by what the world is turned upright, once axes and scale are applied; None to leave
+    it so.
 
     Raises
     ------
@@ -87,10 +90,11 @@ class Options:
     unmirrored: bool = False
     original_world: bool = False
     size_fits: bool = False
+    up_from: str | None = None
 
     def __post_init__(self) -> None:
         _choice("axes", self.axes, AXES)
-        for name, among in (("angle_unit", ANGLES), ("pixel", PIXELS), ("pose", POSES)):
+        for name, among in (("angle_unit", ANGLES), ("pixel", PIXELS), ("pose", POSES), ("up_from", UPS)):
             if getattr(self, name) is not None:
                 _choice(name, getattr(self, name), among)
         for name in ("scale", "pixel_aspect"):

@@ -2,7 +2,8 @@
 known: labels/colmap.py knows some.
 
 **Cameras.** One for each set of intrinsics that the pictures have: SIMPLE_PINHOLE (f, cx, cy) where pixels are square, else
-PINHOLE (fx, fy, cx, cy). The upper left corner of the picture is (0, 0), its first pixel's centre (0.5, 0.5).
+PINHOLE (fx, fy, cx, cy); with a lens OPENCV or the first model that has its terms. The upper left corner of the picture is
+(0, 0), its first pixel's centre (0.5, 0.5).
 
 **Images.** In text two lines each, the second one a list of image points, empty where there are none. The pose takes world
 space to the camera's x right, y down, z into the view, as a unit quaternion (w first, Hamilton's) and a translation. All
@@ -35,6 +36,7 @@ from .source import Source, flat, pixels
 
 TITLE = "COLMAP model (cameras, images)"
 SUFFIX = ""
+LENSES = True
 
 MODELS: dict[str, tuple[int, tuple[str, ...]]] = {
     "SIMPLE_PINHOLE": (0, ("f", "cx", "cy")),
@@ -339,7 +341,7 @@ def texts(cameras: Iterable[Camera], tracks: Tracks | None = None) -> dict[str, 
     places, points = _points(tracks, len(cameras))
     images = []
     for number, (camera, line) in enumerate(zip(cameras, places, strict=True), start=1):
-        intrinsic = numbers.setdefault(_camera(camera.pinhole), len(numbers) + 1)
+        intrinsic = numbers.setdefault(_camera(camera), len(numbers) + 1)
         images.append(f"{number} {_spaced(*pose_of(camera.pinhole))} {intrinsic} {naming.image_of(camera)}\n{line}\n")
     return {
         "images.txt": "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# POINTS2D[] as X Y POINT3D_ID\n"
@@ -395,15 +397,43 @@ def comments(cameras: Iterable[Camera]) -> str:
     return "".join(f"# {own.comment(camera.pinhole)}\n" for camera in cameras)
 
 
-def intrinsics_of(pinhole: Pinhole) -> _Intrinsics:
-    """The entry of cameras.txt about a camera."""
+def intrinsics_of(pinhole: Pinhole, lens: distortion.Lens | None = None) -> _Intrinsics:
+    """The entry of cameras.txt about a camera.
+
+    Raises
+    ------
+    InputError
+        if its lens is none of COLMAP's.
+    """
     (f_x, _, c_x), (_, f_y, c_y), _ = intrinsics(pinhole)
+    if lens is not None:
+        model, bent = _model_of(lens)
+        return _Intrinsics(model, pinhole.width, pinhole.height, (f_x, f_y, c_x, c_y, *bent))
     model, focal = ("SIMPLE_PINHOLE", (f_x,)) if f_x == f_y else ("PINHOLE", (f_x, f_y))
     return _Intrinsics(model, pinhole.width, pinhole.height, (*focal, c_x, c_y))
 
 
-def _camera(pinhole: Pinhole) -> str:
-    model, width, height, parameters = intrinsics_of(pinhole)
+def _model_of(lens: distortion.Lens) -> tuple[str, tuple[float, ...]]:
+    """The first of COLMAP's models that is this lens, and its coefficients in their order."""
+    k1, k2, k3, k4, *higher = (*lens.radial, *[0.0] * 6)[:6]
+    (p1, p2), (s1, s2, s3, s4) = lens.tangential, lens.prism
+    coefficients = {
+        "OPENCV": (k1, k2, p1, p2),
+        "FULL_OPENCV": (k1, k2, p1, p2, k3, *(*lens.divisor, *[0.0] * 3)[:3]),
+        "OPENCV_FISHEYE": (k1, k2, k3, k4),
+        "THIN_PRISM_FISHEYE": (k1, k2, p1, p2, k3, k4, s1, s3),
+        "RAD_TAN_THIN_PRISM_FISHEYE": (k1, k2, k3, k4, *higher, p2, p1, s1, s2, s3, s4),
+        lens.projection.upper(): lens.parameters,
+    }
+    for model, numbers in coefficients.items():
+        names = [name for name in MODELS.get(model, (0, ()))[1] if name not in _STRAIGHT]
+        if len(names) == len(numbers) and _lens(model, dict(zip(names, numbers, strict=True))) == lens:
+            return model, numbers
+    raise InputError("COLMAP has no model of this lens: undistort the pictures, or choose to take it without distortion")
+
+
+def _camera(camera: Camera) -> str:
+    model, width, height, parameters = intrinsics_of(camera.pinhole, camera.lens)
     return f"{model} {width} {height} {_spaced(*parameters)}"
 
 

@@ -9,6 +9,7 @@ from .colmap import MODELS, NOTES, check_names, comments, intrinsics_of, pose_of
 
 TITLE = "COLMAP model, binary"
 SUFFIX = ""
+LENSES = True
 
 
 def write(cameras: Sequence[Camera], options: Options) -> dict[str, str | bytes]:
@@ -29,5 +30,5 @@ def write(cameras: Sequence[Camera], options: Options) -> dict[str, str | bytes]
 
 
 def _intrinsics(camera: Camera) -> bytes:
-    model, width, height, parameters = intrinsics_of(camera.pinhole)
+    model, width, height, parameters = intrinsics_of(camera.pinhole, camera.lens)
     return struct.pack(f"<iQQ{len(parameters)}d", MODELS[model][0], width, height, *parameters)

@@ -47,6 +47,13 @@ class Lens:
     skew: float = 0.0
     radial_first: bool = False
 
+    def __post_init__(self) -> None:
+        for name in ("radial", "divisor"):  # lenses that do the same are the same
+            terms = getattr(self, name)
+            while terms and not terms[-1]:
+                terms = terms[:-1]
+            object.__setattr__(self, name, tuple(terms))
+
     def distort(self, points: ArrayLike) -> np.ndarray:
         """The places in the photograph of a pinhole's points, (..., 2) → (..., 2); NaN where the model has none."""
         with np.errstate(all="ignore"):

@@ -37,6 +37,7 @@ from .source import Record, Source, image_size
 
 TITLE = "transforms.json (NeRF, instant-ngp, nerfstudio)"
 SUFFIX = ".json"
+LENSES = True
 FILE = "transforms.json"
 AABB_SCALES = tuple(2**exponent for exponent in range(8))
 
@@ -88,7 +89,7 @@ def document(cameras: Iterable[Camera], aabb_scale: int | None = None) -> dict[s
     cameras = naming.checked(cameras, FILE)
     if aabb_scale is not None and checks.whole("aabb_scale", aabb_scale) not in AABB_SCALES:
         raise InputError(f"aabb_scale is {aabb_scale}: give a power of two from 1 to {AABB_SCALES[-1]}")
-    pictures = [_picture(camera.pinhole) for camera in cameras]
+    pictures = [_picture(camera.pinhole) | _said_of(camera) for camera in cameras]
     shared = all(picture == pictures[0] for picture in pictures)
     return {
         **(pictures[0] if shared else {}),
@@ -103,6 +104,22 @@ def document(cameras: Iterable[Camera], aabb_scale: int | None = None) -> dict[s
             for camera, picture in zip(cameras, pictures, strict=True)
         ],
     }
+
+
+def _said_of(camera: Camera) -> dict[str, Any]:
+    """The camera's lens, as nerfstudio has it."""
+    lens = camera.lens
+    if lens is None:
+        return {}
+    numbers = dict(zip(("k1", "k2", "k3", "k4"), (*lens.radial, *[0.0] * 4), strict=False))
+    tangential = dict(zip(("p1", "p2"), lens.tangential, strict=True))
+    if lens == distortion.fisheye(numbers):
+        return {"camera_model": "OPENCV_FISHEYE", **numbers}
+    if lens == distortion.opencv(numbers | tangential | {"r8": numbers["k4"], "k4": 0.0}):
+        return {"camera_model": "OPENCV", **numbers, **tangential}
+    raise InputError(
+        f"{FILE} has no model of the lens of {camera.name}: undistort the pictures, or choose to take it without distortion"
+    )
 
 
 def _picture(pinhole: Pinhole) -> dict[str, float]:

@@ -13,8 +13,10 @@ import dataclasses
 import importlib
 import importlib.util
 import io
+import math
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -74,22 +76,49 @@ def undistorted(lens: Lens, plane: ViewPlane, blank: float = 0.0) -> ViewPlane:
     return ViewPlane(plane.distance, (c_x * new_width / width, new_height - new_c_y), new_width, new_height)
 
 
-def places(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> Iterator[tuple[slice, np.ndarray]]:
-    """Rows of the undistorted picture, and where in the photograph each of their pixels' centers is seen.
+@lru_cache(maxsize=1)
+def places(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> np.ndarray:
+    """Where in the photograph the centers of the undistorted picture's pixels are seen.
 
-    plane : of the photograph. cut : of the picture. Places are (rows, columns, 2), from the corner, y down; NaN where the lens
-    shows none.
+    plane : of the photograph. cut : of the picture. (rows, columns, 2), from the corner, y down; NaN where the lens shows none.
     """
+    middle = np.array([plane.principal_point[0], plane.height - plane.principal_point[1]])
     columns = (np.arange(cut.width) + 0.5 - cut.principal_point[0]) / cut.distance[0]
-    center = cut.height - cut.principal_point[1]
+    down = (np.arange(cut.height) + 0.5 - (cut.height - cut.principal_point[1])) / cut.distance[1]
+    found = np.empty((cut.height, cut.width, 2))
+    for rows in _bands(cut):
+        points = np.stack(np.meshgrid(columns, down[rows]), axis=-1)
+        found[rows] = lens.distort(points) * plane.distance + middle
+        found[rows][lens.folds(points)] = np.nan
+    return found
+
+
+def _bands(cut: ViewPlane) -> list[slice]:
     step = max(1, _BAND // cut.width)
-    for start in range(0, cut.height, step):
-        rows = slice(start, min(start + step, cut.height))
-        down = (np.arange(rows.start, rows.stop) + 0.5 - center) / cut.distance[1]
-        points = np.stack(np.meshgrid(columns, down), axis=-1)
-        found = lens.distort(points)
-        found[lens.folds(points)] = np.nan
-        yield rows, found * plane.distance + [plane.principal_point[0], plane.height - plane.principal_point[1]]
+    return [slice(start, min(start + step, cut.height)) for start in range(0, cut.height, step)]
+
+
+def of_screen(photograph: np.ndarray, lens: Lens, plane: ViewPlane, widest: int) -> np.ndarray:
+    """The photograph as its pinhole shows it: the same focal length, axis and sides, but no more pixels than a screen has.
+
+    photograph : rows from the top, of floats. plane : its own. widest : pixels along the longer side, at most.
+    """
+    times = math.ceil(max(plane.width, plane.height) / widest)
+    width, height = plane.width // times, plane.height // times
+    blocks = photograph[: height * times, : width * times].reshape(height, times, width, times, -1)
+    small = _smaller(plane, plane.width / times, plane.height / times, width, height)
+    # Of widths, the one whose height is nearest to a whole number: a picture is shown by its aspect.
+    aspect = plane.height / plane.width
+    cut_width = min(range(width, max(1, width * 3 // 4), -1), key=lambda across: abs(across * aspect - round(across * aspect)))
+    cut_height = max(1, round(cut_width * aspect))
+    return resampled(blocks.mean(axis=(1, 3)), lens, small, _smaller(plane, cut_width, cut_height, cut_width, cut_height))
+
+
+def _smaller(plane: ViewPlane, across: float, down: float, width: int, height: int) -> ViewPlane:
+    """The view plane whose picture has `across` × `down` pixels where this one has all of its own, cut to a size."""
+    (d_x, d_y), (c_x, c_y) = plane.distance, plane.principal_point
+    x, y = across / plane.width, down / plane.height
+    return ViewPlane((d_x * x, d_y * y), (c_x * x, height - (plane.height - c_y) * y), width, height)
 
 
 def resampled(photograph: np.ndarray, lens: Lens, plane: ViewPlane, cut: ViewPlane, nearest: bool = False) -> np.ndarray:
@@ -100,8 +129,9 @@ def resampled(photograph: np.ndarray, lens: Lens, plane: ViewPlane, cut: ViewPla
     """
     picture = np.zeros((cut.height, cut.width, *photograph.shape[2:]), photograph.dtype)
     limits = np.array(photograph.shape[1::-1])
-    for rows, at in places(lens, plane, cut):
-        at = at if nearest else at - 0.5
+    found = places(lens, plane, cut)
+    for rows in _bands(cut):
+        at = found[rows] if nearest else found[rows] - 0.5
         with np.errstate(invalid="ignore"):
             seen = ((at >= 0) & (at < limits if nearest else at <= limits - 1)).all(axis=-1)
         x, y = at[seen].T

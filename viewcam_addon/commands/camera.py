@@ -1,4 +1,4 @@
-"""`viewcam camera`: cameras of any program, listed or written for another.
+"""`viewcam camera`: cameras of any program, a .blend among them, listed or written for another.
 
 A file, a folder or, as "-", what stands on standard input; see cameras/.
 """
@@ -13,18 +13,21 @@ from .. import cameras
 from ..cameras import Camera, Options, undistortion
 from ..cameras.sidecar import record
 from ..errors import InputError
+from ..jobs import makers
 from ..pinhole import ViewPlane
 from ..terminal import say, silent_libraries
-from . import Result
+from . import Result, blender_room
 
 _MOST_CHARACTERS = 100_000_000
 
 
 def add_options(added: argparse.ArgumentParser) -> None:
     """Add the command's options to its parser, which has those of every command already."""
-    added.add_argument("file", metavar="FILE", help="a file or folder with cameras; - for standard input")
+    added.add_argument("file", metavar="FILE", help="a file or folder with cameras, a .blend too; - for standard input")
     added.add_argument("--list", action="store_true", help="a line for each camera, and what is to be said of them")
     added.add_argument("--camera", metavar="NAME", help="only this one of them")
+    added.add_argument("--frames", metavar="A..B", help="of a .blend: its camera at each frame (from -5 on: --frames=-5..3)")
+    added.add_argument("--trust", action="store_true", help="of a .blend: let what is in it run and write")
     added.add_argument("--from", dest="format", choices=cameras.readable(), help="the format (default: by its content)")
     added.add_argument("--to", choices=cameras.writable(), help="write them in this format")
     added.add_argument("--out", metavar="FILE", type=types.path, help="where to; a folder for some formats (default: printed)")
@@ -41,7 +44,10 @@ def add_reading_options(added: argparse._ActionsContainer, size: bool = True) ->
     """Add the options that say how cameras are read. size : whether --size is one of them, and not there already."""
     if size:
         added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
-    added.add_argument("--axes", choices=[*cameras.AXES], default="as_is", help="y_up: y points up in the file and z here")
+    added.add_argument(
+        "--axes", choices=[*cameras.AXES], default="as_is", help="y_up, y_down: where y points in the file, and z up here"
+    )
+    added.add_argument("--up-from", choices=[*cameras.UPS], help="turn the world so that the mean of the cameras' up is z")
     added.add_argument("--scale", type=types.above_zero, metavar="S", default=1.0, help="1 unit of the file is S units here")
     added.add_argument("--distance", type=types.above_zero, metavar="D", help="view-plane distance in pixels, for poses alone")
     added.add_argument(
@@ -80,6 +86,7 @@ def options_of(options: argparse.Namespace) -> Options:
         without_distortion=options.without_distortion,
         unmirrored=options.unmirrored,
         original_world=options.original_world,
+        up_from=options.up_from,
     )
 
 
@@ -90,11 +97,8 @@ def run(options: argparse.Namespace) -> Result:
         return _undistort(options)
     if options.out and not options.to:
         raise InputError("--out says where to, but not in which format: give --to")
-    given = sys.stdin.read(_MOST_CHARACTERS) if options.file == "-" else Path(options.file)
-    with silent_libraries():  # USD tells of all that a stage lacks
-        found = cameras.read(given, format=options.format, options=options_of(options))
-    if options.camera is not None:
-        found = [cameras.choose(found, options.camera)]
+    with silent_libraries():  # Blender tells what it opens, USD all that a stage lacks
+        found = _found(options)
     notes = list(dict.fromkeys(note for camera in found for note in camera.notes))
     for note in notes:
         options.events.tell("note", command=options.command, text=note)
@@ -115,11 +119,26 @@ def run(options: argparse.Namespace) -> Result:
     return 0, result | {"written": [str(path) for path in written]}
 
 
+def _found(options: argparse.Namespace) -> list[Camera]:
+    if options.file.lower().endswith(".blend"):
+        room = blender_room("dataset_cameras")
+        if options.frames is not None:
+            shots = [(job.name, job.frame) for job in makers.frames(options.frames)]
+            return room.of_file(Path(options.file), shots, options.camera, options.trust)
+        found = room.of_file(Path(options.file), trust=options.trust)
+    elif options.frames is not None:
+        raise InputError(f"--frames are those of a .blend, and {options.file} is none: leave them out")
+    else:
+        given = sys.stdin.read(_MOST_CHARACTERS) if options.file == "-" else Path(options.file)
+        found = cameras.read(given, format=options.format, options=options_of(options))
+    return found if options.camera is None else [cameras.choose(found, options.camera)]
+
+
 def _undistort(options: argparse.Namespace) -> Result:
     dataset = Path(options.file)
     if options.file == "-" or options.list or options.out or options.camera is not None:
         raise InputError("--undistort writes all of a data set into its folder: give the data set, and leave the others out")
-    if options.axes != "as_is" or options.scale != 1 or options.original_world:
+    if options.axes != "as_is" or options.scale != 1 or options.original_world or options.up_from:
         raise InputError("--undistort leaves the world as it is, for its points' sake: turn and scale what it has written")
     found = cameras.read(dataset, format=options.format, options=options_of(options))
     form = options.to or ("transforms" if cameras.recognised(dataset) == "transforms" else "colmap")

@@ -7,7 +7,7 @@ everything is another than the one with stand-ins, because it hides them, lights
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -23,19 +23,34 @@ _MOST_NAMED = 3
 
 @dataclass(frozen=True)
 class NotModelled:
-    """The part of a picture that is not modelled.
+    """The part of a picture that the answer says nothing of.
 
-    names : of the objects, those that the ledger has as approximated or skipped and that are in the picture, or may be.
-    share : of the pixels, 0 to 1: those that show them or differ by them; None where that was not measured. shown : those that
-    show them alone.
+    names : of the objects, those that the ledger has as approximated or skipped and that are in the picture, or may be, and
+    those whose light is a renderer's choice. share : of the pixels, 0 to 1: those that show them or differ by them; None where
+    that was not measured. shown : those that show them alone. in_one_place : of the names those of surfaces in one place.
+    seen_otherwise : those whose shadows not all kinds of rays see.
     """
 
     names: tuple[str, ...] = ()
     share: float | None = 0.0
     shown: float = 0.0
+    in_one_place: tuple[str, ...] = ()
+    seen_otherwise: tuple[str, ...] = ()
+
+    def sorted_by(self, in_one_place: Sequence[str], seen_otherwise: Sequence[str]) -> "NotModelled":
+        """The same, with which of its objects are modelled."""
+        one_place, otherwise = (tuple(name for name in self.names if name in some) for some in (in_one_place, seen_otherwise))
+        return replace(self, in_one_place=one_place, seen_otherwise=otherwise)
 
     def to_json(self) -> dict[str, Any]:
-        return {"count": len(self.names), "names": list(self.names), "share": self.share, "shown": self.shown}
+        return {
+            "count": len(self.names),
+            "names": list(self.names),
+            "share": self.share,
+            "shown": self.shown,
+            "in_one_place": list(self.in_one_place),
+            "seen_otherwise": list(self.seen_otherwise),
+        }
 
 
 @dataclass(frozen=True)
@@ -94,7 +109,7 @@ def answered(same: bool, headline: str, text: str, not_modelled: NotModelled) ->
         return Answer(DIFFERENT, headline, text, not_modelled)
     if not not_modelled.names:
         return Answer(SAME, headline, text, not_modelled)
-    return Answer(SAME_BUT, f"{headline}, {but_for(not_modelled.names)} ({_named(not_modelled)})", text, not_modelled)
+    return Answer(SAME_BUT, f"{headline}, {but_for(not_modelled.to_json())} ({_named(not_modelled)})", text, not_modelled)
 
 
 def in_the_picture(
@@ -119,10 +134,25 @@ def in_the_picture(
     return NotModelled((*seen, *unseen), float(np.mean(changed | pixels)), share)
 
 
-def but_for(names: Sequence[str]) -> str:
-    """but for 2 objects that are not modelled"""
-    which = "1 object that is" if len(names) == 1 else f"{len(names):,} objects that are"
-    return f"but for {which} not modelled"
+def but_for(not_modelled: Mapping[str, Any]) -> str:
+    """but for 2 objects that are not modelled and 1 shadow that not all rays see
+
+    not_modelled : as of NotModelled.to_json.
+    """
+    one_place, otherwise = (not_modelled.get(key, ()) for key in ("in_one_place", "seen_otherwise"))
+    modelled = {*one_place, *otherwise}
+    kinds = [
+        (
+            [name for name in not_modelled["names"] if name not in modelled],
+            "object that is not",
+            "objects that are not",
+            " modelled",
+        ),
+        (one_place, "object", "objects", " with surfaces in one place"),
+        (otherwise, "shadow", "shadows", " that not all rays see"),
+    ]
+    parts = [f"{len(names):,} {one if len(names) == 1 else several}{rest}" for names, one, several, rest in kinds if names]
+    return f"but for {' and '.join(parts)}"
 
 
 def percent_of(share: float) -> str:

@@ -1,11 +1,18 @@
-"""Light that depends on surfaces in one place: what of a picture is taken out of the comparison for it.
+"""Light that is a renderer's choice: what of a picture is taken out of the comparison for it.
 
 Which of several surfaces in one place a ray of Cycles meets, and whether one of them shadows the other, is what float32
 rounds: a ray leaves a surface at the distance 0, leaves out that one triangle (`intersection_skip_self` in kernel/bvh/util.h),
 and meets another in the same place where Embree's rounding has it at a distance above 0. Rejected: doing what Cycles does,
 which would be Embree's arithmetic to the bit, with fused products or without, as the processor has them.
 
-So the tracer tells how much light comes by such surfaces, at most (core/integrators/path.h). Pixels of which that is a share to
+Which part of its light a place gets where shadow rays see otherwise than scattered ones (an object that only some kinds of
+rays see, a material that asks for the kind, a lamp without shadows) is Cycles' weights of multiple importance sampling
+(`light_sample_mis_weight_forward` and `light_sample_mis_weight_nee` in kernel/light/sample.h): other ones with a light tree
+than without, or with another lamp in the scene. Rejected: doing what Cycles does, since an artist's own picture, with the
+light tree, has other weights than the one that is compared; and to switch importance sampling off on both sides, which takes
+lamps out of mirrors.
+
+So the tracer tells how much light is of these kinds, at most (core/integrators/path.h). Pixels of which that is a share to
 speak of are taken out; the others keep it as a tolerance.
 """
 
@@ -30,13 +37,18 @@ _SHARE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class CoincidentLight:
-    """The light that comes by surfaces in one place, at most.
+    """The light that is a renderer's choice, at most.
 
-    light : its passes. pairs : two names in order of the alphabet → how often rays found these in one place.
+    light : its passes. pairs : two names in order of the alphabet → how often rays found these in one place. seen_otherwise :
+    objects and lamps whose shadows not all kinds of rays see → how often that made a difference.
     """
 
     light: Image
     pairs: Mapping[tuple[str, str], int]
+    seen_otherwise: Mapping[str, int] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return bool(self.pairs or self.seen_otherwise)
 
     def of(self, sides: Sides) -> Array:
         """(height, width): of a quantity, the largest of its channels."""
@@ -53,7 +65,7 @@ class CoincidentLight:
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """A comparison without the light that comes by surfaces in one place. out : (height, width) bool, pixels taken out."""
+    """A comparison without the light that is a renderer's choice. out : (height, width) bool, pixels taken out."""
 
     coincident: CoincidentLight
     out: NDArray[np.bool_]
@@ -78,24 +90,34 @@ MakeCoincidentLight = Callable[[], CoincidentLight]
 class TakenOut:
     """The pixels that were taken out of a comparison of light.
 
-    pixels : (height, width) bool, that show surfaces in one place, or are lit by them. pairs : as of CoincidentLight.
+    pixels : (height, width) bool, that show surfaces in one place or are lit by them, or past what not all kinds of rays see.
+    pairs, seen_otherwise : as of CoincidentLight.
     """
 
     pixels: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((1, 1), bool))
     pairs: Mapping[tuple[str, str], int] = field(default_factory=dict)
+    seen_otherwise: Mapping[str, int] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return bool(self.pairs or self.seen_otherwise)
 
     @property
     def count(self) -> int:
         return int(self.pixels.sum())
 
     @property
-    def names(self) -> tuple[str, ...]:
+    def in_one_place(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys(name for pair in self.pairs for name in pair))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys((*self.in_one_place, *self.seen_otherwise)))
+
     def to_json(self) -> dict:
-        """As InOnePlace of geometry."""
+        """As InOnePlace of geometry, and the names of what not all kinds of rays see."""
         return {
             "pixels": self.count,
             "share": float(self.pixels.mean()),
             "pairs": [{"objects": list(pair)} for pair in self.pairs],
+            "seen_otherwise": list(self.seen_otherwise),
         }

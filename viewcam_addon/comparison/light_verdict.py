@@ -1,6 +1,7 @@
 """The verdict of a comparison of light, as figures, as one sentence, and as aligned lines for the shell."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
@@ -31,6 +32,8 @@ _TELLING = {
     "4π": 4.0 * math.pi,
 }
 _FIT = 1e-4
+
+_MOST_NAMED = 3
 
 # After the point: what float64 leaves of a mean in percent.
 _MOST_DIGITS = 12
@@ -144,9 +147,11 @@ class RadianceComparison:
         if self.equal:
             table.append(f"{'To the last bit':<17}{', '.join(self.equal)}")
         if self.taken_out.pairs:
-            table.append(
-                f"{'In one place':<17}{self.taken_out.count:,} pixels are taken out: {pairs_text(self.taken_out.pairs)}"
-            )
+            table.append(f"{'In one place':<17}{pairs_text(self.taken_out.pairs)}")
+        if self.taken_out.seen_otherwise:
+            table.append(f"{'Shadows':<17}not all rays see those of {_few(self.taken_out.seen_otherwise)}")
+        if self.taken_out:
+            table.append(f"{'Taken out':<17}{self.taken_out.count:,} pixels")
         seen = self.appearance
         expected = "" if seen.expected_relmse is None else f", of which noise explains {seen.expected_relmse:.2e}"
         flip = "" if seen.flip is None else f"; FLIP {seen.flip:.4f}"
@@ -171,10 +176,13 @@ class RadianceComparison:
 
 def _without(comparison: RadianceComparison) -> str:
     taken_out = comparison.taken_out
-    if not taken_out.pairs:
-        return ""
-    which = f"the {taken_out.count:,} pixels that show surfaces in one place, or are lit by them, are taken out"
-    return f"; {which} ({pairs_text(taken_out.pairs)})"
+    which = []
+    if taken_out.pairs:
+        which.append(f"show surfaces in one place, or are lit by them ({pairs_text(taken_out.pairs)})")
+    if taken_out.seen_otherwise:
+        names = _few(taken_out.seen_otherwise)
+        which.append(f"are lit past what shadow rays see and scattered rays do not, or the reverse ({names})")
+    return f"; the {taken_out.count:,} pixels that {', and that '.join(which)}, are taken out" if which else ""
 
 
 def samples_text(comparison: RadianceComparison) -> str:
@@ -297,6 +305,13 @@ def _mean_text(row: LightRow) -> str:
         else "is the same within"
     )
     return f"the mean {differs} ± {plain(error)} %, and a difference of {plain(100.0 * row.visible)} % would have been found"
+
+
+def _few(names: Iterable[str]) -> str:
+    """'Sheet', 'Area' and 3 more."""
+    quoted = [repr(name) for name in names]
+    more = [f"{len(quoted) - _MOST_NAMED:,} more"] if len(quoted) > _MOST_NAMED else []
+    return _listed([*quoted[:_MOST_NAMED], *more])
 
 
 def _listed(names: list[str]) -> str:

@@ -44,7 +44,7 @@ def compare(
 
     pinhole : the camera of the reference, which must have the passes Combined and Depth. test_samples : of each test picture,
     where that is not what its file tells (Cycles counts a first sample that it leaves out). make_coincident : traces the light
-    that comes by surfaces in one place, which is taken out; asked where the pictures differ.
+    that is a renderer's choice, which is taken out; asked where the pictures differ.
 
     Whatever float32 can hold may stand in the pictures: what is no number is told as broken.
 
@@ -55,10 +55,10 @@ def compare(
     """
     compared = compare_quantities(reference, tests, pinhole, test_samples)
     combined, taken_out = compared.combined, TakenOut()
-    if make_coincident is not None and not all(row.ok for row in compared.rows) and (coincident := make_coincident()).pairs:
+    if make_coincident is not None and not all(row.ok for row in compared.rows) and (coincident := make_coincident()):
         rest = coincident.rest(combined)
         compared = compare_quantities(reference, tests, pinhole, test_samples, rest)
-        taken_out = TakenOut(rest.out, coincident.pairs)
+        taken_out = TakenOut(rest.out, coincident.pairs, coincident.seen_otherwise)
     maps = dict(compared.maps)
     appearance, flip = perception.appearance(combined)
     if flip is not None:
@@ -103,7 +103,7 @@ def compare_quantities(
     test_samples: int | None = None,
     rest: Rest | None = None,
 ) -> QuantityComparison:
-    """`compare` without what decides nothing. rest : what is compared where light comes by surfaces in one place."""
+    """`compare` without what decides nothing. rest : what is compared where light is a renderer's choice."""
     found = list(all_sides(reference, tests))
     if rest is not None:
         found = [rest.of(sides) for sides in found]

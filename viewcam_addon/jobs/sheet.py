@@ -72,8 +72,12 @@ def verdict(result: Result) -> str:
     largest = _part(figures, "position").get("max")
     words = f"identical to {plain(largest)} px" if isinstance(largest, float) else "identical"
     words = "the same within noise" if figures.get("noisy") else words
-    names = _part(check, "not_modelled").get("names")
-    return f"{words}, {but_for(names)}" if result.answer == SAME_BUT and isinstance(names, list) else words
+    not_modelled = _part(check, "not_modelled")
+    return (
+        f"{words}, {but_for(not_modelled)}"
+        if result.answer == SAME_BUT and isinstance(not_modelled.get("names"), list)
+        else words
+    )
 
 
 def _part(record: Mapping[str, Any], name: str) -> Mapping[str, Any]:

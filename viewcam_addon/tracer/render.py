@@ -113,10 +113,11 @@ class Tracer:
 
     def coincident_light(
         self, level: str, samples: int, seed: int, roundings: float
-    ) -> tuple[Passes, dict[tuple[str, str], int]]:
-        """The light that depends on surfaces in one place, as much as any choice among them may bring: passes as of
-        `render_light`. And the names of two objects each that were found in one place, in order of the alphabet, with how
-        often; the same one twice where they are faces of one.
+    ) -> tuple[Passes, dict[tuple[str, str], int], dict[str, int]]:
+        """The light that is a renderer's choice, because surfaces are in one place or shadow rays see otherwise than others, as
+        much as any choice may bring: passes as of `render_light`. And the names of two objects each that were found in one
+        place, in order of the alphabet, with how often; the same one twice where they are faces of one. And those of objects
+        that shadow rays see otherwise, and of lamps without shadows, with how often.
 
         roundings : of float32, how far apart surfaces are in one place.
         """
@@ -127,10 +128,15 @@ class Tracer:
         for _ in self._in_threads(lambda tile, stop: light.trace(passes, *tile, stop), tiles, None):
             pass
         pairs: dict[tuple[str, str], int] = {}
+        seen_otherwise: dict[str, int] = {}
         for first, second, count in light.pairs():
-            pair = tuple(sorted((self._names[first], self._names[second])))
-            pairs[pair] = pairs.get(pair, 0) + count
-        return passes, pairs
+            if first is None or second is None:
+                name = self._scene.lamps[second].name if first is None else self._names[first]
+                seen_otherwise[name] = seen_otherwise.get(name, 0) + count
+            else:
+                pair = tuple(sorted((self._names[first], self._names[second])))
+                pairs[pair] = pairs.get(pair, 0) + count
+        return passes, pairs, seen_otherwise
 
     def hits(
         self, names: Collection[str] = (), place: tuple[float, float] = (0.5, 0.5)

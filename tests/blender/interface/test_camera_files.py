@@ -238,3 +238,48 @@ def test_a_dropped_file_goes_to_the_import(registered_addon):
     assert handler.bl_import_operator == camera_files.VIEWCAM_OT_import_cameras.bl_idname
     assert all(re.fullmatch(r"\.\w+", suffix) for suffix in handler.bl_file_extensions.split(";"))
     assert not {".glb", ".gltf", ".usd"} & {*handler.bl_file_extensions.split(";")}
+
+
+def test_a_photograph_is_shown_without_its_lens_and_fits_the_scene_to_its_corners(scene, tmp_path):
+    """Known points, drawn as blobs where the lens shows them: in the background they lie where the pinhole has them."""
+    lens = "640 360 500 510 310 190 -0.12 0.03 0.002 -0.003"
+    (tmp_path / "cameras.txt").write_text(f"1 OPENCV {lens}\n")
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 photo_0001.png\n\n")
+    (camera,) = formats.read(tmp_path)
+    pinhole = camera.pinhole
+    column, row = (each.ravel() for each in np.meshgrid(np.linspace(25, 615, 7), np.linspace(25, 335, 5)))
+    points = np.stack([(column - 310) / 500, (row - 190) / 510], axis=-1)
+    places = camera.lens.distort(points) * [500, 510] + [310, 190]
+    assert np.abs(places - np.stack([column, row], axis=-1)).max() > 5, "a lens that nobody sees"
+    across, down = np.meshgrid(np.arange(640) + 0.5, np.arange(360) + 0.5)
+    blobs = sum(np.exp(-((across - x) ** 2 + (down - y) ** 2) / 18) for x, y in places)
+    image = bpy.data.images.new("made", 640, 360, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set(np.repeat(blobs[::-1, :, None], 4, axis=2).astype(np.float32).ravel())
+    image.filepath_raw, image.file_format = str(tmp_path / "photo_0001.exr"), "OPEN_EXR"
+    image.save()
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 photo_0001.exr\n\n")
+    assert import_(tmp_path, set_size=True) == {"FINISHED"}
+    (block,) = bpy.data.collections[tmp_path.name].objects
+    (background,) = block.data.background_images
+    shown = background.image
+    width, height = shown.size
+    assert width / height == pytest.approx(640 / 360, rel=1e-4) and shown.packed_file
+    pixels = np.array(shown.pixels[:]).reshape(height, width, 4)[::-1, :, 0]
+    across, down = np.meshgrid((np.arange(width) + 0.5) * 640 / width, (np.arange(height) + 0.5) * 360 / height)
+    errors = []
+    for x, y in zip(column, row, strict=True):
+        weight = pixels * (np.hypot(across - x, down - y) < 12)
+        errors.append(math.hypot((weight * across).sum() / weight.sum() - x, (weight * down).sum() / weight.sum() - y))
+    assert max(errors) < 0.1, f"{max(errors):.3f} pixels, of which the blobs' own distortion is a part"
+    assert_same(cameras.read(block, scene), pinhole, ((0, 0, 4), (1, 2, 8), (-2, 1, 8)))
+
+
+def test_a_photograph_of_another_size_than_its_lens_is_not_shown_and_told(scene, tmp_path, capfd):
+    (tmp_path / "cameras.txt").write_text("1 SIMPLE_RADIAL 640 360 500 310 190 -0.1\n")
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n")
+    write_picture(tmp_path / "a.png")
+    assert import_(tmp_path, set_size=True) == {"FINISHED"}
+    (block,) = bpy.data.collections[tmp_path.name].objects
+    assert not block.data.background_images
+    assert "8 × 4" in capfd.readouterr().out

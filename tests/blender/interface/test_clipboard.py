@@ -210,6 +210,25 @@ def test_an_orthographic_camera_is_refused_by_name(camera_object):
     assert everything(camera_object) == before
 
 
+THREE_JS = "const camera = new THREE.PerspectiveCamera(40, 16/9); camera.position.set(7, 3, 6); camera.lookAt(0, 1, 0);"
+
+
+def test_after_a_text_in_which_y_is_up_the_answer_beside_paste_is_named_and_turns_it_upright(posed_camera, capfd):
+    assert bpy.ops.viewcam.paste_camera(text=THREE_JS) == {"FINISHED"}
+    assert tuple(posed_camera.virtual_pinhole.up) == (0, 1, 0)
+    assert "Paste Upright" in capfd.readouterr().out
+    posed_camera.virtual_pinhole.up = (0, 0, 1)
+    assert bpy.ops.viewcam.paste_camera(text=THREE_JS, axes="y_up") == {"FINISHED"}
+    group = posed_camera.virtual_pinhole
+    assert (tuple(group.eye), tuple(group.look_at), tuple(group.up)) == ((7, -6, 3), (0, 0, 1), (0, 0, 1))
+    assert "Paste Upright" not in capfd.readouterr().out
+
+
+def test_a_camera_of_ours_whose_up_is_y_is_pasted_without_a_word_about_it(posed_camera, capfd):
+    assert bpy.ops.viewcam.paste_camera(text="eye=(0, 0, 9) look_at=(0, 0, 0) up=(0, 1, 0) d=900") == {"FINISHED"}
+    assert "Paste Upright" not in capfd.readouterr().out
+
+
 def test_undo_takes_a_pasted_camera_back(camera_object):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="before")

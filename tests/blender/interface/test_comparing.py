@@ -318,6 +318,8 @@ def test_a_child_that_dies_is_told_with_its_last_words(monkeypatch, seen):
     ("said", "status", "sentence"),
     [
         ('traced\n{"event": "error", "text": "out.exr can\'t be written"}\nleft\n', 2, "Out.exr can't be written"),
+        ('{"event": "error", "text": "l.json: one problem", "problems": ["shot 1: no EEVEE"]}', 2, "Shot 1: no EEVEE"),
+        ('{"event": "error", "text": "l.json", "problems": ["a", "b", "c"]}', 2, "A (and 2 more problems)"),
         ("", 3, "The process that compares ended with status 3"),
         ("first\n\n last \n", -9, "The process that compares was ended by signal 9 after saying: last"),
     ],

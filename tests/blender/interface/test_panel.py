@@ -142,13 +142,14 @@ class Layout:
         self.drawn, self.above = [] if drawn is None else drawn, above
         self.active = self.enabled = True
         self.alert = self.is_row = False
+        self.factor = None
         self.use_property_split = above is not None and above.use_property_split
         self.use_property_decorate = above is not None and above.use_property_decorate
         self.alignment = "EXPAND"
 
-    def row(self, **_look):
+    def row(self, factor=None, **_look):
         below = Layout(self.drawn, self)
-        below.is_row = True
+        below.is_row, below.factor = True, factor
         return below
 
     def column(self, **_look):
@@ -233,14 +234,40 @@ def test_the_sub_panel_has_every_move_for_the_camera_that_is_shown(posed_camera)
 
 
 def test_every_value_has_its_row_and_the_roll_is_the_one_that_counts(posed_camera):
-    always = ["name", "eye", "eye_target", "look_at", "look_at_target", "up", "focal_length", "lens_unit", "zoom", "keeps"]
-    assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll", "pole"]
+    always = ["name", "eye_target", "eye", "look_at_target", "look_at", "up", "focal_length", "lens_unit"]
+    assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll"]
     for unit, name in (("DIAGONAL", "diagonal_fov"), ("PIXELS", "distance")):
         posed_camera.virtual_pinhole.lens_unit = unit
         always[always.index("lens_unit") - 1] = name
-        assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll", "pole"]
+        assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll"]
+    assert list(properties_drawn(panel.VIEWCAM_PT_data_options)) == ["zoom", "keeps", "pole"]
     posed_camera.virtual_pinhole.pole = "HOLD"
-    assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "held_roll", "hold_within", "pole"]
+    assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "held_roll"]
+    assert list(properties_drawn(panel.VIEWCAM_PT_data_options)) == ["zoom", "keeps", "pole", "hold_within"]
+
+
+def test_before_the_first_sub_panel_there_are_twelve_rows_below_the_camera_s_name(posed_camera):
+    """A vector is three rows; what stands in one row with another, or beside a point, is none of its own."""
+    fields = properties_drawn(panel.VIEWCAM_PT_sidebar)
+    tall = [
+        name for name in fields if getattr(type(posed_camera.virtual_pinhole).bl_rna.properties.get(name), "is_array", False)
+    ]
+    beside = [name for name in fields if name.endswith("_target") or name in ("lens_unit", "name")]
+    rows = 3 * len(tall) + len(fields) - len(tall) - len(beside)
+    buttons = [
+        layout for kind, name, _, layout, _ in drawn(panel.VIEWCAM_PT_sidebar) if kind == "operator" and "camera" in name
+    ]
+    rows += len({id(layout) for layout in buttons}) - 1  # without those beside the name
+    assert rows == 12
+
+
+def test_the_values_of_all_rows_begin_at_one_edge(posed_camera):
+    fields = properties_drawn(panel.VIEWCAM_PT_sidebar)
+    for name in ("eye", "look_at", "up", "focal_length", "roll"):
+        above = fields[name]
+        while above.factor is None:
+            above = above.above
+        assert above.factor == 0.4, name
 
 
 SHOWN = {
@@ -257,8 +284,9 @@ def test_nothing_but_a_dot_takes_room_from_the_lens(posed_camera):
     for unit in [item.identifier for item in fields()["lens_unit"].enum_items]:
         posed_camera.virtual_pinhole.lens_unit = unit
         found = drawn(panel.VIEWCAM_PT_sidebar, 292)
-        beside = [(kind, name) for kind, name, _, layout, _ in found if layout.is_row and kind in ("label", "decorator")]
-        assert ("label", "") not in beside and [name for kind, name in beside if kind == "decorator"] == [SHOWN[unit]]
+        name = SHOWN[posed_camera.virtual_pinhole.lens_unit]
+        (row,) = (layout for kind, other, _, layout, _ in found if (kind, other) == ("prop", name))
+        assert [each[:2] for each in found if each[3] is row] == [("prop", name), ("decorator", name)]
 
 
 BLENDERS = {
@@ -295,7 +323,8 @@ def test_no_label_of_the_panel_reads_as_the_subjects_distance(posed_camera):
     said = []
     for unit in [item.identifier for item in fields()["lens_unit"].enum_items]:
         posed_camera.virtual_pinhole.lens_unit = unit
-        for kind, name, look, *_ in [*drawn(panel.VIEWCAM_PT_sidebar), *drawn(panel.VIEWCAM_PT_sidebar_move)]:
+        panels = (panel.VIEWCAM_PT_sidebar, panel.VIEWCAM_PT_sidebar_options, panel.VIEWCAM_PT_sidebar_move)
+        for kind, name, look, *_ in [row for each in panels for row in drawn(each)]:
             said.append(look.get("text") or name)
             if kind == "prop" and name in fields():
                 said += [fields()[name].name, *(item.name for item in getattr(fields()[name], "enum_items", ()))]
@@ -329,8 +358,8 @@ def test_in_the_narrowest_sidebar_no_name_stands_beside_its_field(posed_camera, 
     posed_camera.virtual_pinhole.look_at_target = block
     wide, narrow = (drawn(panel.VIEWCAM_PT_sidebar, width) for width in (300, NARROWEST))
     fields = [[each[1] for each in found if each[0].startswith("prop")] for found in (wide, narrow)]
-    assert fields[0] == fields[1], "a field is missing"
-    assert any(each[3].use_property_split for each in wide)
+    assert sorted(fields[0]) == sorted(fields[1]), "a field is missing"
+    assert ("label", "Roll") in [each[:2] for each in wide]
     lacking = {"ENUM", "POINTER", "STRING"}  # what has no room for its name inside
     for before, (kind, name, look, layout, _) in itertools.pairwise(narrow):
         if not kind.startswith("prop") or name == "name":
@@ -352,11 +381,12 @@ def keyed_by_a_dot(each, width):
 def test_what_can_be_keyed_has_its_dot_however_narrow_the_panel_is(posed_camera, each):
     for posed_camera.virtual_pinhole.pole in ("CANONICAL", "HOLD"):
         for posed_camera.virtual_pinhole.lens_unit in ("MILLIMETERS", "PIXELS"):
-            shown = {name for kind, name, *_ in drawn(each) if kind == "prop" and name != "name"}
-            keyed = {name for name in shown if fields()[name].is_animatable}
-            assert {"eye", "look_at", "up", "zoom"} <= keyed
-            for width in (300, 249, NARROWEST):
-                assert keyed <= keyed_by_a_dot(each, width), f"at {width} pixels"
+            for part, least in ((each, {"eye", "look_at", "up"}), (panel.VIEWCAM_PT_sidebar_options, {"zoom"})):
+                shown = {name for kind, name, *_ in drawn(part) if kind == "prop" and name != "name"}
+                keyed = {name for name in shown if fields()[name].is_animatable}
+                assert least <= keyed
+                for width in (300, 249, NARROWEST):
+                    assert keyed <= keyed_by_a_dot(part, width), f"at {width} pixels"
 
 
 @pytest.mark.parametrize("each", [panel.VIEWCAM_PT_sidebar_move, panel.VIEWCAM_PT_sidebar_readouts])
@@ -382,7 +412,8 @@ def test_a_camera_that_is_not_enabled_shows_its_own_values_greyed_and_one_button
 def test_what_a_constraint_or_a_driver_places_is_read_only_with_a_word_why(posed_camera, empty):
     def locked():
         bpy.context.view_layer.update()
-        return [name for name, layout in properties_drawn(panel.VIEWCAM_PT_data).items() if not layout.is_all("enabled")]
+        found = properties_drawn(panel.VIEWCAM_PT_data) | properties_drawn(panel.VIEWCAM_PT_data_options)
+        return [name for name, layout in found.items() if not layout.is_all("enabled")]
 
     def words():
         found = drawn(panel.VIEWCAM_PT_data)
@@ -393,7 +424,7 @@ def test_what_a_constraint_or_a_driver_places_is_read_only_with_a_word_why(posed
     constraint.target = empty("Target", (5, 5, 5))
     assert locked() == ["look_at", "up", "roll"] and words() == ["Constraint"]
     posed_camera.data.driver_add("lens").driver.expression = "20.0 + 1.0"
-    assert locked() == ["look_at", "up", "focal_length", "lens_unit", "zoom", "roll"] and words() == ["Constraint", "Driver"]
+    assert locked() == ["look_at", "up", "focal_length", "lens_unit", "roll", "zoom"] and words() == ["Constraint", "Driver"]
     posed_camera.constraints.clear()
     posed_camera.parent = parent = empty("Dolly")
     assert locked() == ["focal_length", "lens_unit", "zoom"], "a parent that stands still lets its camera be set"
@@ -410,7 +441,7 @@ def test_what_is_linked_can_not_be_set_by_buttons(posed_camera, tmp_path):
     bpy.context.scene.collection.objects.link(bpy.data.objects["Camera"])
     bpy.context.scene.camera = bpy.data.objects["Camera"]
     dead = {"viewcam.apply_camera", "viewcam.adopt_camera", "viewcam.bake_camera"}
-    for kind, name, _, layout, _ in drawn(panel.VIEWCAM_PT_data):
+    for kind, name, _, layout, _ in drawn(panel.VIEWCAM_PT_data_options):
         if kind == "operator" and name in dead:
             dead.remove(name)
             assert not layout.is_all("enabled"), name
@@ -452,11 +483,10 @@ def test_a_target_s_vertex_group_or_bone_is_chosen_below_it(posed_camera, scene,
     assert searched == ([(field, {"look_at_group": "vertex_groups", "look_at_bone": "bones"}[field])] if field else [])
 
 
-def test_apply_again_is_not_marked_where_it_mends_nothing(posed_camera, scene):
+def test_apply_again_is_not_offered_where_it_mends_nothing(posed_camera, scene):
     def is_marked():
         bpy.context.view_layer.update()
-        (layout,) = (each[3] for each in drawn(panel.VIEWCAM_PT_data) if each[1] == "viewcam.apply_camera")
-        return layout.alert
+        return "viewcam.apply_camera" in [name for _, name, *_ in drawn(panel.VIEWCAM_PT_data)]
 
     assert not is_marked()
     for block, name, value in (
@@ -478,7 +508,8 @@ def test_a_notice_is_drawn_in_lines_that_fit_and_with_its_remedy_below(posed_cam
     lines = [(name, look["icon"]) for kind, name, look, *_ in found if kind == "label" and "icon" in look]
     assert " ".join(line for line, _ in lines).startswith("The view is parallel to up")
     assert [icon for _, icon in lines] == ["ERROR"] + ["BLANK1"] * (len(lines) - 1) and len(lines) > 2
-    assert found[-1][:2] == ("operator", "viewcam.choose_up") and found[-1][4].camera == "Camera"
+    (remedy,) = (each for each in found if each[:2] == ("operator", "viewcam.choose_up"))
+    assert remedy[4].camera == "Camera" and found.index(remedy) < [each[1] for each in found].index("eye"), "it is at the top"
 
 
 def test_each_read_out_has_a_button_that_copies_it(posed_camera):
@@ -532,7 +563,7 @@ def test_what_is_made_of_pieces_is_translated_before_the_pieces_go_in(posed_came
     posed_camera.virtual_pinhole.eye = (0, 0, 5)
     monkeypatch.setattr(panel, "iface", lambda text: GERMAN.get(text, text))
     found = drawn(panel.VIEWCAM_PT_data)
-    assert found[-1][2] == {"text": "Oben wird (1, 0, 0)", "translate": False}
+    assert {"text": "Oben wird (1, 0, 0)", "translate": False} in [each[2] for each in found]
     assert ("label", "Senkrecht", {"icon": "ERROR", "translate": False}) in [each[:3] for each in found]
 
 

@@ -27,7 +27,7 @@ def seen(*points):
 def settings(fresh_blender):
     yield fresh_blender.context.window_manager.virtual_pinhole_match
     found = fresh_blender.context.window_manager.virtual_pinhole_match
-    for name in ("kind", "axes", "sides", "precision"):
+    for name in ("kind", "axes", "sides", "precision", "is_lens_known", "length"):
         found.property_unset(name)
 
 
@@ -94,6 +94,29 @@ def test_edges_dragged_over_a_picture_turn_the_camera_and_set_its_lens_and_the_e
     assert tuple(posed_camera.virtual_pinhole.eye) == before["virtual_pinhole.eye"]
     assert (scene.unit_settings.scale_length, scene.unit_settings.system) == units
     assert hand.operator.result.precision == ZOOM, "one pixel of the screen"
+
+
+def test_the_length_of_the_first_edge_at_the_cursor_says_where_the_camera_stands(posed_camera, scene, settings):
+    settings.length, scene.cursor.location = 4.0, (-2, -1, 0)
+    hand = Hand(posed_camera, scene)
+    draw_the_edges(hand)
+    assert hand.event("RET") == {"FINISHED"}
+    bpy.context.view_layer.update()
+    found = cameras.read(posed_camera, scene)
+    np.testing.assert_allclose(found.eye, PHOTO.eye, atol=1e-4)
+    assert np.allclose(found.basis(), PHOTO.basis(), atol=1e-6)
+
+
+def test_a_lens_that_is_known_stays_to_the_bit_and_the_viewport_says_so(posed_camera, scene, settings):
+    settings.is_lens_known = True
+    posed_camera.virtual_pinhole.distance = 1800
+    hand = Hand(posed_camera, scene)
+    draw_the_edges(hand)
+    assert hand.event("RET") == {"FINISHED"} and posed_camera.virtual_pinhole.distance == 1800
+    bpy.context.view_layer.update()
+    assert np.allclose(cameras.read(posed_camera, scene).basis(), PHOTO.basis(), atol=1e-6)
+    line = photo_matching.told(hand.operator.result, posed_camera.data.lens)[0]
+    assert line == "33.75 mm as it was,  d = 1800 px"
 
 
 @pytest.mark.parametrize("enabled", [True, False])

@@ -139,6 +139,18 @@ def test_by_script_it_waits_and_says_where_the_sheet_is(two, stand_in, tmp_path)
         bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path / "other"))
 
 
+def test_after_a_run_without_a_contact_sheet_none_of_an_earlier_run_is_opened(two, stand_in, monkeypatch, tmp_path):
+    (tmp_path / "go").touch()
+    assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path)) == {"FINISHED"}
+    assert bpy.ops.viewcam.open_contact_sheet.poll()
+    told = '{"event": "error", "text": "shots.json: one problem, nothing is rendered", "problems": ["camera A: no graphics"]}'
+    monkeypatch.setattr(comparing, "command", lambda *_: [sys.executable, "-c", f"print({told!r}); raise SystemExit(2)"])
+    time.sleep(1.1)  # its folder is named by the second
+    with pytest.raises(RuntimeError, match="Camera A: no graphics"):
+        bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path))
+    assert not bpy.ops.viewcam.open_contact_sheet.poll()
+
+
 @pytest.mark.parametrize("check", [False, True])
 def test_a_proof_of_each_picture_is_asked_for_by_one_box(two, stand_in, tmp_path, monkeypatch, check):
     (tmp_path / "go").touch()

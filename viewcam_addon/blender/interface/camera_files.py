@@ -4,6 +4,7 @@ What a format leaves open is the scene's: its size where a file says none, and f
 glTF and USD are left to Blender's own importers when they are dropped.
 """
 
+import dataclasses
 from pathlib import Path
 from typing import ClassVar
 
@@ -12,9 +13,10 @@ from bpy_extras.io_utils import ExportHelper
 
 from ... import cameras as formats
 from ...errors import InputError
+from ...jobs import makers
 from ...pinhole import ViewPlane
 from .. import camera as cameras
-from .. import datablocks
+from .. import datablocks, dataset_cameras, picture
 from . import clipboard, file_menu
 from .camera_options import READING, ReadingOptions, WorldOptions
 
@@ -166,6 +168,7 @@ class VIEWCAM_OT_export_cameras(WorldOptions, ExportHelper, bpy.types.Operator):
             ("SCENE", "The Scene's", "The camera that a render takes"),
             ("SELECTED", "Selected", "All selected cameras"),
             ("ALL", "All", "All cameras of the scene"),
+            ("FRAMES", "The Scene's, Each Frame", "The camera that a render takes at each frame from Start to End"),
         ],
         default="ALL",
     )
@@ -190,7 +193,7 @@ class VIEWCAM_OT_export_cameras(WorldOptions, ExportHelper, bpy.types.Operator):
                 raise InputError("the cameras have no file name: give one")
             if suffix and self.format != "sidecar" and not path.suffix:
                 path = path.with_suffix(suffix)
-            found = [clipboard.camera_of(each, context.scene) for each in self._chosen_objects(context)]
+            found = self._at_each_frame(context.scene) if self.which == "FRAMES" else self._cameras(context)
             written = formats.save(found, path, self.format, self.chosen())
         except InputError as error:
             self.report({"ERROR"}, file_menu.text(datablocks.sentence(error)))
@@ -199,6 +202,15 @@ class VIEWCAM_OT_export_cameras(WorldOptions, ExportHelper, bpy.types.Operator):
         files = "" if len(written) == 1 else f", {len(written)} files"
         self.report({"INFO"}, file_menu.text(f"{path.name}: {count} ({formats.FORMATS[self.format].TITLE}{files})"))
         return {"FINISHED"}
+
+    def _at_each_frame(self, scene: bpy.types.Scene) -> list[formats.Camera]:
+        frames = makers.frames(f"{scene.frame_start}..{scene.frame_end}")[:: scene.frame_step]
+        found = dataset_cameras.of_frames(scene, [(job.name, job.frame) for job in frames])
+        frame = datablocks.frame_of(scene)
+        return [dataclasses.replace(each, pinhole=picture.at_full_size(each.pinhole, frame)) for each in found]
+
+    def _cameras(self, context: bpy.types.Context) -> list[formats.Camera]:
+        return [clipboard.camera_of(each, context.scene) for each in self._chosen_objects(context)]
 
     def _chosen_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         if self.which == "SCENE":

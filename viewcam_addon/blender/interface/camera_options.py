@@ -12,7 +12,7 @@ from ... import cameras as formats
 from ...cameras import Options
 
 _UNSTATED = "UNSTATED"
-_AXES = {"as_is": "As They Are", "y_up": "Y Up to Z Up"}
+_AXES = {"as_is": "As They Are", "y_up": "Y Up to Z Up", "y_down": "Y Down to Z Up"}
 _POSES = {
     "w2c_opencv": "World to Camera, OpenCV's Axes",
     "c2w_opencv": "Camera to World, OpenCV's Axes",
@@ -59,6 +59,11 @@ class WorldOptions:
 class ReadingOptions(WorldOptions):
     """The options with which cameras are read, beside axes and scale."""
 
+    level: bpy.props.BoolProperty(
+        name="Level by Cameras",
+        description="Turn the world so that the mean of the cameras' up is Z, as of a reconstruction that knows no up",
+        options={"SKIP_SAVE"},
+    )
     unmirrored: bpy.props.BoolProperty(
         name="Unmirrored",
         description="Take a camera whose picture is mirrored without that; else its scale becomes negative",
@@ -100,8 +105,10 @@ class ReadingOptions(WorldOptions):
 
     def chosen(self, **more: Any) -> Options:
         stated = {name: None if getattr(self, name) == _UNSTATED else getattr(self, name) for name in _MAY_BE_STATED}
-        return super().chosen(unmirrored=self.unmirrored, without_distortion=self.without_distortion, **stated, **more)
+        up_from = "cameras" if self.level else None
+        taken = {"unmirrored": self.unmirrored, "without_distortion": self.without_distortion, "up_from": up_from}
+        return super().chosen(**taken, **stated, **more)
 
 
-READING = ("axes", "scale", "unmirrored", "without_distortion", *_MAY_BE_STATED)
+READING = ("axes", "scale", "level", "unmirrored", "without_distortion", *_MAY_BE_STATED)
 """The names of all of them, in the order in which they are shown."""

@@ -18,7 +18,7 @@ from ... import cameras as formats
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import datablocks, picture, targets
+from .. import datablocks, picture, preferences, targets
 from ..temporary_settings import Overrides
 from . import camera_options, readouts
 from .camera_options import READING, ReadingOptions, WorldOptions
@@ -26,6 +26,7 @@ from .operators import CameraOperator
 
 _DIALOG_WIDTH = 480
 _ROUNDING = 1e-6  # pixels, of principal points that were computed
+_Y_UP = (0.0, 1.0, 0.0)
 _NAMES = {"eye": "eye", "look_at": "look-at", "up": "up"}
 
 
@@ -147,10 +148,14 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         type(self).question = ""  # it is answered, and the panel of the last operation shows the same properties
-        found = formats.choose(self._found(self.text or _clipboard(), camera_object, scene), self.named or None)
+        text = self.text or _clipboard()
+        found = formats.choose(self._found(text, camera_object, scene), self.named or None)
         before = _present(camera_object, scene)
         findings = paste(found, before, camera_object, scene, self.set_size)
         self.report({"INFO"}, f"Pasted {_said(found.pinhole, before)} on {camera_object.name}")
+        is_lying = found.pinhole.up == _Y_UP != before.up == preferences.up_axis()
+        if is_lying and self.axes == "as_is" and formats.recognised(text) != OWN:
+            findings.append("In this text y is up, and in the scene it is not: the arrow beside Paste has Paste Upright")
         for finding in findings:  # after it, since the status bar shows what was reported last
             self.report({"WARNING"}, finding)
 
@@ -167,6 +172,23 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
             base=picture.at_full_size(_present(camera_object, scene), frame),
         )
         return formats.read(text, options=options)
+
+
+class VIEWCAM_MT_paste_camera_as(bpy.types.Menu):
+    bl_idname = "VIEWCAM_MT_paste_camera_as"
+    bl_label = "Paste as"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        camera_object = datablocks.camera_in(context)
+        for text, properties in (
+            ("Paste Upright: Y Is Up in the Text", {"axes": "y_up"}),
+            ("Paste and Set the Scene's Size", {"set_size": True}),
+            ("Paste Upright and Set the Scene's Size", {"axes": "y_up", "set_size": True}),
+        ):
+            entry = self.layout.operator("viewcam.paste_camera", text=text)
+            entry.camera = camera_object.name if camera_object else ""
+            for name, value in properties.items():
+                setattr(entry, name, value)
 
 
 class VIEWCAM_OT_copy_readout(bpy.types.Operator):
@@ -280,9 +302,8 @@ def draw(layout: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:
     row.operator("viewcam.copy_camera", text="Copy", icon="COPYDOWN").camera = camera_object.name
     row.menu("VIEWCAM_MT_copy_camera_as", text="", icon="DOWNARROW_HLT")
     row.operator("viewcam.paste_camera", text="Paste", icon="PASTEDOWN").camera = camera_object.name
-    with_size = row.operator("viewcam.paste_camera", text="", icon="OUTPUT")
-    with_size.camera, with_size.set_size = camera_object.name, True
+    row.menu("VIEWCAM_MT_paste_camera_as", text="", icon="DOWNARROW_HLT")
 
 
 IN_MENUS = (VIEWCAM_OT_copy_camera, VIEWCAM_OT_paste_camera)  # a read-out is copied by its own button
-CLASSES = (VIEWCAM_MT_copy_camera_as, *IN_MENUS, VIEWCAM_OT_copy_readout)
+CLASSES = (VIEWCAM_MT_copy_camera_as, VIEWCAM_MT_paste_camera_as, *IN_MENUS, VIEWCAM_OT_copy_readout)

@@ -257,7 +257,7 @@ def headline(result: dict[str, Any]) -> str:
     if result["answer"] == DIFFERENT:
         return "Cycles renders another picture"
     words = _agreement(result)
-    return f"{words}, {but_for(result['not_modelled']['names'])}" if result["answer"] == SAME_BUT else words
+    return f"{words}, {but_for(result['not_modelled'])}" if result["answer"] == SAME_BUT else words
 
 
 def _agreement(result: dict[str, Any]) -> str:
@@ -298,11 +298,15 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def failure(printed: str, status: int) -> str:
-    """One sentence for a child that came to nothing: the error that it has told, or its last words."""
+    """One sentence for a child that came to nothing: the error that it has told, or its last words.
+
+    Of several problems with a list of shots it is the first, and how many more there are.
+    """
     lines = printed.splitlines()
-    errors = [event["text"] for event in child_process.events_in(lines) if event["event"] == "error"]
+    errors = [event for event in child_process.events_in(lines) if event["event"] == "error"]
     if errors:
-        return errors[-1][:1].upper() + errors[-1][1:]
+        sentence, *more = errors[-1].get("problems") or [errors[-1]["text"]]
+        return sentence[:1].upper() + sentence[1:] + (f" (and {len(more)} more problems)" if more else "")
     how = f"was ended by signal {-status}" if status < 0 else f"ended with status {status}"
     words = [line.strip() for line in lines if line.strip() and not line.startswith('{"event"')]
     return f"The process that compares {how}" + (f" after saying: {words[-1]}" if words else "")

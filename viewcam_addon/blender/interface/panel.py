@@ -56,19 +56,13 @@ class _MainPanel(CameraPanel):
             return
         scene_cameras.draw_header(layout, camera_object, context)
         panel_rows.begin(layout, context, decorate=True)
-        found = notices(camera_object, context.scene)
+        for notice in notices(camera_object, context.scene):
+            _draw_notice(layout.column(align=True), notice, camera_object, context)
         if camera_object.virtual_pinhole.enabled:
             _draw_values(layout.column(), camera_object.virtual_pinhole)
-            clipboard.draw(layout, camera_object)
-            baking.draw(layout, camera_object)
-            converting.draw(layout, camera_object)
-            buttons = panel_rows.buttons(layout, context)
-            _draw_setting(buttons, camera_object, any(notice.is_mended_by_applying for notice in found))
         else:
             _draw_standing(layout, camera_object, context)
-            clipboard.draw(layout, camera_object)
-        for notice in found:
-            _draw_notice(layout.column(align=True), notice, camera_object, context)
+        clipboard.draw(layout, camera_object)
 
 
 def _draw_standing(layout: bpy.types.UILayout, camera_object: bpy.types.Object, context: bpy.types.Context) -> None:
@@ -102,39 +96,31 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
     column.active = group.enabled
     followed = causes.followed(group.id_data)
     for point, quantity in (("eye", findings.EYE), ("look_at", findings.VIEW)):
-        rows = column.column()
         # Where the point is, its target says, or what places the camera at every frame.
-        rows.enabled = quantity not in followed and targets.place(group.id_data, point) is None
-        panel_rows.field(rows, group, point)
-        _draw_why(column, followed.get(quantity))
-        panel_rows.field(column, group, f"{point}_target", text="Object")
+        is_free = quantity not in followed and targets.place(group.id_data, point) is None
         target = targets.target_of(group.id_data, point)
+        followers = [(f"{point}_target", "Object", None)]
         if target and target.type == "ARMATURE":
-            panel_rows.field(column, group, f"{point}_bone", text="Bone", among=(target.data, "bones"))
+            followers.append((f"{point}_bone", "Bone", (target.data, "bones")))
         elif target and target.type == "MESH":
-            panel_rows.field(column, group, f"{point}_group", text="Group", among=(target, "vertex_groups"))
+            followers.append((f"{point}_group", "Group", (target, "vertex_groups")))
+        panel_rows.point(column, group, point, is_free, followers)
+        _draw_why(column, followed.get(quantity))
     turned = column.column()
     turned.enabled = findings.VIEW not in followed
-    panel_rows.field(turned, group, "up")
-    column.separator()
+    panel_rows.point(turned, group, "up", is_free=True, followers=[])
     zoomed = column.column()
     zoomed.enabled = findings.DISTANCE not in followed
     _draw_lens(zoomed, group)
     is_override = bool(group.id_data.override_library)  # which keeps values, and not the other looks at them
     if is_override and group.lens_unit != "PIXELS":
         _draw_why(column, "Override: edit in px")
-    panel_rows.field(zoomed, group, "zoom")
     _draw_why(column, followed.get(findings.DISTANCE))
-    panel_rows.field(column, group, "keeps")
-    column.separator()
     turned = column.column()
     turned.enabled = findings.VIEW not in followed
-    panel_rows.field(turned, group, "held_roll" if group.pole == "HOLD" else "roll")
+    panel_rows.value(turned, group, "held_roll" if group.pole == "HOLD" else "roll")
     if is_override and group.pole != "HOLD":
         _draw_why(column, "Override: edit Up")
-    if group.pole == "HOLD":
-        panel_rows.field(column, group, "hold_within")
-    panel_rows.field(column, group, "pole")
 
 
 def _draw_why(column: bpy.types.UILayout, word: str | None) -> None:
@@ -146,29 +132,16 @@ def _draw_why(column: bpy.types.UILayout, word: str | None) -> None:
 
 
 def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
-    """One field and its unit, no wider than its words, or below it where both would be cut."""
+    """One field and its unit, no wider than its words."""
     field = {unit: look for look, unit in datablocks.LENSES.items()}.get(group.lens_unit, "distance")
-    if not column.use_property_split:
-        column.label(text="Lens")
-        panel_rows.field(column, group, field, text="")
-        panel_rows.field(column, group, "lens_unit", text="Unit")
-        return
-    row = column.row(align=True)
-    row.use_property_decorate = False
-    row.prop(group, field)
-    unit = row.row(align=True)
-    unit.use_property_split = False
-    unit.ui_units_x = 2.4 if group.lens_unit in ("MILLIMETERS", "PIXELS") else 9.0
-    unit.prop(group, "lens_unit", text="")
-    row.prop_decorator(group, field)
+    width = {"MILLIMETERS": 2.4, "PIXELS": 2.1}.get(group.lens_unit, 3.6)
+    panel_rows.value(column, group, field, ("lens_unit", width))
 
 
-def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object, alert: bool) -> None:
-    """The two ways to bring values and camera together. alert : whether they differ, and the first of them mends it."""
+def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:
+    """The two ways to bring values and camera together."""
     row.enabled = camera_object.library is None
-    apply = row.row(align=True)
-    apply.alert = alert
-    apply.operator("viewcam.apply_camera").camera = camera_object.name
+    row.operator("viewcam.apply_camera").camera = camera_object.name
     row.operator("viewcam.adopt_camera").camera = camera_object.name
 
 
@@ -179,6 +152,32 @@ def _draw_notice(
     if notice.remedy:
         operator, text = notice.remedy
         column.operator(operator, text=text, translate=False).camera = camera_object.name
+    if notice.is_mended_by_applying:
+        _draw_setting(panel_rows.buttons(column, context), camera_object)
+
+
+class _OptionsPanel(SubPanel):
+    bl_label = "Options"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return super().poll(context) and datablocks.camera_in(context).virtual_pinhole.enabled
+
+    def draw(self, context: bpy.types.Context) -> None:
+        camera_object, layout = datablocks.camera_in(context), self.layout
+        group = camera_object.virtual_pinhole
+        panel_rows.begin(layout, context, decorate=True)
+        column = layout.column()
+        zoomed = column.column()
+        zoomed.enabled = findings.DISTANCE not in causes.followed(camera_object)
+        panel_rows.field(zoomed, group, "zoom")
+        panel_rows.field(column, group, "keeps")
+        panel_rows.field(column, group, "pole")
+        if group.pole == "HOLD":
+            panel_rows.field(column, group, "hold_within")
+        _draw_setting(panel_rows.buttons(layout, context), camera_object)
+        baking.draw(layout, camera_object)
+        converting.draw(layout, camera_object)
 
 
 class _MovePanel(SubPanel):
@@ -309,6 +308,14 @@ class VIEWCAM_PT_sidebar(_MainPanel, InSidebar, bpy.types.Panel):
         return context.scene is not None
 
 
+class VIEWCAM_PT_data_options(_OptionsPanel, BelowProperties, bpy.types.Panel):
+    pass
+
+
+class VIEWCAM_PT_sidebar_options(_OptionsPanel, BelowSidebar, bpy.types.Panel):
+    pass
+
+
 class VIEWCAM_PT_data_move(_MovePanel, BelowProperties, bpy.types.Panel):
     pass
 
@@ -328,6 +335,8 @@ class VIEWCAM_PT_sidebar_readouts(_ReadOutsPanel, BelowSidebar, bpy.types.Panel)
 CLASSES = (
     VIEWCAM_PT_data,
     VIEWCAM_PT_sidebar,
+    VIEWCAM_PT_data_options,
+    VIEWCAM_PT_sidebar_options,
     VIEWCAM_PT_data_move,
     VIEWCAM_PT_sidebar_move,
     VIEWCAM_PT_data_readouts,

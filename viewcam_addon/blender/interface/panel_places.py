@@ -19,6 +19,7 @@ class SubPanel(CameraPanel):
     """One that is closed at first, below the panel Virtual Pinhole."""
 
     bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+    bl_order = 1  # after Proof, which is open
 
 
 class InProperties:

@@ -5,6 +5,7 @@ import bpy
 from . import readouts
 
 _NARROW = 250  # pixels
+_LABEL = 0.4  # of a row, as Blender splits it
 _BESIDE_TEXT = 60  # pixels, of what stands left and right of a sentence
 
 
@@ -48,6 +49,68 @@ def field(
         where.prop(owner, name, text=text)
     if is_dotted:
         row.column(align=True).prop_decorator(owner, name)
+
+
+def point(
+    column: bpy.types.UILayout,
+    owner: bpy.types.bpy_struct,
+    name: str,
+    is_free: bool,
+    followers: list[tuple[str, str, tuple[bpy.types.bpy_struct, str] | None]],
+) -> None:
+    """A point's three numbers, and beside them below its name what it may follow; in a narrow panel one below the other.
+
+    is_free : whether the numbers can be edited. followers : (property, name, `among` of `field`) of each.
+    """
+    if not column.use_property_split:
+        rows = column.column()
+        rows.enabled = is_free
+        field(rows, owner, name)
+        for follower, text, among in followers:
+            field(column, owner, follower, text=text, among=among)
+        return
+    left, right = named(column, owner.bl_rna.properties[name].name)
+    for follower, _, among in followers:
+        if among:
+            left.prop_search(owner, follower, *among, text="")
+        else:
+            left.prop(owner, follower, text="")
+    right.enabled = is_free
+    right.column(align=True).prop(owner, name, text="")
+    right.column(align=True).prop_decorator(owner, name)
+
+
+def named(column: bpy.types.UILayout, label: str) -> tuple[bpy.types.UILayout, bpy.types.UILayout]:
+    """A column that begins with a label, and the row beside it, which begins where all of a panel's do. Neither has dots."""
+    split = column.split(factor=_LABEL)
+    left, right = split.column(align=True), split.row(align=True)
+    heading = left.row()
+    heading.alignment = "RIGHT"
+    heading.label(text=label)
+    for each in (left, right):
+        each.use_property_split = each.use_property_decorate = False
+    return left, right
+
+
+def value(column: bpy.types.UILayout, owner: bpy.types.bpy_struct, name: str, unit: tuple[str, float] | None = None) -> None:
+    """A number beside its name, with its dot, or in a narrow panel below it.
+
+    unit : the property that chooses its unit, and the width that this has, in Blender's units.
+    """
+    if not column.use_property_split:
+        if unit:
+            column.label(text=owner.bl_rna.properties[name].name)
+        field(column, owner, name, text="" if unit else None)
+        if unit:
+            field(column, owner, unit[0], text="Unit")
+        return
+    _, row = named(column, owner.bl_rna.properties[name].name)
+    row.prop(owner, name, text="")
+    if unit:
+        chosen = row.row(align=True)
+        chosen.ui_units_x = unit[1]
+        chosen.prop(owner, unit[0], text="")
+    row.prop_decorator(owner, name)
 
 
 def buttons(column: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.UILayout:

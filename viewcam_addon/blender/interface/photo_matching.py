@@ -32,6 +32,7 @@ _AXES = "XYZ"
 _NEAR = 12  # pixels of the screen within which the mouse takes an end
 _SHORT = 8  # and a line that is shorter than this was a click
 _HANDLE, _LETTERS = 4, 13  # half a handle's size, and the letters', in points
+_TOOLS = 50  # points that the toolbar may take
 _HELP = {
     EDGES: "Drag along an edge, towards where its axis points   X Y Z: axis to draw, or to mend   Backspace: delete",
     RECTANGLE: "Click the corners: origin, along the first side, and around   Drag one to move it   Backspace: delete",
@@ -48,7 +49,8 @@ class Drawing:
     like : the camera as it was, whose picture it is. kind : EDGES, RECTANGLE or POINTS. axes : of the rectangle's sides.
     sides : their lengths. origin : of the rectangle, world space. places : of the points, world space.
     ends : pixels, two an edge, or one a corner or point. along : the axis of each edge. axis : of the next. exact : the largest
-    error of what is drawn, pixels of the picture.
+    error of what is drawn, pixels of the picture. is_lens_known : it stays as it was. length : world units, of the first edge,
+    which begins at the origin then; 0 where that is not known.
     """
 
     like: Pinhole
@@ -61,6 +63,8 @@ class Drawing:
     along: list[str] = field(default_factory=list)
     axis: str = "X"
     exact: float = 1.0
+    is_lens_known: bool = False
+    length: float = 0.0
     taken: int | None = None
 
     def press(self, place: Pair, reach: float, exact: float) -> None:
@@ -105,15 +109,17 @@ class Drawing:
 
     def match(self) -> photo_match.Match:
         """The camera that follows. Raises InputError as photo_match does."""
+        distance = self.like.distance[0] if self.is_lens_known else None
         if self.kind == EDGES:
             edges = [(axis, *self.ends[2 * i : 2 * i + 2]) for i, axis in enumerate(self.along)]
             whole = [edge for edge in edges if np.hypot(*np.subtract(edge[2], edge[1])) >= 1.0]
-            return photo_match.from_edges(whole, self.like, self.exact)
+            known = photo_match.KnownEdge(0, self.length, self.origin) if self.length > 0 else None
+            return photo_match.from_edges(whole, self.like, self.exact, distance, known)
         if self.kind == RECTANGLE:
             if len(self.ends) < 4:
                 raise InputError(f"the rectangle has {len(self.ends)} of 4 corners: click the next")
-            return photo_match.from_rectangle(self.ends, self.sides, self.like, self.exact, self.origin, self.axes)
-        return photo_match.from_points(self.places, self.ends, self.like, self.exact)
+            return photo_match.from_rectangle(self.ends, self.sides, self.like, self.exact, self.origin, self.axes, distance)
+        return photo_match.from_points(self.places, self.ends, self.like, self.exact, distance)
 
 
 def told(match: photo_match.Match, lens: float) -> list[str]:
@@ -121,7 +127,8 @@ def told(match: photo_match.Match, lens: float) -> list[str]:
     low, high = match.distance_between
     d = match.pinhole.distance[0]
     share = (high - low) / 2 / d
-    lines = [f"{lens:.4g} mm ± {100 * share:.2g} %,  d = {d:.5g} px ± {(high - low) / 2:.2g} px"]
+    size = f"{lens:.4g} mm ± {100 * share:.2g} %,  d = {d:.5g} px ± {(high - low) / 2:.2g} px"
+    lines = [size if high > low else f"{lens:.4g} mm as it was,  d = {d:.5g} px"]
     names = {"look_at": "look-at", "up": "roll", "distance": "lens", "eye": "eye"}
     lines.append("In the picture: " + ",  ".join(f"{names[name]} ± {value:.2g} px" for name, value in match.pixels.items()))
     if match.error:
@@ -136,7 +143,12 @@ class MatchSettings(bpy.types.PropertyGroup):
         name="From",
         description="What of the photo is known",
         items=(
-            (EDGES, "Edges", "Two or more edges along each of two or three axes. The camera turns and zooms, the eye stays"),
+            (
+                EDGES,
+                "Edges",
+                "Two or more edges along each of two or three axes. The camera turns and zooms; the eye stays, unless a length "
+                "is known",
+            ),
             (RECTANGLE, "Rectangle", "A rectangle of known sides, one corner of which is at the 3D cursor"),
             (POINTS, "Selected Objects", "Objects whose places are known: four in one plane, or six"),
         ),
@@ -154,6 +166,16 @@ class MatchSettings(bpy.types.PropertyGroup):
         size=2,
         default=(1.0, 1.0),
         min=1e-9,
+    )
+    is_lens_known: bpy.props.BoolProperty(
+        name="Keep the Lens", description="The camera has the photo's lens already, from its EXIF data: only the pose is asked"
+    )
+    length: bpy.props.FloatProperty(
+        name="First Edge",
+        description="Length of the edge that is drawn first, which begins at the 3D cursor: it says where the camera stands. "
+        "With 0 the eye stays where it is",
+        unit="LENGTH",
+        min=0.0,
     )
     precision: bpy.props.FloatProperty(
         name="Precision",
@@ -293,6 +315,7 @@ def begun(camera_object: bpy.types.Object | None, context: bpy.types.Context) ->
     if like.mirrored or like.distance[0] != like.distance[1]:
         raise InputError("the picture is mirrored or its pixels are not square: a photo's are neither")
     drawing = Drawing(like, settings.kind, settings.axes, tuple(settings.sides), tuple(scene.cursor.location))
+    drawing.is_lens_known, drawing.length = settings.is_lens_known, settings.length
     if drawing.kind == POINTS:
         chosen = [each for each in context.selected_objects if each != camera_object]
         drawing.places = tuple(tuple(each.matrix_world.translation) for each in chosen)
@@ -359,11 +382,13 @@ def _draw() -> None:
     gpu.state.blend_set("NONE")
     words = told(match.result, match.found.data.lens) if match.result else [match.sentence] if match.sentence else []
     blf.size(0, _LETTERS * scale)
-    for number, line in enumerate(words):
+    # Along the lower edge: above are the header, the names of view and camera, and left the tools.
+    x, y = max(left, _TOOLS * scale) + 10 * scale, max(bottom, 0.0) + 0.8 * _LETTERS * scale
+    for number, line in enumerate(reversed(words)):
         blf.enable(0, blf.SHADOW)
         blf.shadow(0, 3, 0.0, 0.0, 0.0, 1.0)
         blf.color(0, 1.0, 1.0, 1.0, 1.0)
-        blf.position(0, left + 10 * scale, top - (number + 1.6) * 1.6 * _LETTERS * scale, 0)
+        blf.position(0, x, y + 1.6 * number * _LETTERS * scale, 0)
         blf.draw(0, line)
         blf.disable(0, blf.SHADOW)
 
@@ -379,6 +404,9 @@ class VIEWCAM_PT_sidebar_match(SubPanel, BelowSidebar, bpy.types.Panel):
         if settings.kind == RECTANGLE:
             column.prop(settings, "sides")
             panel_rows.field(column, settings, "axes")
+        elif settings.kind == EDGES:
+            column.prop(settings, "length")
+        column.prop(settings, "is_lens_known")
         column.prop(settings, "precision")
         layout.operator("viewcam.match_photo", icon="CAMERA_DATA")
 

@@ -17,7 +17,7 @@ from ..render_settings import LEVELS
 from . import icons, panel_rows, proof_image
 from .background import Background, Cancels, StartsForCamera
 from .comparing import Outcome, RunningComparison
-from .panel_places import BelowProperties, BelowSidebar, SubPanel
+from .panel_places import BelowProperties, BelowSidebar, CameraPanel
 
 _SECONDS = 0.2  # between two looks
 _MOST_LACKING = 4  # objects that the panel names
@@ -199,12 +199,13 @@ class VIEWCAM_OT_open_report(bpy.types.Operator):
         return bpy.ops.wm.url_open(url=background.latest.report.absolute().as_uri())
 
 
-class _ProofPanel(SubPanel):
+class _ProofPanel(CameraPanel):
+    """The button and the last verdict, on show below the camera's values."""
+
     bl_label = "Proof"
 
     def draw(self, context: bpy.types.Context) -> None:
         camera_object = datablocks.camera_in(context)
-        _draw_settings(self.layout, context)
         if background.running:
             _draw_progress(self.layout)
         else:
@@ -213,6 +214,10 @@ class _ProofPanel(SubPanel):
             column = self.layout.column()
             column.active = background.running is None
             _draw_outcome(column, background.latest, camera_object, context)
+        header, body = self.layout.panel("viewcam_proof_settings", default_closed=True)
+        header.label(text="Settings")
+        if body:
+            _draw_settings(body, context)
 
 
 class VIEWCAM_PT_data_proof(_ProofPanel, BelowProperties, bpy.types.Panel):

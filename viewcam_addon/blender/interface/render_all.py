@@ -21,7 +21,7 @@ from .background_batch import BackgroundBatch, shot
 
 _SHEET = "contact-sheet.html"
 
-_sheet: Path | None = None  # the last contact sheet
+_sheet: Path | None = None  # the contact sheet of the last run, if it made one
 
 
 def _looked(outcome: tuple[bool, str] | None) -> None:
@@ -32,7 +32,8 @@ def _looked(outcome: tuple[bool, str] | None) -> None:
 
         def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
             menu.layout.label(text=sentence, translate=False)
-            menu.layout.operator("viewcam.open_contact_sheet", icon="URL")
+            if _sheet:
+                menu.layout.operator("viewcam.open_contact_sheet", icon="URL")
 
         bpy.context.window_manager.popup_menu(draw, title="Render All Cameras", icon="CHECKMARK" if well else "ERROR")
 
@@ -85,7 +86,7 @@ class Rendering(BackgroundBatch):
         ended = self.ended()
         if ended is None:
             return None
-        _sheet = self.sheet if self.sheet.is_file() else _sheet
+        _sheet = self.sheet if self.sheet.is_file() else None
         status, sentence = ended
         if status == 0:
             return True, f"{self.count} picture{'s' if self.count > 1 else ''} in {self.folder}"

@@ -184,19 +184,17 @@ def draw_header(layout: bpy.types.UILayout, camera_object: bpy.types.Object, con
     """Which camera it is about, the way to the others, and whether it is the scene's."""
     layout = layout.column()
     layout.use_property_split = layout.use_property_decorate = False
-    row = layout.row(align=True)
-    row.operator("viewcam.step_camera", text="", icon="TRIA_LEFT").step = -1
-    row.prop(camera_object, "name", text="", icon="CAMERA_DATA")
-    row.operator("viewcam.step_camera", text="", icon="TRIA_RIGHT").step = 1
-    row.operator("viewcam.add_camera", text="", icon="ADD")
-    if (active := context.active_object) and active != camera_object and getattr(context, "camera", None) is None:
-        panel_rows.sentence(layout, context, f"The scene's camera; {active.name} is active", "INFO")
-    row = layout.row(align=True)
-    if camera_object == context.scene.camera:
-        if active == camera_object:
-            row.label(text="The scene's camera", icon="RADIOBUT_ON")
-    else:
-        row.operator("viewcam.make_camera_active", icon="RADIOBUT_OFF").camera = camera_object.name
+    is_scenes = camera_object == context.scene.camera
+    if getattr(context, "camera", None) is None:  # else Blender has its name above
+        row = layout.row(align=True)
+        row.operator("viewcam.step_camera", text="", icon="TRIA_LEFT").step = -1
+        row.prop(camera_object, "name", text="", icon="VIEW_CAMERA" if is_scenes else "CAMERA_DATA")
+        row.operator("viewcam.step_camera", text="", icon="TRIA_RIGHT").step = 1
+        row.operator("viewcam.add_camera", text="", icon="ADD")
+        if (active := context.active_object) and active != camera_object:
+            panel_rows.sentence(layout, context, f"The scene's camera; {active.name} is active", "INFO")
+    if not is_scenes:
+        layout.operator("viewcam.make_camera_active", icon="RADIOBUT_OFF").camera = camera_object.name
 
 
 def draw_none(layout: bpy.types.UILayout) -> None:

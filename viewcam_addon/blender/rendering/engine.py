@@ -8,8 +8,10 @@ Level `geometry` knows no light: its Combined shows surfaces as a lamp at the ey
 What is prepared for one picture serves all passes of a frame, and the next frames as well where Blender's "Persistent Data" is
 on, which keeps the engine. The scene is read anew for each, except in a batch (`keeps_scene`).
 
-Rejected: drawing in the viewport, which wants a quick preview where this engine is a reference; a result that is begun once and
-updated, which Blender would copy whole for each band of rows.
+In the viewport's Rendered shading live_view.py traces; here it is told of scene and view, and its picture is drawn. The scene
+is read as the viewport's graph has it, whenever Blender tells of a change of more than cameras.
+
+Rejected: a result that is begun once and updated, which Blender would copy whole for each band of rows.
 """
 
 import time
@@ -18,11 +20,10 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import errors
 from ...errors import InputError
-from ...image import BACKGROUND_DEPTH, CHANNELS, GEOMETRY_PASSES, SETTINGS
+from ...image import CHANNELS, GEOMETRY_PASSES, SETTINGS
 from ...terminal import plain
 from ...tracer.scene import Scene
 from ...tracer.scene.film import LEVELS
@@ -32,7 +33,8 @@ from .. import datablocks, versions
 from ..scenes import export
 from ..scenes.depsgraph import only_cameras_changed
 from ..scenes.ledger import Ledger
-from . import tracing
+from . import live_view, tracing
+from .live_view import LiveView, camera_of, lit_from_the_eye
 
 _GEOMETRY = LEVELS[0]
 
@@ -51,6 +53,10 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
     warnings: tuple[str, ...] = ()
     _keeper = None
     _read = None  # what it was read for, and the scene
+    # Of a viewport: what traces it, what it is asked to show, and what was drawn last as a texture, with its number.
+    _live: LiveView | None = None
+    _shown: tuple | None = None
+    _texture: tuple | None = None
 
     def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
         for name in _asked_for(scene, renderlayer):
@@ -68,6 +74,60 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         finally:
             if not depsgraph.scene.render.use_persistent_data:  # else Blender keeps this engine for the next frame
                 self._keeper = self._read = None
+
+    def view_update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """The scene has changed: it is read anew as it is drawn next."""
+        if depsgraph.id_type_updated("SCENE") or not only_cameras_changed(depsgraph):
+            self._read = None
+
+    def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        try:
+            self._show_view(context, depsgraph)
+        except InputError as error:
+            self.update_stats("", datablocks.sentence(error))
+        except Exception as error:  # Blender would print a traceback at each draw
+            self.update_stats("", f"Virtual Pinhole: {errors.bug(error)}")
+
+    def _show_view(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        settings, space = depsgraph.scene_eval.virtual_pinhole_reference, context.space_data
+        camera = camera_of(context.region, context.region_data)
+        clip = space.clip_start, space.clip_end
+        lit = settings.level != "GEOMETRY"
+        if self._read is None or self._read[0] != lit:
+            self._read = lit, export.scene_through(depsgraph, camera, clip, Ledger(), lit)
+            self._shown = None
+        scene = self._read[1]
+        level = least_level(scene)[0] if settings.level == "AUTO" else settings.level.lower()
+        asked = camera, clip, level, settings.samples, settings.clay
+        self._live = self._live or LiveView()
+        if asked != self._shown:
+            self._shown, scene = asked, replace(scene, camera=camera, clip=clip)
+            self._live.show(_of_clay(scene) if settings.clay else scene, level, settings.samples)
+        self._draw_picture(self._live, context, depsgraph.scene)
+
+    def _draw_picture(self, live: LiveView, context: bpy.types.Context, scene: bpy.types.Scene) -> None:
+        """Draw the latest picture over the region."""
+        import gpu
+        from gpu_extras.presets import draw_texture_2d
+
+        live.drawn, picture = live.number, live.picture
+        words = f"{live.samples} samples" if live.samples else "Surfaces"
+        self.update_stats("", live.message or words)
+        if picture is None:
+            return
+        if self._texture is None or self._texture[0] is not picture:
+            height, width, _ = picture.shape
+            pixels = gpu.types.Buffer("FLOAT", picture.size, picture.ravel())
+            self._texture = picture, gpu.types.GPUTexture((width, height), format="RGBA16F", data=pixels)
+        gpu.state.blend_set("ALPHA_PREMULT")
+        self.bind_display_space_shader(scene)
+        draw_texture_2d(self._texture[1], (0, 0), context.region.width, context.region.height)
+        self.unbind_display_space_shader()
+        gpu.state.blend_set("NONE")
+
+    def __del__(self) -> None:
+        if self._live:
+            self._live.close()
 
     def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
         self.update_stats("", "Reading the scene")
@@ -91,8 +151,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
             raise InputError("stereoscopy is on, and each eye has another camera: turn it off among the output properties")
         settings, camera_object = depsgraph.scene_eval.virtual_pinhole_reference, self.camera_override.original
         scene = self._read_scene(depsgraph, camera_object, settings.level != "GEOMETRY")
-        if settings.clay:
-            scene = replace(scene, objects=tuple(replace(placed, materials=()) for placed in scene.objects))
+        scene = _of_clay(scene) if settings.clay else scene
         frame = datablocks.frame_of(depsgraph.scene)
         if frame.border and not frame.crop:
             scene = replace(scene, camera=scene.camera.cropped(*replace(frame, crop=True).window))
@@ -130,7 +189,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         for passes, rows in traced(level):
             band = {name: values[rows.start : rows.stop] for name, values in (centres | passes).items()}
             if level == _GEOMETRY:
-                band["Combined"] = _lit_from_the_eye(band)
+                band["Combined"] = lit_from_the_eye(band)
             yield band, rows
 
     def _show(self, depsgraph: bpy.types.Depsgraph, band: Passes, rows: range) -> None:
@@ -144,10 +203,8 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         self.end_result(result)
 
 
-def _lit_from_the_eye(passes: Passes) -> NDArray[np.float32]:
-    """The Combined pass of level geometry, (height, width, 4): transparent where nothing is."""
-    hit = (passes["Depth"] < BACKGROUND_DEPTH).astype(np.float32)
-    return np.concatenate([passes["Facing"]] * 3 + [hit], axis=-1)
+def _of_clay(scene: Scene) -> Scene:
+    return replace(scene, objects=tuple(replace(placed, materials=()) for placed in scene.objects))
 
 
 def _asked_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Iterator[str]:
@@ -158,3 +215,4 @@ def _asked_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Itera
 
 
 CLASSES = (VIEWCAM_RenderEngine,)
+unregister = live_view.unregister

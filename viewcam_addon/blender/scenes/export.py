@@ -19,6 +19,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...pinhole import Pinhole
 from ...tracer.scene import Mesh, Object, Scene, Spheres
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Lamp, World
@@ -156,6 +157,17 @@ def light_in(
 
 def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False) -> Scene:
     """The scene in the depsgraph that a render engine is given. lit : as in `export_scene`."""
+    return _scene(depsgraph, _view_in(depsgraph, camera_object), ledger, lit)
+
+
+def scene_through(
+    depsgraph: bpy.types.Depsgraph, camera: Pinhole, clip: tuple[float, float], ledger: Ledger, lit: bool = False
+) -> Scene:
+    """The scene in a depsgraph, through a camera that no object of it is, as a viewport's. lit : as in `export_scene`."""
+    return _scene(depsgraph, {"camera": camera, "stated_camera": None, "clip": clip}, ledger, lit)
+
+
+def _scene(depsgraph: bpy.types.Depsgraph, view: dict[str, object], ledger: Ledger, lit: bool) -> Scene:
     shading = Shading() if lit else None
     names: dict[tuple[int, int], str] = {}
     geometries: dict[str, Mesh | Spheres] = {}
@@ -175,7 +187,7 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
     _note_doubles(objects, geometries, ledger)
     surfaces = {placed.name for placed in objects}
     return Scene(
-        **_view_in(depsgraph, camera_object),
+        **view,
         geometries={name: geometries[name] for name in dict.fromkeys(placed.geometry for placed in objects)},
         objects=linking.among(objects, surfaces),
         **(_shown_by_light(depsgraph, ledger, shading, surfaces) if shading else {}),

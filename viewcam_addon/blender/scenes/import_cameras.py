@@ -3,6 +3,10 @@
 All of it or nothing: whatever has been made and set is taken back if anything fails. What the artist has set stays, unless
 asked: the scene's camera if it has one, and its size, into which each camera is fitted (picture.py).
 
+The photograph of a camera with a lens is shown without it: as an undistorted copy in the .blend, no larger than a screen.
+Rejected: a movie clip with Blender's own tracking camera, which undistorts to 0.03 pixels, but has no fisheyes, and takes the
+number in a file's name for a frame: at another frame of the scene it shows another camera's photograph.
+
 A flight is plain keyframes of location, rotation and lens, as Bake writes them. Rejected: curves of the four values, which hold
 eye and look-at in float32 each, and the direction between them in fewer digits.
 """
@@ -17,13 +21,14 @@ import bpy
 import numpy as np
 
 from ... import intrinsics, rotation
-from ...cameras import Camera
+from ...cameras import Camera, undistortion
 from ...cameras.naming import picture_of
 from ...errors import InputError
 from .. import camera as cameras
 from .. import datablocks, picture, pose, versions
 from ..temporary_settings import Overrides
 
+_WIDEST = 2048  # pixels of an undistorted copy along its longer side, which takes two seconds
 _OF_DATA = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height")
 
 
@@ -170,6 +175,8 @@ class _CameraImport:
     def _show(self, block: bpy.types.Object, camera: Camera, folder: Path) -> bool:
         """Give the camera its picture as background, if there is one."""
         image = self._packed(camera) if camera.picture is not None else self._loaded(camera, folder)
+        if image is not None and camera.lens is not None:
+            image = self._undistorted(camera, image)
         if image is None:
             return False
         background = block.data.background_images.new()
@@ -182,6 +189,27 @@ class _CameraImport:
         background.frame_method = "CROP" if is_higher else "FIT"
         block.data.show_background_images = True
         return True
+
+    def _undistorted(self, camera: Camera, photograph: bpy.types.Image) -> bpy.types.Image | None:
+        """A copy of the photograph as the pinhole sees it; None where it is of another size than its camera."""
+        plane, lens = camera.pinhole.plane, camera.lens
+        if tuple(photograph.size) != (plane.width, plane.height):
+            size = " × ".join(map(str, photograph.size))
+            self._note(
+                [f"{camera.name}: its picture has {size} pixels and its camera {plane.width} × {plane.height}: it is not shown"]
+            )
+            return None
+        pixels = np.empty((plane.height, plane.width, 4), np.float32)
+        photograph.pixels.foreach_get(pixels.ravel())
+        seen = undistortion.of_screen(pixels[::-1], lens, plane, _WIDEST)
+        copy = bpy.data.images.new(
+            f"{camera.name} undistorted", seen.shape[1], seen.shape[0], alpha=True, float_buffer=photograph.is_float
+        )
+        self._overrides.afterwards(bpy.data.batch_remove, [copy])
+        copy.colorspace_settings.name = photograph.colorspace_settings.name
+        copy.pixels.foreach_set(np.ascontiguousarray(seen[::-1]).ravel())
+        copy.pack()
+        return copy
 
     def _packed(self, camera: Camera) -> bpy.types.Image:
         image = bpy.data.images.new(camera.name, camera.pinhole.width, camera.pinhole.height)

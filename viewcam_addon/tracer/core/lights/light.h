@@ -22,6 +22,7 @@ class Light {
     bool multiple_importance = true;  // whether rays run into it, where it has a size
     uint64_t receivers;
     RayKind shadow_rays;
+    uint32_t number = NONE;  // of lamps, in the scene
 
     // part: one number more in [0, 1), of those that have parts.
     LightSample sample_li(const Interaction& from, double part, Vec2 u) const {
@@ -38,7 +39,7 @@ class Light {
     }
     // The same of some of four points, of which point_of(i) tells all.
     template <class PointOf>
-    LightSampleOf<double4> sample_li(const SurfacePoint<double4>& from, const PointOf& point_of, unsigned lanes, double4 part, Vec2x4 u) const {
+    LightSampleOf<double4> sample_li(const SurfacePoint<double4>& from, const PointOf& point_of, unsigned lanes, double4 part, const Vec2x4& u) const {
         return std::visit(
             [&](const auto& light) {
                 if constexpr (requires { light.sample_li(from, u); })

@@ -38,7 +38,7 @@ class LightSampler {
         unsigned lanes = 0;
 
         // The samples of these lights. point_of(i): all that is known of a point.
-        template <class PointOf> LightSampleOf<double4> sample_li(const SurfacePoint<double4>& from, const PointOf& point_of, Vec2x4 u) const {
+        template <class PointOf> LightSampleOf<double4> sample_li(const SurfacePoint<double4>& from, const PointOf& point_of, const Vec2x4& u) const {
             LightSampleOf<double4> samples;
             for (unsigned left = lanes; left;) {
                 const Light* first = light[std::countr_zero(left)];
@@ -64,6 +64,7 @@ class LightSampler {
         for (const Lamp& lamp : given.lamps) {
             linked_ |= lamp.receivers != EVERYTHING;
             Light light = light_of(lamp, &scene);
+            light.number = uint32_t(&lamp - given.lamps.data());
             (lit & ~lamp.hidden_from ? lights_ : unlit).push_back(light);
         }
         if (environment_->has_image() && lit & ~environment_->hidden_from) {
@@ -105,23 +106,16 @@ class LightSampler {
         if (sky_ == NONE || pdf == INFINITE || is_black(radiance)) return radiance;
         return radiance * power_heuristic(pdf, environment_->pdf_li(direction) * chance(from, sky_, seen, through));
     }
-    // The same of a ray that a surface has scattered with a density, where that light may have been found from there, too. seen,
-    // through: as in `choose`.
-    Vec3 le(const LightRay& ray, RayKind kind, const Interaction& from, double pdf, bool seen, bool through) const {
-        Vec3 sum;
-        each_met(ray, kind, [&](uint32_t light, Vec3 radiance, double) {
-            if (lights_[light].shadow_rays == SHADOW) sum += radiance * share(light, ray, from, pdf, seen, through);
-        });
-        return sum;
-    }
-    // The same of lamps that have blockers of their own, but for what stands before them: calls visit(lamp, radiance, distance).
-    bool is_shadow_linked() const { return shadow_linked_; }
-    template <class Visit> void each_shadow_linked(const LightRay& ray, RayKind kind, const Interaction& from, double pdf, bool seen, bool through, const Visit& visit) const {
-        if (!shadow_linked_ || !meets_lamps(kind)) return;
+    // Calls visit(lamp, radiance, distance) for the lamps that such a ray runs through, with what counts of each where it may have been
+    // found from there, too, but for what stands before it.
+    template <class Visit> void each_lamp(const LightRay& ray, RayKind kind, const Interaction& from, double pdf, bool seen, bool through, const Visit& visit) const {
+        if (!meets_lamps(kind)) return;
         each_met(ray, kind, [&](uint32_t light, Vec3 radiance, double distance) {
-            if (lights_[light].shadow_rays != SHADOW) visit(lights_[light], radiance * share(light, ray, from, pdf, seen, through), distance);
+            visit(lights_[light], radiance * share(light, ray, from, pdf, seen, through), distance);
         });
     }
+    // Whether rays run into lamps that have blockers of their own.
+    bool is_shadow_linked() const { return shadow_linked_; }
 
     // Whether the receivers of a light, or of an object that shines, are all, or what a point is of is one of them.
     template <class Linked> bool reaches(const Linked& light, const Interaction& point) const {
@@ -132,6 +126,7 @@ class LightSampler {
 
     // How many lights surfaces can be lit by, and whether what they get depends on chance.
     int count() const { return count_; }
+    bool has_sky() const { return sky_ != NONE; }  // among them
     bool has_meshes() const { return size_t(count_) > lamps_; }
     bool is_random() const { return random_; }
     // Whether rays of a kind run into lamps.

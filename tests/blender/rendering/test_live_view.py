@@ -1,0 +1,124 @@
+"""The viewport's picture: surfaces at once, then light that refines, of whatever was asked for last."""
+
+import threading
+import time
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender.rendering import live_view
+from viewcam_addon.blender.scenes import export
+from viewcam_addon.blender.scenes.ledger import Ledger
+from viewcam_addon.errors import InputError
+from viewcam_addon.tracer.render import render
+
+CLIP = (0.1, 100.0)
+PATIENCE = 60  # seconds, of a busy machine
+
+
+@pytest.fixture
+def live(fresh_blender):
+    result = live_view.LiveView()
+    yield result
+    result.close()
+    live_view.unregister()
+
+
+@pytest.fixture
+def lit(posed_camera, scene, monkey):
+    """Suzanne under a grey sky, as a viewport of 48 × 32 sees it."""
+    scene.world = bpy.data.worlds.new("Sky")
+    scene.render.resolution_x, scene.render.resolution_y = 48, 32
+    bpy.context.view_layer.update()
+    camera = cameras.read(posed_camera, scene)
+    return export.scene_through(bpy.context.evaluated_depsgraph_get(), camera, CLIP, Ledger(), True)
+
+
+def until(condition):
+    ends = time.monotonic() + PATIENCE
+    while not condition() and time.monotonic() < ends:
+        time.sleep(0.002)
+    assert condition(), "it does not come to it"
+
+
+def test_surfaces_come_first_and_then_light_up_to_the_samples_asked_for(live, lit):
+    seen = []
+    publish = live._publish
+    live._publish = lambda picture, samples, message="": (seen.append(samples), publish(picture, samples, message))
+    live.show(lit, "path", 64)
+    until(lambda: live.samples == 64)
+    assert seen == [0, 1, 2, 4, 8, 16, 32, 64]
+    whole = render(lit, "path", 64)["Combined"]
+    assert live.picture.shape == whole.shape and live.picture.dtype == np.float32
+    # Both are means of 64 samples of other seeds, of light between 0 and 1 or so: of 1536 pixels the mean is far closer.
+    assert np.abs((live.picture - whole).mean()) < 0.01
+    live.drawn = live.number
+    until(lambda: live.is_settled)
+
+
+def test_at_level_geometry_the_picture_is_the_engine_s_own(live, lit):
+    live.show(lit, "geometry", 64)
+    until(lambda: live.number == 1)
+    np.testing.assert_array_equal(live.picture, live_view.lit_from_the_eye(render(lit, "geometry")))
+
+
+def test_what_is_asked_for_last_ends_what_is_under_way(live, lit):
+    live.show(lit, "path", 2**20)
+    until(lambda: live.samples > 0)
+    wide = replace(lit, camera=lit.camera.resized(64, 40))
+    live.show(wide, "geometry", 1)
+    until(lambda: live.picture.shape == (40, 64, 4))
+    number = live.number
+    time.sleep(0.2)
+    assert (live.number, live.samples) == (number, 0), "the light of the former view goes on"
+
+
+def test_what_can_not_be_traced_is_told_and_the_next_is_shown(live, lit):
+    trace = live._trace
+
+    def fails(*_):
+        raise InputError("the scene needs more memory than there is")
+
+    live._trace = fails
+    live.show(lit, "path", 1)
+    until(lambda: live.message == "the scene needs more memory than there is")
+    live._trace = trace
+    live.show(lit, "path", 2)
+    until(lambda: live.samples == 2)
+    assert not live.message
+
+
+def test_a_view_that_is_closed_leaves_no_thread(fresh_blender, lit):
+    before = threading.active_count()
+    view = live_view.LiveView()
+    view.show(lit, "path", 2**20)
+    until(lambda: view.samples > 0)
+    view.close()
+    until(lambda: threading.active_count() == before)
+    assert view.is_settled
+
+
+def test_the_camera_of_a_viewport_is_that_of_the_matrices_it_is_drawn_with(posed_camera, scene):
+    scene.render.resolution_x, scene.render.resolution_y = 320, 200
+    posed_camera.data.shift_x, posed_camera.data.shift_y = 0.1, -0.05
+    bpy.context.view_layer.update()
+    matrix = posed_camera.calc_matrix_camera(bpy.context.evaluated_depsgraph_get(), x=320, y=200)
+    pose = posed_camera.matrix_world.inverted()
+    region, view = (
+        SimpleNamespace(width=320, height=200),
+        SimpleNamespace(window_matrix=matrix, view_matrix=pose, is_perspective=True),
+    )
+    found, expected = live_view.camera_of(region, view), cameras.read(posed_camera, scene)
+    # float32: the matrices, and of coordinates below 10 their inverse.
+    np.testing.assert_allclose(found.eye, expected.eye, atol=1e-5)
+    np.testing.assert_allclose(found.basis(), expected.basis(), atol=1e-6)
+    np.testing.assert_allclose(found.distance, expected.distance, rtol=1e-6)
+    np.testing.assert_allclose(found.principal_point, expected.principal_point, atol=1e-4)
+    view.is_perspective = False
+    with pytest.raises(InputError, match="orthographic, no pinhole"):
+        live_view.camera_of(region, view)

@@ -1,0 +1,166 @@
+"""The picture of a viewport, traced in a thread: surfaces at once, then light that refines, anew for each scene and view.
+
+Blender asks an engine to draw whenever its viewport is drawn, and must not wait for it: `LiveView.show` only says what shall be
+seen, and `picture` is what has come of it by then. What is asked for last ends what is under way. Hierarchies are kept from one
+view to the next (tracer/render.py).
+
+The camera is that of the matrices with which Blender draws, so that outlines and handles lie on what is traced.
+
+Rejected: a child process (the scene would have to be written for each change), and coarse pictures first (at level `geometry`
+a whole one takes less than a twentieth of a second).
+"""
+
+import contextlib
+import threading
+from typing import TYPE_CHECKING, ClassVar
+from weakref import WeakSet
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...image import BACKGROUND_DEPTH
+from ...pinhole import Pinhole
+from ...rotation import float64
+from ...tracer.scene import Scene
+from ...tracer.scene.film import LEVELS
+from ...tracer.tiles import Passes, Stopped
+
+if TYPE_CHECKING:
+    from ...tracer.render import Keeper
+
+Picture = NDArray[np.float32]
+
+_GEOMETRY = LEVELS[0]
+_SECONDS = 1 / 30  # between two looks whether there is another picture
+
+
+class LiveView:
+    """The picture of one viewport.
+
+    picture : (height, width, 4) float32, scene linear, rows from the bottom; None until there is one. number : of the picture,
+    which counts them. samples : of light that it has, 0 where it shows surfaces. message : why there is none.
+    """
+
+    _all: ClassVar[WeakSet["LiveView"]] = WeakSet()
+
+    def __init__(self) -> None:
+        self.picture: Picture | None = None
+        self.number, self.drawn, self.samples, self.message = 0, 0, 0, ""
+        self._asked = threading.Condition()
+        self._next: tuple[Scene, str, int] | None = None
+        self._is_at_work = self._is_closed = False
+        self._all.add(self)
+        threading.Thread(target=self._work, name="viewcam view", daemon=True).start()
+
+    def show(self, scene: Scene, level: str, samples: int) -> None:
+        """Begin with another picture. samples : of light, at most."""
+        with self._asked:
+            self._next, self._is_at_work = (scene, level, samples), True
+            self._asked.notify()
+        if not bpy.app.timers.is_registered(_redraw):
+            bpy.app.timers.register(_redraw, first_interval=_SECONDS)
+
+    def close(self) -> None:
+        """End the thread."""
+        with self._asked:
+            self._is_closed = True
+            self._asked.notify()
+
+    @property
+    def is_settled(self) -> bool:
+        """True if the picture that is drawn is the last that there will be."""
+        return self._is_closed or (not self._is_at_work and self.drawn == self.number)
+
+    def tile(self, passes: Passes, rows: range) -> None:
+        """Nothing: pictures are shown whole."""
+
+    def stop(self) -> bool:
+        """True if something else is asked for."""
+        return self._next is not None or self._is_closed
+
+    def _work(self) -> None:
+        from ...tracer.render import Keeper  # loads the tracer, which Blender's start need not wait for
+
+        keeper = Keeper()
+        while True:
+            with self._asked:
+                self._is_at_work = self._next is not None
+                self._asked.wait_for(self.stop)
+                if self._is_closed or self._next is None:
+                    return
+                (scene, level, samples), self._next = self._next, None
+                self._is_at_work = True
+            with contextlib.suppress(Stopped):
+                try:
+                    self._trace(scene, level, samples, keeper)
+                except InputError as error:
+                    self._publish(None, 0, str(error))
+
+    def _trace(self, scene: Scene, level: str, samples: int, keeper: "Keeper") -> None:
+        tracer = keeper.tracer(scene)
+        surfaces = tracer.render(self, ("Depth", "Facing"))
+        self._publish(lit_from_the_eye(surfaces), 0)
+        if level == _GEOMETRY:
+            return
+        total, done = np.zeros((), np.float64), 0
+        while done < samples:
+            more = min(max(1, done), samples - done)  # each picture has twice as many as the one before
+            light = tracer.render_light(level, more, done, self)["Combined"]
+            total, done = total + more * light.astype(np.float64), done + more
+            self._publish((total / done).astype(np.float32), done)
+
+    def _publish(self, picture: Picture | None, samples: int, message: str = "") -> None:
+        if picture is not None:
+            self.picture = np.ascontiguousarray(picture, np.float32)
+        self.samples, self.message = samples, message
+        self.number += 1
+
+
+def lit_from_the_eye(passes: Passes) -> Picture:
+    """The Combined pass of level geometry, (height, width, 4): transparent where nothing is."""
+    hit = (passes["Depth"] < BACKGROUND_DEPTH).astype(np.float32)
+    return np.concatenate([passes["Facing"]] * 3 + [hit], axis=-1)
+
+
+def camera_of(region: bpy.types.Region, view: bpy.types.RegionView3D) -> Pinhole:
+    """The pinhole with which a viewport is drawn, its picture the region.
+
+    Raises
+    ------
+    InputError
+        if the view is orthographic.
+    """
+    if not view.is_perspective:
+        raise InputError("the viewport is orthographic, no pinhole: switch it to perspective")
+    to_picture, pose = float64(view.window_matrix), np.linalg.inv(float64(view.view_matrix))
+    size = np.array([region.width, region.height])
+    eye, w, v = pose[:3, 3], pose[:3, 2], pose[:3, 1]
+    return Pinhole(
+        tuple(eye.tolist()),
+        tuple((eye - w).tolist()),
+        tuple(v.tolist()),
+        tuple((to_picture[[0, 1], [0, 1]] * size / 2).tolist()),
+        region.width,
+        region.height,
+        tuple(((1 - to_picture[:2, 2]) * size / 2).tolist()),
+    )
+
+
+def _redraw() -> float | None:
+    """Have the viewports that show pictures drawn where there are others; called by a timer while any may come."""
+    if any(each.drawn != each.number for each in LiveView._all):
+        for window in bpy.context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "VIEW_3D" and area.spaces.active.shading.type == "RENDERED":
+                    area.tag_redraw()
+    return None if all(each.is_settled for each in LiveView._all) else _SECONDS
+
+
+def unregister() -> None:
+    """End all threads."""
+    for each in list(LiveView._all):
+        each.close()
+    if bpy.app.timers.is_registered(_redraw):
+        bpy.app.timers.unregister(_redraw)
