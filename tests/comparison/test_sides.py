@@ -62,13 +62,33 @@ def test_only_what_all_pictures_have_is_compared():
     assert names == ["Combined", "Alpha", "Emission"]
 
 
-def test_a_quantity_has_no_noise_where_the_picture_and_its_surroundings_have_none():
+def test_a_quantity_has_no_noise_where_it_is_all_of_a_picture_that_has_none_there_and_around():
     variance = np.zeros((*SHAPE, 3), np.float32)
     variance[0, 0] = 1.0
-    three = drawn(3)
-    found = sides(picture(Variance=variance, Emission=three), [picture(Emission=three)], "Emission")
-    assert np.isinf(found.variance[:2, :2]).all()
-    assert (found.variance[2:] == 0).all() and (found.variance[:, 2:] == 0).all()
+    combined = drawn(4)
+    glowing = {"combined": combined, "Emission": combined[..., :3] * np.float32(1 + 2**-22)}
+    for name in ("Emission", "Environment"):
+        black = {"Environment": np.zeros((*SHAPE, 3), np.float32)}
+        found = sides(picture(Variance=variance, **glowing, **black), [picture(**glowing, **black)], name)
+        assert np.isinf(found.variance[:2, :2]).all()
+        assert (found.variance[2:] == 0).all() and (found.variance[:, 2:] == 0).all()
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_passes_that_may_trade_their_light_have_noise_though_their_sum_has_none(side):
+    """A ray in sixteen goes on to glass that shines as brightly as the world: what was direct is indirect, on either side."""
+    white = np.ones((*SHAPE, 3), np.float32)
+    direct, indirect = [white.copy(), white.copy()], [0 * white, 0 * white]
+    direct[side][2, 2], indirect[side][2, 2] = 15 / 16, 1 / 16
+    reference, test = (
+        picture(np.ones((*SHAPE, 4), np.float32), Diffuse_Direct=a, Diffuse_Indirect=b, Diffuse_Color=white, **more)
+        for a, b, more in zip(direct, indirect, ({"Variance": 0 * white}, {}), strict=True)
+    )
+    traded = np.zeros(SHAPE, bool)
+    traded[2, 2] = True
+    for name in ("Diffuse Direct", "Diffuse Indirect"):
+        found = sides(reference, [test, test], name)
+        assert np.isinf(found.variance[traded]).all() and not found.variance[~traded].any()
 
 
 def test_roundings_are_no_noise_and_more_is():

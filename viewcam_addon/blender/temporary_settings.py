@@ -8,7 +8,7 @@ Rejected: a copy of the scene to change freely (rigid bodies, caches and drivers
 """
 
 import contextlib
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Hashable, Iterator
 from typing import Any, TypeVar
 
 import bpy
@@ -20,11 +20,15 @@ LARGEST_INDEX = 32767
 
 
 class Overrides:
-    """Sets what is Blender's for a while, and remembers how to restore it."""
+    """Sets what is Blender's for a while, and remembers how to restore it.
 
-    def __init__(self, stack: contextlib.ExitStack) -> None:
+    lasting : the overrides of all renders that this one is of, which end after it; by default these themselves.
+    """
+
+    def __init__(self, stack: contextlib.ExitStack, lasting: "Overrides | None" = None) -> None:
         self._stack = stack
-        self._made: dict[Callable[..., Any], Any] = {}
+        self._made: dict[Hashable, Any] = {}
+        self.lasting = lasting or self
 
     def set(self, owner: bpy.types.bpy_struct, name: str, value: Any) -> None:
         """Set a property until the overrides end."""
@@ -35,11 +39,17 @@ class Overrides:
             self.afterwards(setattr, owner, name, before)
             setattr(owner, name, value)
 
-    def shared(self, make: Callable[["Overrides"], Made]) -> Made:
-        """The result of `make(overrides)` while the overrides last: the same for all who ask, made for the first."""
-        if make not in self._made:
-            self._made[make] = make(self)
-        return self._made[make]
+    def shared(self, make: Callable[..., Made], *arguments: Hashable) -> Made:
+        """The result of `make(overrides, *arguments)` while the overrides last, made for the first who asks."""
+        key = make, *arguments
+        if key not in self._made:
+            self._made[key] = make(self, *arguments)
+        return self._made[key]
+
+    @property
+    def is_shared(self) -> bool:
+        """True if anything is."""
+        return bool(self._made)
 
     def enter(self, context: contextlib.AbstractContextManager) -> None:
         """Enter a context, and leave it when the overrides end."""
@@ -51,10 +61,10 @@ class Overrides:
 
 
 @contextlib.contextmanager
-def overridden() -> Iterator[Overrides]:
-    """Give overrides; at the end of the block everything is as it was."""
+def overridden(lasting: Overrides | None = None) -> Iterator[Overrides]:
+    """Give overrides; at the end of the block everything is as it was. lasting : as of Overrides."""
     with contextlib.ExitStack() as stack:
-        yield Overrides(stack)
+        yield Overrides(stack, lasting)
 
 
 def still_of_one_layer(

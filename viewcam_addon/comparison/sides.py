@@ -3,7 +3,8 @@ of both.
 
 Several test pictures are one picture rendered with several seeds: their mean is the test, and their spread tells its noise. The
 reference brings the variance of its Combined pass along. Of the other passes only the spread is known, and that the reference
-has none where its Combined has none: a sum of light that never changes has no part that does.
+has none where its Combined has none and is one pass's light alone. A sum of several may never change while they do: where rays
+go on to glass that shines as brightly as the world, light that is direct once is indirect another time.
 
 Cycles divides Diffuse Direct and Diffuse Indirect by the surface's colour, each a mean over the pixel: a quotient of means,
 which on edges depends on the number of samples. So their products with Diffuse Color are compared, the light itself.
@@ -22,6 +23,7 @@ from .tolerances import FLOAT32, Array
 
 QUANTITIES = ("Combined", "Alpha", *(name for name in LIGHT_PASSES if name in SETTINGS))
 _TIMES_COLOUR = ("Diffuse Direct", "Diffuse Indirect")
+_LIGHT = ("Emission", "Environment", *_TIMES_COLOUR)
 CHANNEL_NAMES = ("red", "green", "blue")
 
 # A standard error below so many roundings of float32 of the value itself is no noise but rounding.
@@ -88,11 +90,26 @@ def all_sides(reference: Image, tests: Sequence[Image]) -> Iterator[Sides]:
     shared = np.where(np.isfinite(variance), variance, 0.0) if "Sample Count" in reference.passes else 0.0
     combined = replace(_sides("Combined", reference, tests, variance), shared=shared)
     yield combined
-    known = quiet(combined.reference, combined.variance)
-    for name in QUANTITIES[1:]:
-        if all(_has(image, name) for image in (reference, *tests)):
-            sides = _sides(name, reference, tests, np.where(known, 0.0, np.inf))
-            yield replace(sides, shared=shared) if name in _TIMES_COLOUR else sides
+    unknown = np.array(np.inf)
+    parts = [
+        _sides(name, reference, tests, unknown)
+        for name in QUANTITIES[1:]
+        if all(_has(image, name) for image in (reference, *tests))
+    ]
+    alone = np.any([_is_all(part, combined) for part in parts if part.name in _LIGHT], axis=0)
+    variance = np.where(quiet(combined.reference, combined.variance) & alone, 0.0, np.inf)
+    for part in parts:
+        known = np.broadcast_to(variance, part.reference.shape)
+        yield replace(part, variance=known, shared=shared if part.name in _TIMES_COLOUR else 0.0)
+
+
+def _is_all(part: Sides, combined: Sides) -> NDArray[np.bool_]:
+    """(height, width, 1) bool: where all light of both sides is that of one pass, but for rounding."""
+    rest = [
+        np.abs(of - all_of).max(axis=-1) <= _QUIET * FLOAT32 * np.abs(all_of).max(axis=-1)
+        for of, all_of in ((part.reference, combined.reference), (part.test, combined.test))
+    ]
+    return (rest[0] & rest[1])[..., None]
 
 
 def quiet(values: Array, variance: Array) -> NDArray[np.bool_]:

@@ -11,6 +11,7 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender import another_blender
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import world_image
+from viewcam_addon.blender.scenes.images import image_of
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
 
@@ -221,3 +222,27 @@ def test_cycles_shows_the_same_image_and_nearly_the_sky_itself(tree, camera_obje
     assert np.percentile(np.abs(shown - true) / true, 99) < 5e-3 and abs(shown.mean() / true.mean() - 1) < 1e-4
     turned = np.abs(np.roll(ours, 1, axis=1) - shown) / shown  # by a pixel
     assert np.percentile(turned, 50) > 1e-6
+
+
+def test_each_of_many_renders_shows_the_camera_its_own_image(tree, camera_object, scene, read_passes, tmp_path, monkeypatch):
+    """Else one that is made anew for each may lie where the other one lay, and Cycles shows that."""
+    monkeypatch.setattr(world_image, "WIDTH", 64)
+    add = tree.add("ShaderNodeMixRGB", blend_type="ADD")
+    tree.link(tree.add("ShaderNodeLightPath").outputs["Is Camera Ray"], add.inputs[0])
+    tree.link(shifted_direction(tree), add.inputs[1])
+    add.inputs[2].default_value = (5, 5, 5, 1)
+    tree.colour(add.outputs[0])
+    addresses = []
+
+    def watched(*given, **how):
+        image = image_of(*given, **how)
+        addresses.append(image.as_pointer())
+        return image
+
+    monkeypatch.setattr(world_image.images, "image_of", watched)
+    scene.render.resolution_x, scene.render.resolution_y = 16, 9
+    paths = [tmp_path / f"{seed}.exr" for seed in range(4)]
+    jobs.both_sides(Job(level="direct", samples=8), paths)
+    found = [passes["Environment"][..., :3].mean(axis=(0, 1)) for passes in read_passes(paths)]
+    assert np.allclose(found, found[0], rtol=0.1), found
+    assert len(addresses) == 8 and len({*addresses}) == 2, "Cycles tells images by their address"

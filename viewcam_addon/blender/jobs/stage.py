@@ -20,6 +20,7 @@ from ..scenes import materials, recentering
 from ..scenes.export import Lighting, export_scene, level_needed
 from ..scenes.ledger import Ledger
 from ..temporary_settings import overridden
+from . import persistent_data
 
 
 @dataclass(frozen=True)
@@ -83,19 +84,23 @@ class Stage:
         """
         camera = self.camera if self.is_chosen or self.told else None
         share = max((job.samples or SAMPLES) // len(paths), 1)
-        for number, path in enumerate([*paths, *([everything] if everything is not None else [])]):
-            rendering(number + 1)
-            is_of_everything, seed = number == len(paths), number % len(paths)
-            settings = None
-            if self.is_lit and light:
-                bounces = light.bounces.none if self.level == "direct" else light.bounces
-                settings = cycles.LightSettings(light.film, bounces, share, (job.seed or 0) + seed)
-            remedies = self.ledger.remedies_of_everything if is_of_everything else self.ledger.remedies.values()
-            of = self.scene, self.view_layer, camera, path
-            if job.engine in ("EEVEE", "WORKBENCH"):
-                rasters.render(*of, job.engine, remedies, job.threads)
-            else:
-                cycles.render(*of, remedies, job.threads, settings, keep and not self.told, job.device, is_of_everything)
+        with overridden() as lasting:
+            for number, path in enumerate([*paths, *([everything] if everything is not None else [])]):
+                rendering(number + 1)
+                is_of_everything, seed = number == len(paths), number % len(paths)
+                settings = None
+                if self.is_lit and light:
+                    bounces = light.bounces.none if self.level == "direct" else light.bounces
+                    settings = cycles.LightSettings(light.film, bounces, share, (job.seed or 0) + seed)
+                remedies = self.ledger.remedies_of_everything if is_of_everything else self.ledger.remedies.values()
+                of = self.scene, self.view_layer, camera, path
+                if job.engine in ("EEVEE", "WORKBENCH"):
+                    rasters.render(*of, job.engine, remedies, job.threads)
+                else:
+                    kept = keep and not self.told
+                    cycles.render(*of, remedies, job.threads, settings, kept, job.device, is_of_everything, lasting)
+            if keep and lasting.is_shared:  # Cycles must not know it when it is gone
+                persistent_data.drop(self.scene)
 
 
 @contextlib.contextmanager

@@ -85,13 +85,14 @@ def render(
     keep: bool = False,
     device: str = "CPU",
     everything: bool = False,
+    lasting: Overrides | None = None,
 ) -> None:
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
 
     camera_object : the one that Blender chooses itself, as markers bind it, where None. remedies : what to take out for the
         time of the render (ledger.py). threads : all by default. light : for a picture of light in place of the passes of
         geometry. keep : whether Cycles keeps what it has built, for the next render. everything : with hair, volumes and
-        whatever else the tracer does not model.
+        whatever else the tracer does not model. lasting : of all renders that share what remedies make.
 
     Raises
     ------
@@ -100,7 +101,7 @@ def render(
     """
     if not hasattr(scene, "cycles"):
         raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")
-    with overridden() as overrides:
+    with overridden(lasting) as overrides:
         override_settings(overrides, scene, view_layer, light, everything)
         if device != "CPU":
             _override_device(overrides, scene, device)

@@ -86,7 +86,14 @@ def image_of(picture: Picture, name: str, overrides: Overrides, packed: bool = T
     """An image with these pixels until the overrides end: bytes where they are encoded, floats where they are linear.
 
     packed : whether it is to be saved with the file.
+
+    All renders of `overrides.lasting` share one. A Cycles that keeps its data tells images by their address, and shows the
+    pixels of one that is gone where another one lies at its address.
     """
+    return overrides.lasting.shared(_made, picture, name, packed)
+
+
+def _made(overrides: Overrides, picture: Picture, name: str, packed: bool) -> bpy.types.Image:
     height, width, channels = picture.shape
     image = bpy.data.images.new(
         name, width, height, alpha=channels == 4, float_buffer=not picture.srgb, is_data=not picture.srgb
