@@ -16,7 +16,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import conversion, datablocks, findings, storage
+from viewcam_addon.blender import conversion, findings, pose, storage
 
 pytestmark = pytest.mark.slow
 
@@ -34,13 +34,13 @@ def target(empty):
 @pytest.fixture
 def placed(monkeypatch):
     """The names of the cameras that are placed, in order, as long as the test lasts."""
-    names, place = [], conversion.place
+    names, set_rotations = [], pose.set_rotations
 
-    def counting(camera_object, *rest):
-        names.append(camera_object.name)
-        return place(camera_object, *rest)
+    def counting(blocks, *rest):
+        names.extend(each.name for each in blocks)
+        return set_rotations(blocks, *rest)
 
-    monkeypatch.setattr(conversion, "place", counting)
+    monkeypatch.setattr(pose, "set_rotations", counting)
     return names
 
 
@@ -99,13 +99,13 @@ def test_what_no_camera_depends_on_moves_without_placing_any(two_hundred_cameras
 
 
 def test_a_frame_looks_at_nothing_but_what_blender_has_evaluated(two_hundred_cameras, scene, monkeypatch):
-    """However many objects there are: animated_values is asked for the keyed camera alone."""
+    """However many objects there are: the values of the keyed camera alone are loaded."""
     key_the_eye(two_hundred_cameras[0])
     scene.frame_set(1)
-    asked, animated_values = [], datablocks.animated_values
-    monkeypatch.setattr(datablocks, "animated_values", lambda each: asked.append(each.name) or animated_values(each))
+    asked, animated = [], storage.animated
+    monkeypatch.setattr(storage, "animated", lambda each, before: asked.append(each.name) or animated(each, before))
     scene.frame_set(50)
-    assert set(asked) == {"Camera"}
+    assert asked == ["Camera"]
 
 
 def updates_of(action):

@@ -3,8 +3,7 @@
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python panel_in_a_window.py
 
 A timer takes one step at a time, so that Blender handles the events and draws in between. Buttons are found by moving the mouse
-over them and asking Blender which property it is on: no coordinate is assumed but that two buttons stand below the choice of
-what happens at the pole, and that of a warning above the first value.
+over them and asking Blender which property it is on: no coordinate is assumed. Operators are found by tour_hands.py.
 Leaves with status 0, or 5 and a traceback.
 """
 
@@ -12,6 +11,7 @@ import contextlib
 import os
 import sys
 import traceback
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -20,7 +20,6 @@ KEYS = {"-": "MINUS", "0": "ZERO", "1": "ONE", "3": "THREE", "5": "FIVE", "7": "
 _found_at = {}  # where a button was: looked at first
 NOWHERE = (600, 500)  # a place in the 3D viewport
 ROW = 9  # pixels between two looks for a button, less than half its height
-BELOW = 18  # pixels from where the choice at the pole is found, which is below its middle, to the row of buttons
 
 
 def window():
@@ -241,19 +240,19 @@ def nobody_notices_moves():
 
 
 def press_the_buttons():
-    _, sidebar = region("VIEW_3D", "UI")
-    _, y = yield from find("pole", -1)
+    from tour_hands import push  # which has what is in here
+
     stated = values().numbers()
     with nobody_notices_moves():
         camera().location = (1, 2, 3)
         yield
         assert values().numbers() == stated and tuple(camera().location) == (1, 2, 3)
-        yield from click(sidebar.x + sidebar.width * 0.2, y - BELOW)
+        yield from push("viewcam.apply_camera(")
         assert values().numbers() == stated
         is_at_its_values()
         camera().location = (1, 2, 3)
         yield
-        yield from click(sidebar.x + sidebar.width * 0.65, y - BELOW)
+        yield from push("viewcam.adopt_camera(")
         assert tuple(values().eye) == (1, 2, 3), f"after Adopt Camera the eye is {tuple(values().eye)}"
         is_at_its_values()
     camera().location = (2, 1, 4)
@@ -281,20 +280,15 @@ def take_the_view_of_the_viewport():
 
 def use_another_up():
     """Close to up the panel offers another one, in a button below the warning at its top. It leaves the picture as it is."""
+    from tour_hands import push
+
     stated = tuple(values().eye), tuple(values().look_at), tuple(values().up)
     values().look_at, values().up, values().eye = (0.3, 0.2, 0), (0.1, 0.2, 1), (0.8, 1.2, 5.0001)
     yield
     yield
-    _found_at.clear()  # the warning moves all of them
-    _, y = yield from find("eye", 0)
     before, doubtful = state(), tuple(values().up)
-    _, sidebar = region("VIEW_3D", "UI")
-    for above in range(2 * ROW, 4 * ROW, ROW // 2):
-        yield from click(sidebar.x + sidebar.width * 0.5, y + above)
-        if tuple(values().up) != doubtful:
-            break
-    else:
-        raise AssertionError("no button offers another up")
+    yield from push("viewcam.choose_up(")
+    assert tuple(values().up) != doubtful, "the button offers no other up"
     assert abs(np.dot(state()[1][:3, 2], values().up)) < 1e-6, f"up {tuple(values().up)} is not perpendicular to the view"
     assert np.abs(state()[1] - before[1]).max() < 1e-6, "the picture has turned"
     values().eye, values().look_at, values().up = stated
@@ -394,4 +388,5 @@ def start(steps, interval=0.05):
 
 
 if __name__ == "__main__":
+    sys.path.append(str(Path(__file__).parent))
     start(steps)
