@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from viewcam_addon import cameras, cli
-from viewcam_addon.cameras import Camera
+from viewcam_addon.cameras import Camera, distortion
 from viewcam_addon.cameras.audit import MISTAKES, Depths, Tracks, Views, _audited, audit, tracks_through, views_of
 from viewcam_addon.pinhole import Pinhole
 
@@ -448,3 +448,75 @@ def test_no_depth_map_is_waited_for_or_larger_than_a_picture(tmp_path, capfd, na
     assert run("audit", tmp_path) == 2
     said = capfd.readouterr().err
     assert told in said and "bug" not in said and said.count("\n") == 1
+
+
+BENT = {
+    "": (lambda lens: lens, "none"),
+    "lens_twice": (lambda lens: None, "lens_twice"),
+    "tangential_swapped": (lambda lens: replace(lens, tangential=lens.tangential[::-1]), "tangential_swapped"),
+    "a fisheye": (lambda lens: replace(lens, projection="equidistant"), "lens_model"),
+}
+
+
+@pytest.mark.parametrize("true", BENT)
+def test_what_is_wrong_with_a_lens_is_named_and_nothing_where_it_is_right(true):
+    """The pictures were taken through one lens, and the cameras say another."""
+    change, kind = BENT[true]
+    said = distortion.opencv({"k1": -0.2, "k2": 0.05, "p1": 0.004, "p2": -0.003})
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        views, middle = a_right_dataset(random)
+        lens = change(said)
+        straight = points_in_pictures(random, views, middle, 0.0)
+        in_plane = (straight.places - views.center[straight.which]) / views.focal[straight.which]
+        taken = (in_plane if lens is None else lens.distort(in_plane)) * views.focal[straight.which] + views.center[
+            straight.which
+        ]
+        evidence = Tracks(straight.which, taken + 0.3 * random.normal(size=taken.shape), straight.points)
+        verdict = _audited(replace(views, lenses=(said,) * len(views.eye)), evidence)
+        off = np.median(
+            np.hypot(*(taken - (said.distort(in_plane) * views.focal[straight.which] + views.center[straight.which])).T)
+        )
+        if not true or off > 1:  # a telephoto shows too little of a lens to tell
+            assert verdict.kind == kind, (seed, off, verdict)
+
+
+@pytest.mark.parametrize("k1", [-0.25, -0.05, 0.15])
+def test_a_lens_that_was_left_out_is_named_with_its_coefficient(k1):
+    """Of a positive one the pictures were undistorted twice, or have a pincushion's lens."""
+    named = 0
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        views, middle = a_right_dataset(random)
+        lens = distortion.opencv({"k1": k1})
+        straight = points_in_pictures(random, views, middle, 0.0)
+        in_plane = (straight.places - views.center[straight.which]) / views.focal[straight.which]
+        bent = (lens.distort(in_plane) - in_plane) * views.focal[straight.which]
+        noise = 0.3 * random.normal(size=bent.shape)
+        verdict = _audited(views, Tracks(straight.which, straight.places + bent + noise, straight.points))
+        if np.percentile(np.hypot(*bent.T), 95) > 4:
+            named += 1
+            assert verdict.kind == "lens_left_out", (seed, verdict)
+            assert abs(float(verdict.sentence.split("k1 = ")[1].split(",")[0]) - k1) < 0.2 * abs(k1) + 0.02, verdict
+    assert named >= 5
+
+
+def test_a_data_set_of_colmap_with_a_lens_is_right(tmp_path, capsys):
+    random = np.random.default_rng(3)
+    lens = distortion.opencv({"k1": -0.2})
+    points = np.array([0, 0, 4]) + random.uniform(-1, 1, (80, 3))
+    images, where = [], random.uniform(-0.3, 0.3, 4)
+    for number, x in enumerate(where, start=1):
+        seen = points + np.array([x, 0, 0])
+        places = lens.distort(seen[:, :2] / seen[:, 2:]) * 600 + [320, 180]
+        shown = " ".join(f"{a!r} {b!r} {i}" for i, (a, b) in enumerate(places.tolist(), start=1))
+        images.append(f"{number} 1 0 0 0 {float(x)!r} 0 0 1 {number}.png\n{shown}\n")
+    (tmp_path / "images.txt").write_text("".join(images))
+    (tmp_path / "cameras.txt").write_text("1 SIMPLE_RADIAL 640 360 600 320 180 -0.2\n")
+    lines = [f"{i} {x!r} {y!r} {z!r} 1 1 1 0 1 0" for i, (x, y, z) in enumerate(points.tolist(), start=1)]
+    (tmp_path / "points3D.txt").write_text("\n".join(lines) + "\n")
+    assert cli.main(["audit", str(tmp_path)]) == 0
+    assert "nothing is wrong" in capsys.readouterr().out
+    (tmp_path / "cameras.txt").write_text("1 PINHOLE 640 360 600 600 320 180\n")
+    assert cli.main(["audit", str(tmp_path)]) == 1
+    assert "lens distortion was left out: k1 = -0.2" in capsys.readouterr().out

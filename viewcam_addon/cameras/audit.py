@@ -10,9 +10,9 @@ A mistake is named only if its inverse explains the evidence far better than the
 pictures may have; what explains it as well is named beside it. Else it is said that nothing is wrong, or that something is,
 of an unknown kind. Robust costs (Cauchy's) let outliers and hidden points be.
 
-Rejected: fitting free parameters, which explains whatever is there (but for a principal point that was left out, and one factor
-of all focal lengths), and judging poses by their looks (do cameras look at their middle?), which is right for most and a false
-alarm for the rest.
+Rejected: fitting free parameters, which explains whatever is there (but for a principal point or a lens that was left out,
+and one factor of all focal lengths), and judging poses by their looks (do cameras look at their middle?), which is right for
+most and a false alarm for the rest.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from . import axes
 from .camera import Camera
+from .distortion import Lens, opencv
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,8 @@ Array = NDArray[np.float64]
 _SURE, _TIED = 14.0, 10.0
 _FEWEST = 40  # observations
 _LEFT_OUT = 2.0  # pixels: less may be anything's
+_ROUNDS = 10  # of weighing outliers
+_LENS_FITS = 1.0  # pixels: a lens that was left out explains the evidence to this, or is none
 _FITTED = "focal_factor"
 _FACTORS, _STEPS, _FINEST = (1 / 8, 8.0), 25, 1e-5  # of depth maps: what is tried first, and how fine it is told
 _COUNTED = 2000  # at most: a systematic error repeats in each, so more of them add no certainty
@@ -45,7 +48,7 @@ class Views:
     axes : (n, 3, 3), columns u, v, w; their determinants may be −1. eye : (n, 3). focal : (n, 2), pixels. center : (n, 2),
     the principal point from the left and the top. size : (n, 2), pixels. depth_scale : world units of one of the depth maps'.
     along_ray : whether depth is the distance from the eye, and not along w. shifted : by how many pictures the cameras are
-    late.
+    late. lenses : of each camera; without any all are pinholes.
     """
 
     axes: Array
@@ -56,24 +59,33 @@ class Views:
     depth_scale: float = 1.0
     along_ray: bool = False
     shifted: int = 0
+    lenses: tuple[Lens | None, ...] = ()
 
     def project(self, which: NDArray, points: Array) -> tuple[Array, Array]:
         """(m, 2) pixels from the left and the top, and (m,) depth, of points (m, 3) in cameras (m,)."""
         which = (which + self.shifted) % len(self.eye)
         x, y, z = np.einsum("mij,mi->jm", self.axes[which], points - self.eye[which])
         with np.errstate(all="ignore"):
-            places = self.center[which] + self.focal[which] * np.stack([x / -z, -y / -z], axis=-1)
+            in_plane = self._through_lens(which, np.stack([x / -z, -y / -z], axis=-1), Lens.distort)
+            places = self.center[which] + self.focal[which] * in_plane
         return places, -z
 
     def points(self, which: NDArray, places: Array, depth: Array) -> Array:
         """(m, 3): what cameras (m,) see at places (m, 2), at depths (m,) of their depth maps."""
         which = (which + self.shifted) % len(self.eye)
-        x, y = ((places - self.center[which]) / self.focal[which]).T
+        x, y = self._through_lens(which, (places - self.center[which]) / self.focal[which], Lens.undistort).T
         rays = np.stack([x, -y, -np.ones_like(x)], axis=-1)
         if self.along_ray:
             rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
         rays = np.einsum("mij,mj->mi", self.axes[which], rays)
         return self.eye[which] + (self.depth_scale * depth)[:, None] * rays
+
+    def _through_lens(self, which: NDArray, points: Array, move: Callable[[Lens, Array], Array]) -> Array:
+        """Points (m, 2) in the view planes at distance 1 of cameras (m,), moved by their lenses."""
+        for lens in {lens for lens in self.lenses if lens is not None}:
+            of_it = np.array([each == lens for each in self.lenses])[which]
+            points[of_it] = move(lens, points[of_it])
+        return points
 
 
 def views_of(cameras: Sequence[Camera]) -> Views:
@@ -81,7 +93,8 @@ def views_of(cameras: Sequence[Camera]) -> Views:
     matrices = np.array([axes.camera_to_world(camera.pinhole) for camera in cameras])
     k = np.array([axes.intrinsics(camera.pinhole) for camera in cameras])
     size = np.array([(camera.pinhole.width, camera.pinhole.height) for camera in cameras], float)
-    return Views(matrices[:, :3, :3], matrices[:, :3, 3], k[:, [0, 1], [0, 1]], k[:, :2, 2], size)
+    lenses = tuple(camera.lens for camera in cameras)
+    return Views(matrices[:, :3, :3], matrices[:, :3, 3], k[:, [0, 1], [0, 1]], k[:, :2, 2], size, lenses=lenses)
 
 
 # ---- evidence
@@ -171,7 +184,8 @@ def tracks_through(true: Sequence[Camera]) -> Tracks:
     which = np.repeat(np.arange(len(true)), _SAMPLES)
     places = random.uniform(0, 1, (len(which), 2)) * views.size[which]
     points = views.points(which, places, reach * random.uniform(0.5, 2, len(which)))
-    return Tracks(which, places, points)
+    seen = np.isfinite(points).all(axis=-1)  # and not beyond what a lens shows
+    return Tracks(which[seen], places[seen], points[seen])
 
 
 # ---- mistakes
@@ -410,6 +424,35 @@ def _mistakes() -> list[Mistake]:
 MISTAKES = _mistakes()
 
 
+def _with_lenses(views: Views, change: Callable[[Lens], Lens | None]) -> Views:
+    return replace(views, lenses=tuple(lens and change(lens) for lens in views.lenses))
+
+
+_OF_LENSES = [
+    Mistake(
+        "lens_twice",
+        "the pictures are undistorted already, and the cameras' lens distortion counts once more: it should be none",
+        lambda v: replace(v, lenses=()),
+    ),
+    Mistake(
+        "tangential_swapped",
+        "p1 and p2 of the lens are swapped, as Metashape's are against OpenCV's",
+        lambda v: _with_lenses(v, lambda lens: replace(lens, tangential=lens.tangential[::-1])),
+    ),
+    Mistake(
+        "lens_model",
+        "the lens is a fisheye, whose coefficients were taken for those of a lens with straight lines",
+        lambda v: _with_lenses(v, lambda lens: replace(lens, projection="equidistant", divisor=())),
+    ),
+    Mistake(
+        "lens_model",
+        "the lens is none of a fisheye, for whose its coefficients were taken",
+        lambda v: _with_lenses(v, lambda lens: replace(lens, projection="pinhole")),
+    ),
+]
+"""The mistakes of cameras that have a lens."""
+
+
 @dataclass(frozen=True)
 class Verdict:
     """The verdict of the evidence.
@@ -442,9 +485,12 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
         )
     of_depth = isinstance(evidence, Depths)
     tried = [mistake for mistake in MISTAKES if not (mistake.of_world if of_depth else mistake.of_depth)]
+    tried += _OF_LENSES if any(views.lenses) else []
     tried.append(_of_focal_factor(views, evidence))
     if not of_depth and np.abs(views.center - views.size / 2).max() <= 0.5:
         tried += _left_out(views, evidence)
+    if isinstance(evidence, Tracks) and not any(views.lenses):
+        tried += _lens_left_out(views, evidence)
     errors = [evidence.errors(mistake.undone(views)) for mistake in tried]
     # The usual error is that of the best explanation, so that it does not hide in the worse ones.
     usual = max(evidence.floor, min(_usual(each, evidence) for each in (as_is, *errors)))
@@ -544,3 +590,33 @@ def _cost(errors: Array, usual: float) -> float:
     """The negative log likelihood of Cauchy's distribution, but for a constant."""
     bounded = np.minimum(errors / usual, _FARTHEST)
     return float(np.log1p(bounded * bounded).mean()) * min(len(errors), _COUNTED)
+
+
+def _lens_left_out(views: Views, evidence: Tracks) -> list[Mistake]:
+    """The mistake of cameras without a lens: the radial one that the evidence asks for, if it explains all of it.
+
+    k1 and k2 by least squares, each observation weighted by Cauchy's cost, so that outliers count little.
+    """
+    places, depth = views.project(evidence.which, evidence.points)
+    center, focal = (each[(evidence.which + views.shifted) % len(views.eye)] for each in (views.center, views.focal))
+    with np.errstate(all="ignore"):
+        usable = (depth > 0) & (np.hypot(*(places - evidence.places).T) < views.size.max() / 4)
+    expected = ((places - center) / focal)[usable]
+    if len(expected) < _FEWEST:
+        return []
+    off = (evidence.places - places)[usable]
+    r = (expected * expected).sum(axis=-1)
+    slopes = np.stack([(r**power)[:, None] * expected * focal[usable] for power in (1, 2)], axis=-1)
+    k = np.zeros(2)
+    for _ in range(_ROUNDS):
+        errors = np.hypot(*(off - slopes @ k).T)
+        weight = 1 / np.hypot(1, errors / max(float(np.median(errors)), evidence.floor))
+        k = np.linalg.lstsq((weight[:, None, None] * slopes).reshape(-1, 2), (weight[:, None] * off).ravel(), rcond=None)[0]
+    moved = np.hypot(*(slopes @ k).T)
+    if np.percentile(moved, 95) < _LEFT_OUT or np.median(np.hypot(*(off - slopes @ k).T)) > _LENS_FITS:
+        return []
+    lens = opencv(dict(zip(("k1", "k2"), k.tolist(), strict=True)))
+    sentence = (
+        f"lens distortion was left out: k1 = {k[0]:.4g}, k2 = {k[1]:.4g} is right, or the pictures were undistorted twice"
+    )
+    return [Mistake("lens_left_out", sentence, lambda v: replace(v, lenses=(lens,) * len(v.eye)))]

@@ -17,7 +17,7 @@ from . import Result, blender_room
 
 
 def run(options: argparse.Namespace) -> Result:
-    taken = Options(size=options.size, original_world=True, without_distortion=True)
+    taken = Options(size=options.size, original_world=True)
     with silent_libraries():
         found: Sequence[Camera] = cameras.read(options.dataset, options=taken)
         found, evidence, by = _evidence(options, found, taken)
