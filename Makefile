@@ -156,7 +156,7 @@ test-blender: .venv/zips $(WHEELS:%=.venvs/%/ready)
 # Python for Windows and for arm64 lie in ~/.cache/virtual-pinhole/emulated, made once: .ci/emulated.py.
 PLATFORMS = $(call PYTEST,.venv) -m platforms
 
-test-windows: .venv/zips
+test-windows: .venv/zips $(patsubst %,.venvs/%/ready,$(filter 4.2 5.0,$(MATRIX)))
 	$(PLATFORMS) tests/platforms/test_windows.py
 	$(MAKE) test-windows-suite
 

@@ -81,6 +81,8 @@ def build_core(platform: str, flags: tuple[str, ...] = (), travels: bool = False
     target, _, name = PLATFORMS[platform]
     command = [compiler] if compiler else [sys.executable, "-m", "ziglang", "c++", "-target", target]
     command += [*FLAGS, *([] if platform.startswith("windows") else ["-fPIC"]), *flags]
+    if platform.startswith("macos"):
+        command.append(f"-Wl,-install_name,@rpath/{name}")  # in place of the folder that it is linked in
     made_from = hashlib.sha256((repr(command) + inspect.getsource(_compiled)).encode())
     for path in sorted(path for path in CORE.rglob("*") if path.suffix in (".h", ".cpp")):
         made_from.update(f"{path.relative_to(CORE)}\0".encode() + path.read_bytes())

@@ -1,7 +1,6 @@
 """Runs Python for another platform on this machine: `python .ci/emulated.py PLATFORM ARGUMENT…`
 
-- windows-4.2, windows-5.0: CPython for Windows under wine, with that Blender for Windows as its module. Tests know wine by the
-  environment variable VIEWCAM_WINE.
+- windows-4.2, windows-5.0: CPython for Windows under wine, with that Blender for Windows as its module.
 - linux-arm64: Debian's Python for arm64 under qemu, which starts no child processes.
 
 Made once in ~/.cache/virtual-pinhole/emulated: wine's drives, Pythons, and packages as pip unpacks them for that platform. What
@@ -22,6 +21,8 @@ import tomllib
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
+
+import lief
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / ".ci")]
@@ -47,7 +48,16 @@ BLENDERS = {"4.2": ["bpy==4.2.23", "numpy==1.24.*"], "5.0": ["bpy==5.0.1", "nump
 WINDOWS_ALONE = ["colorama"]
 BUNDLED = ["OpenEXR==3.5.3", "Jinja2==3.1.6", "MarkupSafe==3.0.4", "tqdm==4.70.1"]
 TESTS = ["numpy==1.26.*", "pytest>=8.3", "pytest-timeout>=2.3", "hypothesis>=6.100", "mpmath>=1.3", "pyyaml>=6"]
-WINDOWS_TESTS = ["pytest-xdist>=3.5", "lief>=0.16", "distributed>=2025.1", "cryptography>=42"]
+# The cryptography is of before Rust 1.78, whose programs need bcryptprimitives.dll, which wine 8 lacks.
+WINDOWS_TESTS = ["pytest-xdist>=3.5", "lief>=0.16", "distributed>=2025.1", "cryptography==42.0.5"]
+# wine's clocks tick every 100 ns. Dask waits until it has the same time twice, and so for ever.
+WINDOWS_CLOCKS = """\
+import time
+
+precise_time, precise_monotonic = time.time, time.monotonic
+time.time = lambda: precise_time() * 64 // 1 / 64
+time.monotonic = lambda: precise_monotonic() * 64 // 1 / 64
+"""
 
 
 def program(name: str) -> str:
@@ -58,18 +68,25 @@ def program(name: str) -> str:
 
 
 @contextlib.contextmanager
-def made_once(folder: Path) -> Iterator[Path | None]:
-    """A folder that is to be filled and is called `folder` when the block has ended well; None if that is there already."""
+def made_once(folder: Path, contents: str = "") -> Iterator[Path | None]:
+    """A folder that is to be filled and is called `folder` when the block has ended well; None if that is there already.
+
+    contents : the folder is made anew when it was made for others.
+    """
+    listed = folder / "contents.txt"
     CACHE.mkdir(parents=True, exist_ok=True)
     with open(CACHE / "lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if folder.exists():
+        if folder.exists() and (listed.read_text(encoding="utf-8") if listed.exists() else "") == contents:
             yield None
             return
         print(f"Making {folder}", file=sys.stderr, flush=True)
         part = Path(tempfile.mkdtemp(dir=CACHE))
         try:
             yield part
+            if contents:
+                (part / listed.name).write_text(contents, encoding="utf-8")
+            shutil.rmtree(folder, ignore_errors=True)
             os.replace(part, folder)
         finally:
             shutil.rmtree(part, ignore_errors=True)
@@ -77,7 +94,7 @@ def made_once(folder: Path) -> Iterator[Path | None]:
 
 def python_for_windows() -> Path:
     """The program of CPython for Windows."""
-    with made_once(CACHE / "python") as part:
+    with made_once(CACHE / "python", f"{CPYTHON} python3.dll") as part:
         if part:
             copy = ["dependency:copy", f"-Dartifact={CPYTHON}", f"-DoutputDirectory={part}"]
             subprocess.run([program("mvn"), "--quiet", "--batch-mode", *copy], check=True)
@@ -85,12 +102,27 @@ def python_for_windows() -> Path:
             with zipfile.ZipFile(jar) as archive:
                 archive.extractall(part)
             jar.unlink()
+            (library,) = part.glob("**/python311.dll")
+            _stable_abi(library)
     return next((CACHE / "python").glob("**/windows-x86_64/python.exe"))
+
+
+def _stable_abi(library: Path) -> None:
+    """Write python3.dll, which Maven's CPython lacks, beside python311.dll: all names of that, forwarded to it."""
+    python = lief.parse(library)
+    names = (entry.name for entry in python.get_export().entries if entry.name)
+    with tempfile.TemporaryDirectory() as folder:
+        empty, exports = Path(folder, "empty.c"), Path(folder, "python3.def")
+        empty.touch()
+        lines = (f"{name}={library.stem}.{name}\n" for name in names)
+        exports.write_text("LIBRARY python3\nEXPORTS\n" + "".join(lines), encoding="utf-8")
+        zig = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", "-shared", "-s"]
+        subprocess.run([*zig, empty, exports, "-o", library.with_name("python3.dll")], check=True)
 
 
 def packages(platform: str, name: str, *requirements: str) -> Path:
     """A folder of packages for a platform, unpacked by pip."""
-    with made_once(CACHE / name) as part:
+    with made_once(CACHE / name, " ".join(requirements)) as part:
         if part:
             pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-compile"]
             target = [*(f"--platform={tag}" for tag in PIP_PLATFORMS[platform]), "--python-version=3.11", "--implementation=cp"]
@@ -150,11 +182,11 @@ def windows(blender: str, bare: bool = False) -> tuple[list[str], dict[str, str]
     site_packages.mkdir(parents=True, exist_ok=True)
     lines = "".join(f"{of_windows(folder)}\n" for folder in folders)
     (site_packages / "folders.pth").write_text(lines, encoding="utf-8")
+    (site_packages / "usercustomize.py").write_text(WINDOWS_CLOCKS, encoding="utf-8")
     variables = {
         "WINEPREFIX": str(prefix()),
         "WINEDEBUG": "-all",
         "DISPLAY": "",
-        "VIEWCAM_WINE": "1",
         "PYTHONUSERBASE": of_windows(user),
     }
     return [program("wine"), of_windows(python_for_windows())], variables

@@ -66,6 +66,21 @@ def fresh_blender(registered_addon):
 
 
 @pytest.fixture
+def symlink():
+    """symlink(link, target) makes a symbolic link; where Windows lets this user make none, the test is skipped."""
+
+    def make(link, target):
+        try:
+            os.symlink(target, link)
+        except OSError as error:
+            if sys.platform != "win32":
+                raise
+            pytest.skip(f"no symbolic links here: {error}")
+
+    return make
+
+
+@pytest.fixture
 def no_warnings():
     """NumPy raises where it would warn, and so does Python."""
     with np.errstate(all="raise"), warnings.catch_warnings():

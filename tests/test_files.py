@@ -60,11 +60,11 @@ def test_a_block_that_wrote_nothing_is_an_error(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_symbolic_link_stays_and_what_it_leads_to_is_replaced(tmp_path):
+def test_a_symbolic_link_stays_and_what_it_leads_to_is_replaced(tmp_path, symlink):
     (tmp_path / "elsewhere").mkdir()
     file, link = tmp_path / "elsewhere" / "file.txt", tmp_path / "link.txt"
     file.write_text("older")
-    link.symlink_to(file)
+    symlink(link, file)
     with written_whole(link) as temporary:
         temporary.write_text("whole")
         assert temporary.parent == file.parent and file.read_text() == "older"
@@ -72,16 +72,16 @@ def test_a_symbolic_link_stays_and_what_it_leads_to_is_replaced(tmp_path):
     assert [path.name for path in file.parent.iterdir()] == ["file.txt"]
 
 
-def test_a_link_that_leads_nowhere_yet_leads_to_the_file_then(tmp_path):
+def test_a_link_that_leads_nowhere_yet_leads_to_the_file_then(tmp_path, symlink):
     link = tmp_path / "link.txt"
-    link.symlink_to(tmp_path / "file.txt")
+    symlink(link, tmp_path / "file.txt")
     with written_whole(link) as temporary:
         temporary.write_text("whole")
     assert link.is_symlink() and (tmp_path / "file.txt").read_text() == "whole"
 
 
-def test_a_link_to_itself_is_refused_in_one_sentence(tmp_path):
-    (tmp_path / "link.txt").symlink_to("link.txt")
+def test_a_link_to_itself_is_refused_in_one_sentence(tmp_path, symlink):
+    symlink(tmp_path / "link.txt", "link.txt")
     with pytest.raises(InputError, match=r"link\.txt can't be written"), written_whole(tmp_path / "link.txt"):
         raise AssertionError("nothing is to be made for it")
     assert (tmp_path / "link.txt").is_symlink()

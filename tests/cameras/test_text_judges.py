@@ -653,6 +653,18 @@ def test_potrees_view_has_its_up_along_z(point):
     assert camera.pinhole.distance == pytest.approx(expected.distance)
 
 
+@pytest.mark.parametrize(
+    "arguments", ["[7, -6, 4], [0, 0, 1]", "new THREE.Vector3(7, -6, 4), new THREE.Vector3(0, 0, 1), 500, () => done(3, 4)"]
+)
+def test_potrees_view_is_set_by_position_and_target(arguments):
+    text = f"viewer.setFOV(40);\nviewer.scene.view.setView({arguments});\n"
+    (camera,) = cameras.read(text, options=GL)
+    assert (camera.pinhole.eye, camera.pinhole.look_at, camera.pinhole.up) == ((7, -6, 4), (0, 0, 1), (0, 0, 1))
+    assert camera.pinhole.distance == pytest.approx(cameras.read(CODE["three.js"], options=GL)[0].pinhole.distance)
+    with pytest.raises(InputError, match="give position and target as plain numbers"):
+        cameras.read(text.replace("7, -6", "x, -6"), options=GL)
+
+
 def test_three_js_turns_by_the_up_that_all_objects_have():
     text = "camera = new THREE.PerspectiveCamera(40, 2); camera.position.set(1, 2, 3); camera.lookAt(0, 0, 0);"
     (camera,) = cameras.read(f"THREE.Object3D.DEFAULT_UP.set(0, 0, 1); {text}", options=GL)

@@ -201,11 +201,11 @@ def test_every_event_of_a_batch_is_a_line(tmp_path, capfd):
     assert said.err == ""
 
 
-def test_a_shot_that_fails_is_a_sentence_and_the_rest_are_there(tmp_path, capfd):
+def test_a_shot_that_fails_is_a_sentence_and_the_rest_are_there(tmp_path, symlink, capfd):
     out = tmp_path / "out"
     out.mkdir()
     (tmp_path / "file").touch()
-    (out / "orbit_001.png").symlink_to(tmp_path / "file" / "picture.png")  # which is no folder
+    symlink(out / "orbit_001.png", tmp_path / "file" / "picture.png")  # which is no folder
     said = batch(capfd, CORNELL, "--orbit", "3", "--out", out, *SMALL, status=4)
     failed, summary = said.err.splitlines()
     assert failed.startswith("viewcam batch: orbit_001: ") and "orbit_001.png" in failed

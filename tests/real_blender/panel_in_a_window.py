@@ -110,9 +110,10 @@ def same(one, other):
 
 
 def unfold(panel):
-    """Register a panel anew, open; under a name of its own, since Blender remembers by its name that one was closed."""
+    """Register a panel anew, open and above those that are closed; under a name of its own, since Blender remembers by its
+    name that one was closed."""
     bpy.utils.unregister_class(panel)
-    panel.bl_options, panel.bl_idname = set(), f"{panel.__name__}_open"
+    panel.bl_options, panel.bl_idname, panel.bl_order = set(), f"{panel.__name__}_open", 0
     bpy.utils.register_class(panel)
 
 

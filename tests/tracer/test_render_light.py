@@ -14,8 +14,9 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import native
 from viewcam_addon.tracer.render import Stopped, Tracer, render
 from viewcam_addon.tracer.scene.film import Bounces, Film
-from viewcam_addon.tracer.scene.lamps import Area, Point, Sun, World
+from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun, World
 from viewcam_addon.tracer.scene.materials import Colour, Material
+from viewcam_addon.tracer.scene.shader_nodes import node
 
 PASSES = {*image.LIGHT_PASSES, "Depth", "Object Index"}
 FLOAT32 = 2.0**-24
@@ -95,6 +96,53 @@ def test_light_is_the_same_bit_for_bit_on_every_instruction_set(lively, level, m
     assert best in (b"base", *map(str.encode, pictures)) and (len(pictures) > 1 or best in (b"base", b"v2"))
     for passes in pictures.values():
         assert_same(passes, pictures["v2"])
+
+
+def _lying(height, half=1.0):
+    matrix = np.diag([half, half, half, 1.0])
+    matrix[2, 3] = height
+    return matrix
+
+
+SUN = Sun("sun", towards=(1, 2, 3), irradiance=(1, 1, 0.9))
+POINT = Point("point", position=(3, -2, 3), power=(500, 600, 700))
+AREA = Area("area", matrix=_lying(4), size=(2, 1), power=(80, 80, 80))
+LIT_BY = {
+    "a sun": [SUN],
+    "a wide sun, twice": [replace(SUN, angle=0.3), replace(SUN, name="other", towards=(-1, 0, 2), angle=0.0)],
+    "a point": [POINT],
+    "a ball that is around some": [replace(POINT, position=(0.5, 0.2, 0.3), radius=1.0)],
+    "a soft ball": [replace(POINT, radius=0.8, soft_falloff=True)],
+    "two rectangles": [AREA, replace(AREA, name="other", matrix=_lying(9), power=(900, 900, 900))],
+    "an ellipse with a grid": [replace(AREA, ellipse=True, spread=1.2)],
+    "a spot": [Spot("spot", matrix=_lying(5), power=(900, 900, 900), angle=0.9, radius=0.2)],
+    "some of each": [replace(SUN, angle=0.1), POINT, AREA],
+    "many": [replace(POINT, name=f"{i}", position=(i % 7 - 3, i // 7 - 3, 3)) for i in range(40)],
+    "the sky alone": [],
+}
+
+
+@pytest.mark.parametrize("sky", [0.0, 0.3])
+@pytest.mark.parametrize("lamps", LIT_BY.values(), ids=LIT_BY)
+def test_what_goes_in_vectors_has_the_bits_of_what_goes_path_by_path(random_scene, lamps, sky):
+    """A second closure that is black adds nothing, but with it a surface is no longer taken for a matte one."""
+    scene = random_scene(SEED, 40, 33)
+    red, blue = Colour((0.8, 0.1, 0.1)), Colour((0.1, 0.3, 0.9))
+    matte = {"red": Material(diffuse=red), "blue": Material(diffuse=blue)}
+    objects = tuple(replace(placed, materials=("red", "blue")[i % 2 :][:1]) for i, placed in enumerate(scene.objects))
+    scene = replace(scene, objects=objects, materials=matte, lamps=tuple(lamps), world=World((sky,) * 3), bounces=Bounces(6, 5))
+    black = node("diffuse", color=Colour((0.0, 0.0, 0.0)))
+    one_by_one = {
+        name: Material(surface=node("add", first=node("diffuse", color=colour), second=black))
+        for name, colour in (("red", red), ("blue", blue))
+    }
+    for level, samples, error in (("direct", 3, None), ("path", 8, None), ("path", 32, 0.05)):
+        in_vectors, in_turn = (
+            render(replace(scene, materials=materials), level, samples, error=error) for materials in (matte, one_by_one)
+        )
+        assert in_vectors["Combined"][..., :3].any() or not (lamps or sky)
+        for name, values in in_vectors.items():
+            assert np.array_equal(values, in_turn[name]), (level, samples, name)
 
 
 def test_seeds_give_other_noise_of_the_same_picture(lively):

@@ -135,7 +135,7 @@ _VECTORS = {"eye", "target", "up", "direction"}
 _OF_VTK = re.compile(
     r"SetViewUp|SetFocalPoint|CameraFocalPoint|\bcamera_position\s*=|\bcpos\s*=|\bfocal_point\s*=", re.IGNORECASE
 )
-_OF_POTREE = re.compile(r"\bPotree\b|\bscene\.view\.(?:position|lookAt)\b")
+_OF_POTREE = re.compile(r"\bPotree\b|\bscene\.view\.(?:position|lookAt|setView)\b")
 _LENSES = {"ThinLens", "FishEye", "Fisheye", "Spherical", "Stereo", "StereoCamera", "Orthographic"}
 
 
@@ -315,7 +315,17 @@ class _Code:
     def says_pose(self) -> bool:
         for parts, sign, _, _ in self.statements:
             role = self._role(parts, sign)
-            if role in ("eye", "target", "look_at", "camera_position", "direction", "position_x", "position_y", "position_z"):
+            if role in (
+                "eye",
+                "target",
+                "look_at",
+                "set_view",
+                "camera_position",
+                "direction",
+                "position_x",
+                "position_y",
+                "position_z",
+            ):
                 return True
             if role in ("lookatviewtransform", "computeviewmatrixfromyawpitchroll"):
                 return True
@@ -334,6 +344,8 @@ class _Code:
             return None
         key = texts.plain(parts[-1])
         before = texts.plain(parts[-2]) if len(parts) > 1 else ""
+        if (before, key, sign) == ("view", "setview", "(") and _OF_POTREE.search(self.text):
+            return "set_view"
         if self._is_camera(parts[:-1]) and any(texts.plain(part) in _TURNED for part in parts[1:]):
             return "moves"
         if self._is_camera(parts[:-2]) and before in _PLACES and key not in ("set", "x", "y", "z") and sign == "(":
@@ -468,6 +480,8 @@ class _Code:
                 self._look_at(said, parts, at - 1, start)
             elif role == "perspective":
                 self._perspective(said, parts, at - 1, start)
+            elif role == "set_view":
+                self._of_potree(said, at - 1, start)
             elif role in _PYTORCH3D:
                 self._of_pytorch3d(said, role, at - 1, start)
             elif role == "computeviewmatrixfromyawpitchroll":
@@ -577,6 +591,16 @@ class _Code:
                 return
             texts.fail(self.text, start, "give eye, target and up as plain numbers")
         for role, vector in zip(("eye", "target", "up"), vectors, strict=True):
+            self._set(said, role, vector, start)
+
+    def _of_potree(self, said: _Said, opened: int, start: int) -> None:
+        """setView(position, target, how long it takes there, what is done then)."""
+        values = self.reader.arguments(opened)[0]
+        vectors = [numbers(value, 3) for value in values[:2]]
+        if len(vectors) < 2 or None in vectors:
+            texts.fail(self.text, start, "give position and target as plain numbers")
+        said.moved.append(start)
+        for role, vector in zip(("eye", "target"), vectors, strict=True):
             self._set(said, role, vector, start)
 
     def _of_pybullet(self, said: _Said, opened: int, start: int) -> None:

@@ -625,17 +625,19 @@ class CoreLight:
         addresses = _LightPasses(*(_address(passes.get(name)) for name in LIGHT))
         self._scene.check(self._scene.core.trace_light(self._handle, row, column, addresses, stop))
 
-    def pairs(self) -> list[tuple[int | None, int | None, int]]:
+    def pairs(self) -> list[tuple[int, int | None, int]]:
         """Two objects, which may be one, that paths have met in one place, and how often; the most frequent first, of 1,000.
 
-        Without a second one, an object that shadow rays see otherwise than others; without a first, a lamp without shadows.
+        Without a second one, an object that shadow rays see otherwise than others, or a lamp without shadows. Lamps are counted
+        after the objects.
         """
         objects, counts = np.empty((1000, 2), np.uint32), np.empty(1000, np.uint64)
         found = min(self._scene.core.light_pairs(self._handle, len(counts), _address(objects), _address(counts)), len(counts))
         order = np.argsort(-counts[:found].astype(np.float64), kind="stable")
         none = np.iinfo(np.uint32).max
-        names = [[None if name == none else int(name) for name in objects[i]] for i in order]
-        return [(first, second, int(counts[i])) for i, (first, second) in zip(order, names, strict=True)]
+        return [
+            (int(objects[i, 0]), None if objects[i, 1] == none else int(objects[i, 1]), int(counts[i])) for i in order.tolist()
+        ]
 
 
 class StopFlag:

@@ -129,12 +129,12 @@ class Tracer:
             pass
         pairs: dict[tuple[str, str], int] = {}
         seen_otherwise: dict[str, int] = {}
+        names = [*self._names[:-1], *(lamp.name for lamp in self._scene.lamps)]
         for first, second, count in light.pairs():
-            if first is None or second is None:
-                name = self._scene.lamps[second].name if first is None else self._names[first]
-                seen_otherwise[name] = seen_otherwise.get(name, 0) + count
+            if second is None:
+                seen_otherwise[names[first]] = seen_otherwise.get(names[first], 0) + count
             else:
-                pair = tuple(sorted((self._names[first], self._names[second])))
+                pair = tuple(sorted((names[first], names[second])))
                 pairs[pair] = pairs.get(pair, 0) + count
         return passes, pairs, seen_otherwise
 

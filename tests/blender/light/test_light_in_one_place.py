@@ -143,6 +143,33 @@ def test_light_past_what_not_all_rays_see_is_taken_out_and_named(lit_past_a_shee
     assert not compared(exported, "direct", brighter).passed
 
 
+def test_a_lamp_exactly_in_the_plane_of_a_ceiling_is_in_one_place_with_it(
+    scene, camera, add, add_lamp, mesh_from, tmp_path, read_passes
+):
+    """A wall that glows, and that its light does not reach, is compared as ever."""
+    for name, place in (("Floor", (0, 0, -1)), ("Ceiling", (0, 0, 2))):
+        add(mesh_from("plane", size=4), name, place)
+    glowing = mesh_from("plane", size=8)
+    material = bpy.data.materials.new("Glow")
+    material.use_nodes = True
+    inputs = material.node_tree.nodes["Principled BSDF"].inputs
+    inputs["Base Color"].default_value, inputs["Emission Strength"].default_value = (0, 0, 0, 1), 0.5
+    inputs["Specular IOR Level"].default_value, inputs["Emission Color"].default_value = 0, (1, 1, 1, 1)
+    glowing.materials.append(material)
+    add(glowing, "Wall", (0, 5, 0), rotation_euler=(1.57, 0, 0))
+    add_lamp("AREA", (0, 0, 2), energy=100.0)
+    scene.render.resolution_x, scene.render.resolution_y = 96, 64
+    paths = [tmp_path / f"cycles-{number}.exr" for number in range(2)]
+    exported = jobs.both_sides(Job(threads=2, level="direct", samples=64), paths)
+    tests = [Image(passes, exported.camera) for passes in read_passes(paths)]
+    found = compared(exported, "direct", tests)
+    assert found.passed, "\n".join(found.lines())
+    assert ("Ceiling", "Lamp") in found.pairs and "but for 2 objects with surfaces in one place" in found.sentence
+    assert 0.1 < found.taken_out.pixels.mean() < 0.9
+    brighter = [replace(image, passes={**image.passes, "Combined": 1.01 * image["Combined"]}) for image in tests]
+    assert not compared(exported, "direct", brighter).passed
+
+
 @pytest.mark.parametrize("light", ["surface", "lamp"])
 def test_where_all_rays_see_the_same_no_light_is_a_choice(lit_past_a_sheet, light):
     lit_past_a_sheet(light)

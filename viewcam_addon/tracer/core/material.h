@@ -35,6 +35,12 @@ struct Material {
     bool is_transparent() const { return transparent_; }
     // Whether it has normals of its own.
     bool is_bumped() const { return bumped_; }
+    // The colour of what is nothing but Lambert's reflection of one colour, else black.
+    Vec3 matte_color() const {
+        auto diffuse = closures.size() == 1 ? std::get_if<DiffuseClosure>(&closures[0].closure) : nullptr;
+        bool is_matte = diffuse && closures[0].factors.empty() && !bumped_ && !VIEWCAM_ISA::is_bumped(normal) && !diffuse->color.varies() && diffuse->roughness.is_black();
+        return is_matte ? diffuse->color.rgb : Vec3{};
+    }
     // Whether it asks for the tangents of a UV map.
     bool needs_tangents() const {
         return normal_on_tangents || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.on_tangents; });

@@ -107,15 +107,25 @@ struct NearestOnes {
     }
 };
 
-// The point of a surface that a ray meets, in rendering space.
-struct Interaction {
-    Vec3 position;
-    Vec3 normal;           // unit, of the true geometry, on the side that the ray came from
-    Vec3 shading;          // unit, smooth where the mesh is, turned to the other side where `normal` is
+// A point of a surface, in rendering space, or four.
+template <class T> struct SurfacePoint {
+    Vec3Of<T> position;
+    Vec3Of<T> normal;   // unit, of the true geometry, on the side that the ray came from
+    Vec3Of<T> shading;  // unit, smooth where the mesh is, turned to the other side where `normal` is
+    T offset{};         // how far along ±normal rays that leave must start, so that they do not meet where they start
+
+    // Where a ray in `direction` starts that leaves the surface here.
+    Vec3Of<T> ray_origin(Vec3Of<T> direction) const { return position + normal * copysign(offset, dot(normal, direction)); }
+};
+inline SurfacePoint<double> lane(const SurfacePoint<double4>& points, int i) {
+    return {lane(points.position, i), lane(points.normal, i), lane(points.shading, i), points.offset[i]};
+}
+
+// The point of a surface that a ray meets, and all that is known of it.
+struct Interaction : SurfacePoint<double> {
     Vec2 uv;               // of the mesh's UV map, 0 without one
     Vec3 vertex_color;     // linear, 0 on what has none
     Vec2 barycentric;      // of a triangle, the shares of its second and third corner
-    double offset = 0;     // how far along ±normal rays that leave must start, so that they do not meet where they start
     uint32_t material = 0; // index into Scene::materials
     uint32_t slot = 0;     // index into Scene::slots
     uint32_t object = NONE, primitive = NONE;
@@ -123,9 +133,6 @@ struct Interaction {
     double cosine = 0;     // between that ray and the true surface, which an ellipsoid's `normal` is not at a right angle to
     bool has_uv = false;   // whether the mesh has a UV map
     bool backside = false; // met from behind: from where the corners run clockwise in the object's own space, as in Cycles
-
-    // Where a ray in `direction` starts that leaves the surface here.
-    Vec3 ray_origin(Vec3 direction) const { return position + normal * std::copysign(offset, dot(normal, direction)); }
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

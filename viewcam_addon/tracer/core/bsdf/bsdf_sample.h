@@ -5,10 +5,11 @@
 namespace viewcam::VIEWCAM_ISA {
 
 // direction: unit. weight: the BSDF times the cosine over the density. pdf: the density by solid angle, INFINITE of mirrors.
-struct LobeSample {
-    Vec3 direction, weight;
-    double pdf = 0;
+template <class T> struct LobeSampleOf {
+    Vec3Of<T> direction, weight;
+    T pdf{};
 };
+using LobeSample = LobeSampleOf<double>;
 struct BSDFSample : LobeSample {
     RayKind kind = DIFFUSE;
     bool is_diffuse = true;

@@ -6,19 +6,20 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-struct Lambert {
+template <class T> struct LambertOf {
     static constexpr RayKind KIND = DIFFUSE;
     static constexpr bool DELTA = false, IS_DIFFUSE = true;
-    Vec3 color, normal;
+    Vec3Of<T> color, normal;
 
     // What of light from a unit direction is sent on, cosine included.
-    Vec3 eval(Vec3 to_light) const { return color * pdf(to_light); }
-    double pdf(Vec3 to_light) const { return larger(dot(normal, to_light), 0.0) / PI; }
-    LobeSample sample(Vec2 u) const {
-        double cosine;
-        Vec3 direction = cosine_direction(normal, u, cosine);
+    Vec3Of<T> eval(Vec3Of<T> to_light) const { return color * pdf(to_light); }
+    T pdf(Vec3Of<T> to_light) const { return max(dot(normal, to_light), T{}) / PI; }
+    LobeSampleOf<T> sample(Vec2Of<T> u) const {
+        T cosine;
+        Vec3Of<T> direction = cosine_direction(normal, u, cosine);
         return {direction, color, cosine / PI};
     }
 };
+using Lambert = LambertOf<double>;
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -7,28 +7,28 @@ namespace viewcam::VIEWCAM_ISA {
 
 // A direction as often as the cosine of its angle to the unit normal is large; `cosine` receives that. It points from where a
 // unit sphere touches the surface to a point that lies evenly all over the sphere, twice the cosine away: no frame is needed.
-inline Vec3 cosine_direction(Vec3 normal, Vec2 u, double& cosine) {
+template <class T> inline Vec3Of<T> cosine_direction(Vec3Of<T> normal, Vec2Of<T> u, T& cosine) {
     constexpr double POLE = 0x1p-33;  // half of a sampler's last digit: no direction is a pole, which would be none at all
-    double height = u.x * (2 - 4 * POLE) + (2 * POLE - 1), across = std::sqrt(1 - height * height);
-    SinCos turn = sincos_of_turns(u.y);
-    Vec3 direction = Vec3{across * turn.cos, across * turn.sin, height} + normal;
-    double size = length(direction);
-    cosine = size / 2;
+    T height = u.x * (2 - 4 * POLE) + (2 * POLE - 1), across = sqrt(1.0 - height * height);
+    SinCosOf<T> turn = sincos_of_turns(u.y);
+    Vec3Of<T> direction = Vec3Of<T>{across * turn.cos, across * turn.sin, height} + normal;
+    T size = length(direction);
+    cosine = size / 2.0;
     return direction / size;
 }
 
 // A direction spread evenly over the solid angle of a cone. spread: 1 − cos of half the opening; `short_of` receives 1 − cos of
 // the direction's angle to the axis.
-inline Vec3 cone_direction(Vec3 axis, double spread, Vec2 u, double& short_of) {
-    Frame frame(axis);
+template <class T> inline Vec3Of<T> cone_direction(Vec3Of<T> axis, Scalar<T> spread, Vec2Of<T> u, T& short_of) {
+    FrameOf<T> frame(axis);
     short_of = u.x * spread;
-    double sine = std::sqrt(short_of * (2 - short_of));
-    SinCos turn = sincos_of_turns(u.y);
-    return axis * (1 - short_of) + frame.s * (sine * turn.cos) + frame.t * (sine * turn.sin);
+    T sine = sqrt(short_of * (2.0 - short_of));
+    SinCosOf<T> turn = sincos_of_turns(u.y);
+    return axis * (1.0 - short_of) + frame.s * (sine * turn.cos) + frame.t * (sine * turn.sin);
 }
 
 // 1 − cos of angles up to a right one: a light that is far away fills a cone whose cosine is 1 to the last bit.
-inline double one_minus_cosine(double squared_sine) { return squared_sine / (1 + std::sqrt(1 - squared_sine)); }
+template <class T> inline T one_minus_cosine(T squared_sine) { return squared_sine / (1.0 + sqrt(1.0 - squared_sine)); }
 
 // About the cosine under which what reaches `reach` round a place is seen, 0 only if all of it is below the horizon.
 // height: of the place above the surface's plane. distance: of the place.

@@ -38,7 +38,7 @@ struct GeometryHits {
 // the planes.
 template <class RayOf, class HitOf>
 inline void write_geometry(const Scene& scene, const RayOf& ray_of, const HitOf& hit_of, int count, const GeometryPasses& passes, const size_t* pixels) {
-    constexpr double BACKGROUND_DEPTH = 1e10;
+    static constexpr double BACKGROUND_DEPTH = 1e10;
     Ray rays[PACKET];
     const Ray* met_by[PACKET];
     Hit met[PACKET];

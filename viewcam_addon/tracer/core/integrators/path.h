@@ -26,10 +26,17 @@
 // material that asks which kind has come, a lamp without shadows): how much of it a picture has is its renderer's own weights of multiple
 // importance sampling, which elsewhere make no difference.
 //
+// Where paths come to matte surfaces of meshes, four go on at a time, at every depth: surface, light, lobe and the next ray are computed
+// in vectors, with nothing in memory between them, whatever the other paths of the block have met (MattePaths). Formulas that both
+// ways share are templates over one number or four, so that a path has the same bits either way. 378,000 triangles under a sun of half
+// a degree take 1.4 times as many samples a second so, under an area light at level `path` 1.2 times, whose single rays are most of the
+// work; numbers, film points and sums alone in vectors, with structures of a path each between them, 1.0 to 1.06 times.
+//
 // Rejected: splitting a path at glass, which makes work where light is faint.
 #pragma once
 #include <map>
 #include <mutex>
+#include <utility>
 
 #include "../film/film.h"
 #include "../lights/light_sampler.h"
@@ -38,15 +45,17 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-// A ray to a light ends before it by what rounding can move the light's own surface along the ray: what the light touches
-// does not hide it.
-inline Ray shadow_ray(const Interaction& point, const LightSample& sample) {
+// How far a ray from a point goes to a light: it ends before it by what rounding can move the light's own surface along the ray, so
+// that what the light touches does not hide it.
+template <class T> inline T shadow_ray_end(const SurfacePoint<T>& point, Vec3Of<T> origin, const LightSampleOf<T>& sample) {
     constexpr double ROUNDINGS = 32 * 0x1p-53, FLATTEST = 1e-6;
+    T largest = max_component(abs(origin)) + sample.distance;
+    T slack = (2.0 * point.offset + ROUNDINGS * largest) / max(sample.cosine, splat<T>(FLATTEST));
+    return select(Mask<T>(sample.distance < INFINITE), max(sample.distance - slack, T{}), splat<T>(INFINITE));
+}
+inline Ray shadow_ray(const Interaction& point, const LightSample& sample) {
     Vec3 origin = point.ray_origin(sample.direction);
-    if (sample.distance == INFINITE) return {origin, sample.direction, 0, INFINITE};
-    double largest = max_component(abs(origin)) + sample.distance;
-    double slack = (2 * point.offset + ROUNDINGS * largest) / larger(sample.cosine, FLATTEST);
-    return {origin, sample.direction, 0, larger(sample.distance - slack, 0.0)};
+    return {origin, sample.direction, 0, shadow_ray_end<double>(point, origin, sample)};
 }
 
 // Samples of pixels, row · width + column, with the keys of these and the rays from the eye.
@@ -81,6 +90,7 @@ class PathIntegrator {
             meets_[kind] = shines || lights_.environment().lights(kind) || lights_.meets_lamps(kind);
             only_sky_[kind] = !shines && !transparent_ && !lights_.meets_lamps(kind) && !scene.hides_anything();
         }
+        for (const Material& material : scene.illumination.materials) matte_.push_back(material.matte_color());
         shadow_linked_ = shines && scene.is_shadow_linked();
         for (const ValueNode& node : scene.illumination.nodes.all) has_pixels_ |= std::holds_alternative<BumpNode>(node);
         dark_ = !shines && !transparent_;
@@ -96,7 +106,7 @@ class PathIntegrator {
     const SobolSampler& sampler() const { return sampler_; }
     const Scene& scene() const { return scene_; }
     // Two objects, which may be one, that paths have met in one place, and how often; with NONE in the place of the second, an object
-    // that shadow rays see otherwise than others, and with NONE in that of the first, a lamp without shadows.
+    // that shadow rays see otherwise than others, or a lamp without shadows. Lamps are counted after the objects.
     std::map<std::pair<uint32_t, uint32_t>, uint64_t> coincident_pairs() const {
         std::lock_guard lock(mutex_);
         return pairs_;
@@ -117,7 +127,7 @@ class PathIntegrator {
         block.live = 0;
         for (int i = 0; i < count; i++) light[i].clear();
         start(count, block);
-        for (int depth = 1; block.live > 0; depth++) {
+        for (int depth = 1; block.live > 0 || block.matte > 0; depth++) {
             scatter(depth, block);
             gather(depth, block);
             arrive(depth, block);
@@ -149,19 +159,37 @@ class PathIntegrator {
     };
     // What a light brings to a path if nothing hides it.
     struct Shadowed {
+        double4 light, other;  // other: of what is not diffuse where the eye sees it
         int sample;
         Category category;
-        bool traced;
+        bool traced, has_other;
         RayKind shadow_rays;
-        RayState ray;
-        Vec3 light, other;  // other: of what is not diffuse where the eye sees it
+        RayState ray;  // where anything lets light through
+    };
+    // Where a path has come to a matte surface: on a triangle, of which nothing has been computed yet.
+    struct MattePoint {
+        TriangleHit hit;
+        double4 color;
+    };
+    // Some of four paths at such points, where a light, or the path's next ray, is found.
+    struct MattePaths {
+        unsigned lanes;
+        int slots[4], samples[4];
+        const Path* paths[4];
+        SurfacePoint<double4> at;
+        Vec3x4 color, weight;
     };
     struct Block {
         const CameraSamples* samples;
         PathLight *light, ignored;
         int live = 0, lit[LightSampler::ASKED] = {};
         Path paths[MOST], onwards[MOST];
-        Interaction tables[2][MOST], *points = tables[0], *next_points = tables[1];
+        // Paths at matte surfaces by slot, which is the sample's number for rays from the eye; `matte_lanes`: which of each four are there.
+        int matte = 0;
+        uint8_t matte_lanes[MOST / 4] = {};
+        Path matte_paths[MOST];
+        MattePoint matte_points[MOST];
+        Interaction tables[2][2 * MOST], *points = tables[0], *next_points = tables[1];  // those of matte surfaces behind the others
         Shadowed shadowed[LightSampler::ASKED][MOST];  // by the light that was asked
         Rays shadow_rays[LightSampler::ASKED];
         Hits hits;
@@ -209,10 +237,11 @@ class PathIntegrator {
         }
         if (left.differ()) {
             std::lock_guard lock(mutex_);
-            pairs_[shadows ? std::pair(cause, NONE) : std::pair(NONE, lamp->number)]++;
+            pairs_[{shadows ? cause : name_of(*lamp), NONE}]++;
         }
         return left;
     }
+    uint32_t name_of(const Light& lamp) const { return uint32_t(scene_.objects.size()) + lamp.number; }
     // What a surface leaves of light that comes along a ray through it.
     Vec3 left_behind(const Ray& ray, const Hit& hit, RayState state) const {
         if (!(scene_.objects[hit.object].visible & state.kind)) return {1, 1, 1};
@@ -252,14 +281,19 @@ class PathIntegrator {
         point.offset = larger(point.offset, 2 * reach * larger(point.cosine, 0.0));
         path.weight = min(path.weight * double(hits.size()), MOST_WEIGHT);
     }
-    // How far before its light a shadow ray must end, so that nothing in the light's place counts; 0 where nothing is there.
-    [[gnu::noinline]] double coincident_end(const Interaction& point, const LightSample& light) const {
+    // How far before its light a shadow ray must end, so that nothing in the light's place counts; 0 where nothing is there. Notes
+    // the surface that a lamp lies in, as in that of a ceiling; the places of surfaces that shine are met by paths, too.
+    [[gnu::noinline]] double coincident_end(const Interaction& point, const LightSample& sample, const Light& light) const {
         static thread_local std::vector<Hit> hits;
-        if (!(light.distance < INFINITE)) return 0;
-        double largest = max_component(abs(point.position + scene_.origin)) + light.distance;
-        double reach = coincident_reach(largest, light.cosine);
-        scene_.surfaces({point.position, light.direction, larger(light.distance - reach, 0.0), light.distance + reach}, SHADOW, INFINITE, hits);
-        return hits.size() > 1 ? reach : 0;
+        if (!(sample.distance < INFINITE && light.casts_shadow)) return 0;
+        double largest = max_component(abs(point.position + scene_.origin)) + sample.distance;
+        double reach = coincident_reach(largest, sample.cosine);
+        scene_.surfaces({point.position, sample.direction, larger(sample.distance - reach, 0.0), sample.distance + reach}, SHADOW, INFINITE, hits);
+        if (light.mesh()) return hits.size() > 1 ? reach : 0;
+        if (hits.empty()) return 0;
+        std::lock_guard lock(mutex_);
+        pairs_[{hits[0].object, name_of(light)}]++;
+        return reach;
     }
 
     const Material& material(const Interaction& point) const { return scene_.illumination.materials[point.material]; }
@@ -274,6 +308,21 @@ class PathIntegrator {
         const Color& normal = material(point).normal;
         if (VIEWCAM_ISA::is_bumped(normal)) point.shading = at.normal(normal);
         return at;
+    }
+    // Whether what a path has met is matte, and no more must be known of it; `point` receives what scattering needs.
+    bool meets_matte(const Hit& hit, MattePoint& point) const {
+        if (coincident_ > 0 || has_pixels_) return false;
+        const Object& object = scene_.objects[hit.object];
+        auto mesh = std::get_if<TriangleMesh>(&scene_.geometries[object.geometry]);
+        if (!mesh) return false;
+        Vec3 color = matte_[scene_.slots[object.first_slot + uint32_t(mesh->materials[hit.primitive])].material];
+        if (VIEWCAM_ISA::is_black(color)) return false;
+        point = {{mesh, &object, nullptr, hit.primitive}, double4{color.x, color.y, color.z, 0}};
+        return true;
+    }
+    static void add_matte(int slot, Block& block) {
+        block.matte++;
+        block.matte_lanes[slot / 4] |= uint8_t(1 << slot % 4);
     }
     // What a path brings of the light of a surface where its ray arrives, less what samples of that light find. distance: from
     // where it was scattered.
@@ -430,6 +479,10 @@ class PathIntegrator {
                 continue;
             }
             block.light[i].covered = 1;
+            if (meets_matte(hit, block.matte_points[i])) {
+                add_matte(i, block);
+                continue;
+            }
             met_by[met++] = &ray;
         }
         scene_.interactions(met_by, hits, met, block.points);
@@ -512,7 +565,148 @@ class PathIntegrator {
             next.may_touch = passed ? point.backside : path.touches;
             onwards++;
         }
+        if (block.matte > 0) scatter_matte(depth, onwards, block);
         block.live = onwards;
+    }
+
+    // The same of paths at matte surfaces, four at a time.
+    void scatter_matte(int depth, int& onwards, Block& block) const {
+        block.matte = 0;
+        for (int first = 0; first < MOST; first += 4) {
+            unsigned lanes = std::exchange(block.matte_lanes[first / 4], 0);
+            if (!lanes) continue;
+            MattePaths four = matte_paths(first, lanes, depth, block);
+            if (!lit_) continue;
+            light_matte(four, depth, block, onwards);
+        }
+    }
+    // What is known of four paths where they are; of the eye's, adds the colour. A lane that has none goes along with one that has.
+    [[gnu::always_inline]] MattePaths matte_paths(int first, unsigned lanes, int depth, Block& block) const {
+        static constexpr Path eye{};
+        MattePaths four;
+        four.lanes = lanes;
+        TriangleHit hits[4];
+        Vec3x4 origin, direction;
+        for (int i = 0, some = std::countr_zero(lanes); i < 4; i++) {
+            int slot = four.slots[i] = first + (lanes >> i & 1 ? i : some);
+            hits[i] = block.matte_points[slot].hit;
+            four.paths[i] = depth == 1 ? &eye : &block.matte_paths[slot];
+            four.samples[i] = depth == 1 ? slot : four.paths[i]->sample;
+        }
+        auto color = [&](int i) { return block.matte_points[four.slots[i]].color; };
+        double4 red = color(0), green = color(1), blue = color(2), none = color(3);
+        transpose(red, green, blue, none);
+        four.color = {red, green, blue};
+        if (depth == 1) {
+            const Rays& rays = block.samples->rays;
+            origin = {load<double4>(rays.origin[0] + first), load<double4>(rays.origin[1] + first), load<double4>(rays.origin[2] + first)};
+            direction = {load<double4>(rays.direction[0] + first), load<double4>(rays.direction[1] + first), load<double4>(rays.direction[2] + first)};
+            four.weight = splat4(Vec3{1, 1, 1});
+            for (unsigned left = lanes; left;) {
+                int i = take_bit(left);
+                block.light[four.samples[i]].add(COLOR, color(i));
+            }
+        } else {
+            origin = gather4([&](int i) { return four.paths[i]->ray.origin; });
+            direction = gather4([&](int i) { return four.paths[i]->ray.direction; });
+            four.weight = gather4([&](int i) { return four.paths[i]->weight; });
+        }
+        four.at = TriangleSurfaces(hits, 4, origin, direction).points();
+        return four;
+    }
+    void light_matte(const MattePaths& four, int depth, Block& block, int& onwards) const {
+        auto of_samples = [&](const uint32_t* values) { return uint4{values[four.samples[0]], values[four.samples[1]], values[four.samples[2]], values[four.samples[3]]}; };
+        uint4 keys = of_samples(block.samples->key), numbers = of_samples(block.samples->number);
+        auto number = [&](SobolSampler::Purpose purpose) { return sampler_.number(keys, numbers, SobolSampler::dimension(depth, purpose)); };
+        auto pair = [&](SobolSampler::Purpose purpose) { return sampler_.pair(keys, numbers, SobolSampler::dimension(depth, purpose)); };
+        auto point_of = [&](int i) {
+            const TriangleHit& hit = block.matte_points[four.slots[i]].hit;
+            Interaction point;
+            static_cast<SurfacePoint<double>&>(point) = lane(four.at, i);
+            point.object = uint32_t(hit.object - scene_.objects.data()), point.primitive = hit.triangle;
+            return point;
+        };
+        unsigned last = 0;
+        for (int i = 0; i < 4; i++)
+            if (depth >= most_ || four.paths[i]->scattered[row(DIFFUSE)] + 1 >= most_of_[DIFFUSE]) last |= 1u << i;
+
+        LambertOf<double4> lobe{four.color, four.at.shading};
+        LightSampler::Choices choices[LightSampler::ASKED];
+        double4 brightest, u{};
+        Vec2x4 u_light;
+        if (lights_.is_random()) u = number(SobolSampler::LIGHT), u_light = pair(SobolSampler::LIGHT_POINT);
+        lights_.choose(point_of, four.lanes, u, depth == 1, choices, brightest);
+        for (int slot = 0; slot < LightSampler::ASKED; slot++)
+            if (choices[slot].lanes) ask(choices[slot], slot, four, lobe, point_of, u_light, depth, block);
+
+        unsigned going = meets_[DIFFUSE] ? four.lanes : four.lanes & ~last;
+        if (!going) return;
+        LobeSampleOf<double4> sampled = lobe.sample(pair(SobolSampler::DIRECTION));
+        going &= bits(long4(dot(sampled.direction, four.at.normal) > splat4(0.0)));
+        Vec3x4 weight = four.weight * sampled.weight, origin = four.at.ray_origin(sampled.direction);
+        while (going) {
+            int i = take_bit(going);
+            const Path& path = *four.paths[i];
+            bool ends = last >> i & 1;
+            Vec3 left = min(lane(weight, i), MOST_WEIGHT);
+            double survival = 1;
+            if (ends && brightest[i] > 0)
+                survival = lights_.sky_chance(brightest[i], DIFFUSE);
+            else if (!ends && depth > CERTAIN)
+                survival = smaller(std::sqrt(max_component(left)), 1.0);
+            if (survival < 1) {
+                if (sampler_.number(keys[i], numbers[i], SobolSampler::dimension(depth, SobolSampler::ROULETTE)) >= survival) continue;
+                left = left / survival;
+            }
+            block.points[MOST + four.slots[i]] = point_of(i);
+            Path& next = block.onwards[onwards++];
+            next = path;
+            next.sample = four.samples[i], next.from = MOST + four.slots[i];
+            next.kind = DIFFUSE, next.diffuse = true, next.last = ends, next.through = false;
+            next.scattered[row(DIFFUSE)]++;
+            next.category = after(path.category, true, depth);
+            next.weight = left, next.pdf = sampled.pdf[i];
+            next.ray = {lane(origin, i), lane(sampled.direction, i), 0, INFINITE};
+            next.may_touch = path.touches;
+        }
+    }
+
+    // Notes what lights bring to matte points if nothing hides them.
+    template <class PointOf>
+    void ask(const LightSampler::Choices& choice, int slot, const MattePaths& four, const LambertOf<double4>& lobe, const PointOf& point_of, const Vec2x4& u, int depth, Block& block) const {
+        LightSampleOf<double4> sample = choice.sample_li(four.at, point_of, u);
+        long4 lossy{}, found{};
+        unsigned lanes = 0, traced = 0;
+        for (unsigned left = choice.lanes; left;) {
+            int i = take_bit(left);
+            const Light& light = *choice.light[i];
+            lossy[i] = -int64_t(light.multiple_importance), found[i] = -int64_t(light.is_found_by(DIFFUSE));
+            if (!(light.hidden_from & DIFFUSE) && (!lights_.is_linked() || lights_.reaches(light, point_of(i)))) lanes |= 1u << i;
+            traced |= unsigned(light.casts_shadow) << i;
+        }
+        // See the other one.
+        double4 zero = splat4(0.0), pdf = lobe.pdf(sample.direction);
+        Vec3x4 light = four.color * pdf;
+        long4 behind = ~long4(dot(four.at.normal, sample.direction) > zero);
+        if (long4 shared = found | (lossy & behind); any(shared))
+            light = light * select(shared, power_heuristic(sample.pdf * choice.chance, pdf), splat4(1.0));
+        light = light * sample.weight;
+        lanes &= ~bits(long4(light.x == zero) & long4(light.y == zero) & long4(light.z == zero));
+        if (!lanes) return;
+        light = light * four.weight / choice.chance;
+        double4 brought[4] = {light.x, light.y, light.z, zero};
+        transpose(brought[0], brought[1], brought[2], brought[3]);
+        Vec3x4 origin = four.at.ray_origin(sample.direction);
+        double4 end = shadow_ray_end(four.at, origin, sample);
+        while (lanes) {
+            int i = take_bit(lanes), place = block.lit[slot]++;
+            const Path& path = *four.paths[i];
+            Shadowed& shadowed = block.shadowed[slot][place];
+            shadowed.light = brought[i], shadowed.has_other = false, shadowed.sample = four.samples[i], shadowed.category = after(path.category, true, depth);
+            shadowed.traced = traced >> i & 1, shadowed.shadow_rays = choice.light[i]->shadow_rays;
+            if (transparent_) shadowed.ray = {SHADOW, false, false, depth, path.passed, path.scattered};
+            if (shadowed.traced) block.shadow_rays[slot].set(place, {lane(origin, i), lane(sample.direction, i), 0, end[i]});
+        }
     }
 
     // Notes what a light brings to a point if nothing hides it.
@@ -524,7 +718,7 @@ class PathIntegrator {
         // Light that the smooth surface has before it and the true one behind it counts, less what scattered rays would have found:
         // these are lost, as in Cycles.
         bool behind = !(dot(point.normal, sample.direction) > 0);
-        double end = coincident_ > 0 && choice.light->mesh() ? coincident_end(point, sample) : 0;
+        double end = coincident_ > 0 && !choice.light->is_environment() ? coincident_end(point, sample, *choice.light) : 0;
         uint32_t kinds = ~choice.light->hidden_from, unseen = 0;  // unseen: for which no scattered ray finds what this one does
         bool hidden_from_some = coincident_ > 0 && !path.coincident && end == 0;
         if (hidden_from_some) {
@@ -543,8 +737,9 @@ class PathIntegrator {
         if (is_black(light.diffuse) && is_black(light.other)) return;
         int place = block.lit[choice.slot]++;
         bool traced = choice.light->casts_shadow && !hidden_from_some;
-        block.shadowed[choice.slot][place] = {path.sample, after(path.category, true, depth), traced, choice.light->shadow_rays, {SHADOW, false, false, depth, path.passed, path.scattered},
-                                              light.diffuse * path.weight / choice.chance, light.other * path.weight / choice.chance};
+        Vec3 diffuse = light.diffuse * path.weight / choice.chance, other = light.other * path.weight / choice.chance;
+        block.shadowed[choice.slot][place] = {double4{diffuse.x, diffuse.y, diffuse.z, 0}, double4{other.x, other.y, other.z, 0}, path.sample, after(path.category, true, depth),
+                                              traced, !is_black(light.other), choice.light->shadow_rays, {SHADOW, false, false, depth, path.passed, path.scattered}};
         if (has_pixels_) block.shadowed[choice.slot][place].ray.width = at.footprint();
         if (!traced) return;
         Ray ray = shadow_ray(point, sample);
@@ -587,14 +782,14 @@ class PathIntegrator {
             }
             for (int i = 0; i < count; i++) {
                 PathLight& light = block.light[shadowed[i].sample];
-                if (!hidden[i]) {
-                    light.add(shadowed[i].category, shadowed[i].light);
-                    light.add(OTHER, shadowed[i].other);
-                } else if (transparent_) {
-                    Vec3 left = transmittance(rays.ray(i), shadowed[i].shadow_rays, shadowed[i].ray);
-                    light.add(shadowed[i].category, shadowed[i].light * left);
-                    light.add(OTHER, shadowed[i].other * left);
+                if (hidden[i] && !transparent_) continue;
+                double4 left = splat4(1.0);
+                if (hidden[i]) {
+                    Vec3 through = transmittance(rays.ray(i), shadowed[i].shadow_rays, shadowed[i].ray);
+                    left = double4{through.x, through.y, through.z, 0};
                 }
+                light.add(shadowed[i].category, shadowed[i].light * left);
+                if (shadowed[i].has_other) light.add(OTHER, shadowed[i].other * left);
             }
         }
     }
@@ -649,7 +844,11 @@ class PathIntegrator {
             if (!hit) hit = scene_.closest(path.ray, path.kind);
             meet_lamps(path, path.ray, hit, depth, block);
             if (hit && path.last && dark_) continue;
-            if (hit)
+            if (hit && path.inside == NONE && meets_matte(hit, block.matte_points[block.matte])) {
+                if (path.last || has_ended(path)) continue;
+                block.matte_paths[block.matte] = path;
+                add_matte(block.matte, block);
+            } else if (hit)
                 arrived[met] = i, met_by[met] = &path.ray, hits[met++] = hit;
             else
                 leave(path, path.ray, depth, block);
@@ -671,6 +870,7 @@ class PathIntegrator {
     static Vec3 min(Vec3 rgb, double most) { return {smaller(rgb.x, most), smaller(rgb.y, most), smaller(rgb.z, most)}; }
 
     const Scene& scene_;
+    std::vector<Vec3> matte_;  // of each material, Material::matte_color
     LightSampler lights_;
     SobolSampler sampler_;
     int most_, most_of_[TRANSMISSION + 1] = {};

@@ -28,10 +28,12 @@ class Sun {
 
     bool is_sized() const { return spread_ > 0; }
 
-    LightSample sample_li(const Interaction&, Vec2 u) const {
-        double short_of;
-        Vec3 direction = spread_ > 0 ? cone_direction(towards_, spread_, u, short_of) : towards_;
-        return {direction, INFINITE, irradiance_ * (2 / (2 - spread_)), pdf_li()};  // the radiance times 2π (1 − cos)
+    template <class T> LightSampleOf<T> sample_li(const SurfacePoint<T>&, Vec2Of<T> u) const {
+        T short_of;
+        Vec3Of<T> direction = splat<T>(towards_);
+        if (spread_ > 0) direction = cone_direction(direction, splat<T>(spread_), u, short_of);
+        // The weight is the radiance times 2π (1 − cos).
+        return {direction, splat<T>(INFINITE), splat<T>(irradiance_ * (2 / (2 - spread_))), splat<T>(pdf_li())};
     }
     double pdf_li(const Interaction&, Vec3) const { return pdf_li(); }
 
@@ -71,34 +73,28 @@ class Point {
     Vec3 radiance() const { return radiance_; }
 
     // Whether light comes from everywhere at a place.
-    bool is_around(Vec3 place) const {
-        Vec3 way = center_ - place;
-        return !soft_ && radius_ > 0 && std::sqrt(dot(way, way)) <= radius_;
+    template <class T> Mask<T> is_around(Vec3Of<T> place) const {
+        if (soft_ || radius_ == 0) return Mask<T>{};
+        Vec3Of<T> way = splat<T>(center_) - place;
+        return Mask<T>(sqrt(dot(way, way)) <= radius_);
     }
     // 1 − cos of half the cone that the light fills, seen from outside.
-    double spread(Vec3 place) const {
-        Vec3 way = center_ - place;
-        double to_edge = dot(way, way) + (soft_ ? radius_ * radius_ : 0);
-        return to_edge > 0 ? one_minus_cosine(smaller(radius_ * radius_ / to_edge, 1.0)) : 0;
+    template <class T> T spread(Vec3Of<T> place) const {
+        Vec3Of<T> way = splat<T>(center_) - place;
+        T to_edge = dot(way, way) + (soft_ ? radius_ * radius_ : 0.0);
+        return select(Mask<T>(to_edge > 0.0), one_minus_cosine(min(radius_ * radius_ / to_edge, splat<T>(1))), T{});
     }
 
-    LightSample sample_li(const Interaction& from, Vec2 u) const {
-        Vec3 way = center_ - from.position;
-        double squared = dot(way, way), distance = std::sqrt(squared);
-        Vec3 axis = distance > 0 ? way / distance : Vec3{0, 0, 1};
-        if (radius_ == 0) return {axis, distance, bounded(distance > 0 ? 1 / (4 * PI * squared) : 0)};
-        if (is_around(from.position)) {
-            double cosine;
-            Vec3 ahead = cosine_direction(from.shading, u, cosine);
-            double along = dot(way, ahead), reached = along + std::sqrt(larger(radius_ * radius_ - squared + along * along, 0.0));
-            return {ahead, reached, radiance_ * (PI / larger(cosine, LEAST_COSINE)), cosine / PI};
-        }
-        double to_edge = squared + (soft_ ? radius_ * radius_ : 0), open = spread(from.position), short_of;
-        Vec3 ahead = cone_direction(axis, open, u, short_of);
-        double along = distance * (1 - short_of);
-        double root = std::sqrt(larger(radius_ * radius_ - squared * short_of * (2 - short_of), 0.0));
-        double reached = !soft_ ? along - root : along > 0 ? squared / along : 0;
-        return {ahead, reached, bounded(to_edge > 0 ? 1 / ((2 - open) * (2 * PI * to_edge)) : 0), 1 / (2 * PI * open)};
+    template <class T> LightSampleOf<T> sample_li(const SurfacePoint<T>& from, Vec2Of<T> u) const {
+        Vec3Of<T> way = splat<T>(center_) - from.position;
+        T squared = dot(way, way), distance = sqrt(squared);
+        Mask<T> apart(distance > 0.0);
+        Vec3Of<T> axis = select(apart, way / distance, splat<T>(Vec3{0, 0, 1}));
+        if (radius_ == 0) return {axis, distance, bounded(select(apart, 1.0 / (4 * PI * squared), T{}))};
+        Mask<T> around = is_around(from.position);
+        if (!any(around)) return sample_outside(from, u, axis, squared, distance);
+        LightSampleOf<T> inside = sample_inside(from, u, way, squared);
+        return all(around) ? inside : select<T>(around, inside, sample_outside(from, u, axis, squared, distance));
     }
     double pdf_li(const Interaction& from, Vec3 direction) const {
         if (radius_ == 0) return INFINITE;
@@ -144,7 +140,21 @@ class Point {
    private:
     static constexpr double LEAST_COSINE = 1e-30;
 
-    Vec3 bounded(double factor) const { return power_ * smaller(factor, MOST_WEIGHT_OF_LIGHT); }
+    // way, axis: to the middle, and that of unit length; squared, distance: of the middle.
+    template <class T> LightSampleOf<T> sample_inside(const SurfacePoint<T>& from, Vec2Of<T> u, Vec3Of<T> way, T squared) const {
+        T cosine;
+        Vec3Of<T> ahead = cosine_direction(from.shading, u, cosine);
+        T along = dot(way, ahead), reached = along + sqrt(max(radius_ * radius_ - squared + along * along, T{}));
+        return {ahead, reached, splat<T>(radiance_) * (PI / max(cosine, splat<T>(LEAST_COSINE))), cosine / PI};
+    }
+    template <class T> LightSampleOf<T> sample_outside(const SurfacePoint<T>& from, Vec2Of<T> u, Vec3Of<T> axis, T squared, T distance) const {
+        T to_edge = squared + (soft_ ? radius_ * radius_ : 0.0), open = spread(from.position), short_of;
+        Vec3Of<T> ahead = cone_direction(axis, open, u, short_of);
+        T along = distance * (1.0 - short_of), root = sqrt(max(radius_ * radius_ - squared * short_of * (2.0 - short_of), T{}));
+        T reached = soft_ ? select(Mask<T>(along > 0.0), squared / along, T{}) : along - root;
+        return {ahead, reached, bounded(select(Mask<T>(to_edge > 0.0), 1.0 / ((2.0 - open) * (2 * PI * to_edge)), T{})), 1.0 / (2 * PI * open)};
+    }
+    template <class T> Vec3Of<T> bounded(T factor) const { return splat<T>(power_) * min(factor, splat<T>(MOST_WEIGHT_OF_LIGHT)); }
 
     Vec3 center_, power_, radiance_;
     double radius_;
@@ -231,34 +241,32 @@ class Spot {
 };
 
 // A rectangle parallel to the x-y plane, seen from the origin: points of it spread evenly over the solid angle that it fills.
-class SphericalRectangle {
+template <class T> class SphericalRectangle {
    public:
     // depth: of the plane, of either sign.
-    SphericalRectangle(double x0, double x1, double y0, double y1, double depth)
+    SphericalRectangle(T x0, T x1, T y0, T y1, T depth)
         : x0_(x0), x1_(x1), y0_(y0), y1_(y1), depth_(depth), squared_(depth * depth) {
         // The depth components of the unit normals of the planes through the origin and each side; the others are 0 in pairs.
-        bottom_ = -y0 / std::sqrt(squared_ + y0 * y0), top_ = y1 / std::sqrt(squared_ + y1 * y1);
-        double right = x1 / std::sqrt(squared_ + x1 * x1), left = -x0 / std::sqrt(squared_ + x0 * x0);
+        bottom_ = -y0 / sqrt(squared_ + y0 * y0), top_ = y1 / sqrt(squared_ + y1 * y1);
+        T right = x1 / sqrt(squared_ + x1 * x1), left = -x0 / sqrt(squared_ + x0 * x0);
         behind_ = asin(top_ * left) + asin(left * bottom_);
         angle_ = asin(bottom_ * right) + asin(right * top_) + behind_;
     }
-    double solid_angle() const { return angle_ > 0 ? angle_ : 0; }
-    Vec2 point(Vec2 u) const {
+    T solid_angle() const { return max(angle_, T{}); }
+    Vec2Of<T> point(Vec2Of<T> u) const {
         // From here on x, that part of the angle is to the left of it which u asks for.
-        SinCos turn = sincos_of_turns((u.x * angle_ - behind_) * (0.5 / PI));
-        double rest = turn.cos * bottom_ + top_;
-        double slope = std::sqrt(larger(rest * rest - turn.sin * turn.sin * (squared_ / (squared_ + y0_ * y0_)), 0.0));
-        double x = smaller(larger(std::copysign(depth_, rest) * turn.sin / slope, x0_), x1_);
+        SinCosOf<T> turn = sincos_of_turns((u.x * angle_ - behind_) * (0.5 / PI));
+        T rest = turn.cos * bottom_ + top_;
+        T slope = sqrt(max(rest * rest - turn.sin * turn.sin * (squared_ / (squared_ + y0_ * y0_)), T{}));
+        T x = min(max(copysign(depth_, rest) * turn.sin / slope, x0_), x1_);
         // With x known, y spreads as the sine of its elevation.
-        double squared = x * x + squared_;
-        double low = y0_ / std::sqrt(squared + y0_ * y0_), high = y1_ / std::sqrt(squared + y1_ * y1_);
-        double elevation = low + u.y * (high - low);
-        double y = elevation * std::sqrt(squared / larger(1 - elevation * elevation, 0.0));
-        return {x, smaller(larger(y, y0_), y1_)};
+        T squared = x * x + squared_, low = y0_ / sqrt(squared + y0_ * y0_), high = y1_ / sqrt(squared + y1_ * y1_);
+        T elevation = low + u.y * (high - low), y = elevation * sqrt(squared / max(1.0 - elevation * elevation, T{}));
+        return {x, min(max(y, y0_), y1_)};
     }
 
    private:
-    double x0_, x1_, y0_, y1_, depth_, squared_, bottom_, top_, behind_, angle_;
+    T x0_, x1_, y0_, y1_, depth_, squared_, bottom_, top_, behind_, angle_;
 };
 
 // Area lights: rectangles and ellipses that shine to one side, into all of it or, as through the slats of a grid, into a cone.
@@ -298,33 +306,15 @@ class Area {
 
     bool is_sized() const { return true; }
 
-    LightSample sample_li(const Interaction& from, Vec2 u) const {
-        Vec3 way = center_ - from.position;
-        if (is_near(way)) {
-            double middle[2] = {dot(first_, way), dot(second_, way)}, depth = dot(normal_, way);
-            SphericalRectangle seen = rectangle(way);
-            double angle = seen.solid_angle();
-            if (ellipse_ || angle >= SMALLEST_ANGLE) {
-                Vec2 place = seen.point(u);
-                double distance = std::sqrt(place.x * place.x + place.y * place.y + depth * depth);
-                Vec3 ahead = (first_ * place.x + second_ * place.y + normal_ * depth) / distance;
-                bool lit = depth < 0 && (!ellipse_ || covers((place.x - middle[0]) / lengths_[0], (place.y - middle[1]) / lengths_[1]));
-                double cosine = -dot(normal_, ahead);
-                return {ahead, distance, lit ? radiance_ * (angle * through_grid(cosine)) : Vec3{}, 1 / angle, cosine};
-            }
-        }
-        double across = 2 * u.x - 1, along = 2 * u.y - 1;
-        if (ellipse_) {
-            SinCos turn = sincos_of_turns(u.y);
-            double radius = std::sqrt(u.x);
-            across = radius * turn.cos, along = radius * turn.sin;
-        }
-        Vec3 to = way + first_ * (lengths_[0] * across) + second_ * (lengths_[1] * along);
-        double squared = dot(to, to), distance = std::sqrt(squared);
-        Vec3 ahead = to / distance;
-        double cosine = larger(-dot(normal_, ahead), 0.0);
-        double weight = smaller(cosine / (PI * squared), MOST_WEIGHT_OF_LIGHT) * through_grid(cosine);
-        return {ahead, distance, power_ * weight, squared / (cosine * area_), cosine};
+    template <class T> LightSampleOf<T> sample_li(const SurfacePoint<T>& from, Vec2Of<T> u) const {
+        Vec3Of<T> way = splat<T>(center_) - from.position;
+        Mask<T> near = is_near(way);
+        if (!any(near)) return sample_area(way, u);
+        SphericalRectangle<T> seen = rectangle(way);
+        T angle = seen.solid_angle();
+        if (!ellipse_) near = Mask<T>(near & Mask<T>(angle >= SMALLEST_ANGLE));
+        LightSampleOf<T> sample = sample_angle(way, seen.point(u), angle);
+        return all(near) ? sample : select<T>(near, sample, sample_area(way, u));
     }
     double pdf_li(const Interaction& from, Vec3 direction) const {
         Vec3 way = center_ - from.position;
@@ -359,7 +349,7 @@ class Area {
         return light * most * (mean(power_) / PI / (farthest * farthest * (squared + reach_ * reach_ / 2)));
     }
     LightBounds bounds() const {
-        double most = mean(power_) / PI * through_grid(1);
+        double most = mean(power_) / PI * through_grid(1.0);
         return {box_around(center_, abs(first_) * lengths_[0] + abs(second_) * lengths_[1]), most, normal_, 1, cos_spread_};
     }
 
@@ -375,26 +365,53 @@ class Area {
         x = first, y = second;
     }
 
-    bool is_near(Vec3 way) const {
-        double squared = dot(way, way), longest = FAR * larger(lengths_[0], lengths_[1]);
-        if (squared < longest * longest) return !askew_;
-        if (ellipse_ || askew_) return false;
-        return std::fabs(dot(first_, way)) * lengths_[0] + std::fabs(dot(second_, way)) * lengths_[1] > SLANT * squared;
+    template <class T> Mask<T> is_near(Vec3Of<T> way) const {
+        if (askew_) return Mask<T>{};
+        double longest = FAR * larger(lengths_[0], lengths_[1]);
+        T squared = dot(way, way);
+        Mask<T> close(squared < longest * longest);
+        if (ellipse_ || all(close)) return close;
+        T across = dot(splat<T>(first_), way), along = dot(splat<T>(second_), way);
+        return Mask<T>(close | Mask<T>(abs(across) * lengths_[0] + abs(along) * lengths_[1] > SLANT * squared));
     }
-    SphericalRectangle rectangle(Vec3 way) const {
-        double x = dot(first_, way), y = dot(second_, way);
-        return {x - lengths_[0], x + lengths_[0], y - lengths_[1], y + lengths_[1], dot(normal_, way)};
+    template <class T> SphericalRectangle<T> rectangle(Vec3Of<T> way) const {
+        T x = dot(splat<T>(first_), way), y = dot(splat<T>(second_), way);
+        return {x - lengths_[0], x + lengths_[0], y - lengths_[1], y + lengths_[1], dot(splat<T>(normal_), way)};
+    }
+    // place: in the plane of the light, from below the point, as its solid angle was sampled.
+    template <class T> LightSampleOf<T> sample_angle(Vec3Of<T> way, Vec2Of<T> place, T angle) const {
+        T depth = dot(splat<T>(normal_), way), distance = sqrt(place.x * place.x + place.y * place.y + depth * depth);
+        Vec3Of<T> ahead = (splat<T>(first_) * place.x + splat<T>(second_) * place.y + splat<T>(normal_) * depth) / distance;
+        T across = (place.x - dot(splat<T>(first_), way)) / lengths_[0], along = (place.y - dot(splat<T>(second_), way)) / lengths_[1];
+        Mask<T> lit(depth < 0.0);
+        if (ellipse_) lit = Mask<T>(lit & covers(across, along));
+        T cosine = -dot(splat<T>(normal_), ahead);
+        return {ahead, distance, select(lit, splat<T>(radiance_) * (angle * through_grid(cosine)), Vec3Of<T>{}), 1.0 / angle, cosine};
+    }
+    template <class T> LightSampleOf<T> sample_area(Vec3Of<T> way, Vec2Of<T> u) const {
+        T across = 2.0 * u.x - 1.0, along = 2.0 * u.y - 1.0;
+        if (ellipse_) {
+            SinCosOf<T> turn = sincos_of_turns(u.y);
+            T radius = sqrt(u.x);
+            across = radius * turn.cos, along = radius * turn.sin;
+        }
+        Vec3Of<T> to = way + splat<T>(first_) * (lengths_[0] * across) + splat<T>(second_) * (lengths_[1] * along);
+        T squared = dot(to, to), distance = sqrt(squared);
+        Vec3Of<T> ahead = to / distance;
+        T cosine = max(-dot(splat<T>(normal_), ahead), T{});
+        T weight = min(cosine / (PI * squared), splat<T>(MOST_WEIGHT_OF_LIGHT)) * through_grid(cosine);
+        return {ahead, distance, splat<T>(power_) * weight, squared / (cosine * area_), cosine};
     }
     // Of the light, by the cosine of the angle at which it leaves: what falls off is the part that the grid's slats leave free, and
     // all of it together stays what it is without a grid (Blender D10594).
-    double through_grid(double cosine) const {
-        if (focus_ == 0) return 1;
-        if (!(cosine > cos_spread_)) return 0;
-        return larger(tan_spread_ - std::sqrt(larger(1 - cosine * cosine, 0.0)) / cosine, 0.0) * focus_;
+    template <class T> T through_grid(T cosine) const {
+        if (focus_ == 0) return splat<T>(1);
+        T free = max(tan_spread_ - sqrt(max(1.0 - cosine * cosine, T{})) / cosine, T{}) * focus_;
+        return select(Mask<T>(cosine > cos_spread_), free, T{});
     }
     // Coordinates −1 to 1 along the half sides.
-    bool covers(double across, double along) const {
-        return ellipse_ ? across * across + along * along <= 1 : std::fabs(across) <= 1 && std::fabs(along) <= 1;
+    template <class T> Mask<T> covers(T across, T along) const {
+        return ellipse_ ? Mask<T>(across * across + along * along <= 1.0) : Mask<T>(Mask<T>(abs(across) <= 1.0) & Mask<T>(abs(along) <= 1.0));
     }
 
     Vec3 center_, power_, radiance_, first_, second_, normal_;  // half sides, unit; normal: to where it shines

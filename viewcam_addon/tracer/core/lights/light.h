@@ -38,6 +38,22 @@ class Light {
         if (emission_.varies() && !is_black(sample.weight)) sample.weight *= emission(from.position, sample.direction, sample.distance);
         return sample;
     }
+    // The same of some of four points, of which point_of(i) tells all.
+    template <class PointOf>
+    LightSampleOf<double4> sample_li(const SurfacePoint<double4>& from, const PointOf& point_of, unsigned lanes, double4 part, const Vec2x4& u) const {
+        return std::visit(
+            [&](const auto& light) {
+                if constexpr (requires { light.sample_li(from, u); })
+                    if (!emission_.varies()) return light.sample_li(from, u);
+                LightSampleOf<double4> samples;
+                while (lanes) {
+                    int i = take_bit(lanes);
+                    samples.set(i, sample_li(point_of(i), part[i], {u.x[i], u.y[i]}));
+                }
+                return samples;
+            },
+            kind_);
+    }
     // What a ray sees of a lamp that it runs into; surfaces are met as all others are.
     // distance: receives how far away that is, where it is not at infinity.
     Vec3 le(const LightRay& ray, double& distance) const {

@@ -23,13 +23,24 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-struct LightSample {
-    Vec3 direction;              // unit, towards the light
-    double distance = INFINITE;  // of the point of the light
-    Vec3 weight;                 // radiance over density
-    double pdf = INFINITE;       // by solid angle; INFINITE of what has no size
-    double cosine = 1;           // under which the light's own surface is seen, of flat lights
+template <class T> struct LightSampleOf {
+    Vec3Of<T> direction;               // unit, towards the light
+    T distance = splat<T>(INFINITE);   // of the point of the light
+    Vec3Of<T> weight;                  // radiance over density
+    T pdf = splat<T>(INFINITE);        // by solid angle; INFINITE of what has no size
+    T cosine = splat<T>(1);            // under which the light's own surface is seen, of flat lights
+
+    // Of four, makes one of them this.
+    void set(int i, const LightSampleOf<double>& one) {
+        set_lane(direction, i, one.direction), set_lane(weight, i, one.weight);
+        distance[i] = one.distance, pdf[i] = one.pdf, cosine[i] = one.cosine;
+    }
 };
+using LightSample = LightSampleOf<double>;
+template <class T> inline LightSampleOf<T> select(Mask<T> mask, const LightSampleOf<T>& a, const LightSampleOf<T>& b) {
+    return {select(mask, a.direction, b.direction), select(mask, a.distance, b.distance), select(mask, a.weight, b.weight), select(mask, a.pdf, b.pdf),
+            select(mask, a.cosine, b.cosine)};
+}
 
 // A ray that may run into lights, its direction unit. escaped: whether it meets no surface. start: from where its length counts.
 struct LightRay {
@@ -43,9 +54,9 @@ constexpr double MOST_WEIGHT_OF_LIGHT = 1e100;  // more light than any picture h
 
 inline double mean(Vec3 rgb) { return (rgb.x + rgb.y + rgb.z) / 3; }
 // The part that counts of a sample whose direction was picked with a density, where another way of picking has the other.
-inline double power_heuristic(double pdf, double other) {
-    double ratio = other / pdf;
-    return ratio > 0 ? 1 / (1 + ratio * ratio) : 1;
+template <class T> inline T power_heuristic(T pdf, T other) {
+    T ratio = other / pdf;
+    return select(Mask<T>(ratio > 0.0), 1.0 / (1.0 + ratio * ratio), splat<T>(1));
 }
 // Sizes as they are, but 0 where their squares are nothing that float64 can divide by.
 inline double not_tiny(double size) { return size > 1e-100 ? size : 0; }

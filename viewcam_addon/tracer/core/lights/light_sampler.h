@@ -31,6 +31,31 @@ class LightSampler {
         int slot = 0;
     };
 
+    // What some of four points choose.
+    struct Choices {
+        const Light* light[4];
+        double4 chance, rest;
+        unsigned lanes = 0;
+
+        // The samples of these lights. point_of(i): all that is known of a point.
+        template <class PointOf> LightSampleOf<double4> sample_li(const SurfacePoint<double4>& from, const PointOf& point_of, const Vec2x4& u) const {
+            LightSampleOf<double4> samples;
+            for (unsigned left = lanes; left;) {
+                const Light* first = light[std::countr_zero(left)];
+                unsigned alike = 0;
+                for (unsigned some = left; some;)
+                    if (int i = take_bit(some); light[i] == first) alike |= 1u << i;
+                if (alike == lanes) return first->sample_li(from, point_of, lanes, rest, u);
+                left &= ~alike;
+                while (alike) {
+                    int i = take_bit(alike);
+                    samples.set(i, first->sample_li(point_of(i), rest[i], {u.x[i], u.y[i]}));
+                }
+            }
+            return samples;
+        }
+    };
+
     explicit LightSampler(const Scene& scene) : objects_(&scene.objects), environment_(&scene.illumination.environment) {
         const Illumination& given = scene.illumination;
         uint32_t lit = DIFFUSE;  // the kinds of rays that surfaces scatter light into from any one direction
@@ -97,6 +122,8 @@ class LightSampler {
         return !linked_ || light.receivers == EVERYTHING || point.object == NONE || light.receivers & (*objects_)[point.object].lit_by;
     }
 
+    bool is_linked() const { return linked_; }
+
     // How many lights surfaces can be lit by, and whether what they get depends on chance.
     int count() const { return count_; }
     bool has_sky() const { return sky_ != NONE; }  // among them
@@ -162,6 +189,26 @@ class LightSampler {
             if (i < count_) reached += estimates[i];
         }
         return 0;
+    }
+
+    // The same of some of four points, by slot. point_of(i): all that is known of a point.
+    template <class PointOf> void choose(const PointOf& point_of, unsigned lanes, double4 u, bool seen, Choices (&choices)[ASKED], double4& brightest) const {
+        brightest = double4{};
+        if (count_ == 1 && !(asks_each() && seen)) {
+            const Light* light = &lights_[0];
+            choices[0] = {{light, light, light, light}, splat4(1.0), u, lanes};
+            return;
+        }
+        while (lanes && count_ > 0) {
+            Choice chosen[ASKED];
+            int i = take_bit(lanes);
+            double most;
+            for (int k = choose(point_of(i), u[i], seen, false, chosen, most); k-- > 0;) {
+                Choices& to = choices[chosen[k].slot];
+                to.light[i] = chosen[k].light, to.chance[i] = chosen[k].chance, to.rest[i] = chosen[k].rest, to.lanes |= 1u << i;
+            }
+            brightest[i] = most;
+        }
     }
 
     // What the sky may bring over what the brightest lamp does, as `choose` tells, and how often it is worth a ray beside that.

@@ -10,26 +10,28 @@
 #include <cstdint>
 #include <limits>
 
-#include "vec.h"
+#include "simd.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
 constexpr double PI = 3.14159265358979323846;
 
 // The polynomial with these coefficients, the lowest first.
-template <int N>
-inline double polynomial(double x, const double (&coefficients)[N]) {
-    double value = coefficients[N - 1];
+template <class T, int N>
+inline T polynomial(T x, const double (&coefficients)[N]) {
+    T value = splat<T>(coefficients[N - 1]);
     for (int k = N - 2; k >= 0; k--) value = value * x + coefficients[k];
     return value;
 }
 
-struct SinCos {
-    double sin, cos;
+template <class T> struct SinCosOf {
+    T sin, cos;
 };
+using SinCos = SinCosOf<double>;
 
-// Of an angle in turns, |turns| < 2^30: no digit is lost to a multiple of π.
-inline SinCos sincos_of_turns(double turns) {
+// Of an angle in turns, |turns| < 2^30, or of four: no digit is lost to a multiple of π.
+template <class T> inline SinCosOf<T> sincos_of_turns(T turns) {
+    constexpr double WHOLE = 0x1.8p52;  // what it is added to is rounded to a whole number, whose last binary digits are the sum's
     static constexpr double SIN[] = {6.283185307179586,  -41.34170224039976, 81.60524927607493,  -76.70585975299812,
                                      42.05869392898878,  -15.094640403891546, 3.8197881201632113, -0.7116358090781666};
     static constexpr double COS[] = {1.0,
@@ -41,11 +43,13 @@ inline SinCos sincos_of_turns(double turns) {
                                      7.9035351947629575,
                                      -1.7143161879285278,
                                      0.27945867147528963};
-    double quarters = std::floor(4 * turns + 0.5), x = turns - 0.25 * quarters, squared = x * x;
-    double sin = x * polynomial(squared, SIN), cos = polynomial(squared, COS);
-    int quarter = int(int64_t(quarters) & 3);
-    double across = quarter & 1 ? cos : sin, along = quarter & 1 ? sin : cos;
-    return {quarter & 2 ? -across : across, quarter == 1 || quarter == 2 ? -along : along};
+    T four = 4.0 * turns + 0.5, quarters = (four + WHOLE) - WHOLE;
+    quarters = select(Mask<T>(quarters > four), quarters - 1.0, quarters);
+    T x = turns - 0.25 * quarters, squared = x * x, sin = x * polynomial(squared, SIN), cos = polynomial(squared, COS);
+    auto quarter = bits_of(quarters + WHOLE);
+    Mask<T> odd((quarter & 1) != 0);
+    T across = select(odd, cos, sin), along = select(odd, sin, cos);
+    return {of_bits(bits_of(across) ^ quarter >> 1 << 63), of_bits(bits_of(along) ^ (quarter ^ quarter >> 1) << 63)};
 }
 // A vector that is turned about a unit axis (Rodrigues).
 inline Vec3 turned_about(Vec3 axis, Vec3 v, SinCos angle) { return v * angle.cos + cross(axis, v) * angle.sin + axis * (dot(axis, v) * (1 - angle.cos)); }
@@ -54,21 +58,22 @@ inline double cos(double angle) { return sincos_of_turns(angle * (0.5 / PI)).cos
 
 namespace detail {
 // The arc sine of 0 ≤ x ≤ ½.
-inline double asin_of_small(double x) {
+template <class T> inline T asin_of_small(T x) {
     static constexpr double ASIN[] = {0.16666666666666666,  0.07500000000000118,  0.044642857142551895, 0.03038194447553234,
                                       0.02237215744350722,  0.017352816540325496, 0.01396378001220357,  0.011566459612121669,
                                       0.009621842970100282, 0.009319560794767446, 0.0030448799094556773, 0.019554513336123378,
                                       -0.01924167174674304, 0.02961201126495512};
-    double squared = x * x;
+    T squared = x * x;
     return x + x * (squared * polynomial(squared, ASIN));
 }
 }  // namespace detail
 
 // Of what is rounded to beyond ±1, as of ±1.
-inline double asin(double x) {
-    double size = std::fabs(x);
-    double angle = size <= 0.5 ? detail::asin_of_small(size) : PI / 2 - 2 * detail::asin_of_small(std::sqrt(larger((1 - size) / 2, 0.0)));
-    return std::copysign(angle, x);
+template <class T> inline T asin(T x) {
+    T size = abs(x);
+    Mask<T> is_small(size <= 0.5);
+    T angle = detail::asin_of_small(select(is_small, size, sqrt(max((1.0 - size) / 2.0, T{}))));
+    return copysign(select(is_small, angle, PI / 2 - 2.0 * angle), x);
 }
 inline double acos(double x) {
     if (std::fabs(x) <= 0.5) return PI / 2 - asin(x);

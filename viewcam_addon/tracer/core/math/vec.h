@@ -1,4 +1,4 @@
-// Vectors, affine maps and frames in float64.
+// Vectors and affine maps in float64.
 //
 // Everything in the core is compiled without contraction (-ffp-contract=off): a product and a sum round one after the other,
 // everywhere alike, which the triangle test's watertightness and the pictures' bits stand on.
@@ -18,6 +18,10 @@ inline double max(double a, double b) { return a > b ? a : b; }
 
 inline double sqrt(double a) { return std::sqrt(a); }
 inline double select(bool mask, double a, double b) { return mask ? a : b; }
+inline double copysign(double size, double sign) { return std::copysign(size, sign); }
+inline bool any(bool mask) { return mask; }
+inline bool all(bool mask) { return mask; }
+inline double abs(double a) { return std::fabs(a); }
 
 // Of numbers, or of double4 where four are computed at once (simd.h).
 template <class T> struct Vec2Of {
@@ -72,20 +76,6 @@ struct Affine {
     Vec3 point(Vec3 p) const { return vector(p) + translation(); }
     // The transposed linear part: with the inverse map, what takes normals along.
     Vec3 transposed(Vec3 n) const { return transposed_product(m, n); }
-};
-
-// A right-handed orthonormal frame about a unit vector, without a singularity; its error is 4e-16 for any vector.
-// Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6 (2017).
-struct Frame {
-    Vec3 s, t, n;
-
-    explicit Frame(Vec3 normal) : n(normal) {
-        double sign = std::copysign(1.0, n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
-        s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x};
-        t = {b, sign + n.y * n.y * a, -n.y};
-    }
-    Vec3 to_world(Vec3 v) const { return s * v.x + t * v.y + n * v.z; }
-    Vec3 to_local(Vec3 v) const { return {dot(s, v), dot(t, v), dot(n, v)}; }
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

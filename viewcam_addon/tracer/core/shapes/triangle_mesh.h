@@ -168,10 +168,13 @@ struct TriangleHit {
 // found of one is the same whatever goes along with it.
 class TriangleSurfaces {
    public:
-    TriangleSurfaces(const TriangleHit* hits, int count) : count_(count) {
+    TriangleSurfaces(const TriangleHit* hits, int count)
+        : TriangleSurfaces(hits, count, gather4([&](int i) { return hits[i < count ? i : 0].ray->origin; }),
+                           gather4([&](int i) { return hits[i < count ? i : 0].ray->direction; })) {}
+    // origins, directions: of the rays.
+    [[gnu::always_inline]] TriangleSurfaces(const TriangleHit* hits, int count, const Vec3x4& origins, const Vec3x4& directions)
+        : count_(count), origin_(origins), direction_(directions) {
         for (int i = 0; i < 4; i++) hits_[i] = hits[i < count ? i : 0], on_one_ &= hits_[i].object == hits_[0].object;
-        origin_ = gather4([&](int i) { return hits_[i].ray->origin; });
-        direction_ = gather4([&](int i) { return hits_[i].ray->direction; });
         translation_ = {of_objects([](auto& object) { return object.to_world.m[0][3]; }),
                         of_objects([](auto& object) { return object.to_world.m[1][3]; }),
                         of_objects([](auto& object) { return object.to_world.m[2][3]; })};
@@ -190,8 +193,7 @@ class TriangleSurfaces {
         if (unsigned slender = bits(long4(squared * splat4(SLENDER * SLENDER) < one * two))) {
             while (slender) {
                 int i = take_bit(slender);
-                Vec3 exact = exact_cross(lane(first_, i), lane(second_, i));
-                normal_.x[i] = exact.x, normal_.y[i] = exact.y, normal_.z[i] = exact.z;
+                set_lane(normal_, i, exact_cross(lane(first_, i), lane(second_, i)));
             }
             squared = dot(normal_, normal_);
         }
@@ -214,27 +216,31 @@ class TriangleSurfaces {
         b2_ = max(min(b2_, splat4(1.0) - b1_), splat4(0.0));
     }
 
-    // Writes the surfaces to *found[0], …; material: the slot of the object.
-    void interactions(Interaction* const* found) const {
-        double4 zero = splat4(0.0), one = splat4(1.0);
-        long4 behind = long4(dot(normal_, direction_) > zero), solid = long4(size_ > zero) & long4(size_ < splat4(INFINITE));
-        // What is no surface, but was found to be hit, looks at the ray.
-        double4 side = select(behind & solid, -one, one), distance = length(direction_);
-        Vec3x4 normal = select(solid, normal_ * (side / size_), -(direction_ / distance)), shading = normal;
+    // Where the rays meet them.
+    [[gnu::always_inline]] SurfacePoint<double4> points() const {
+        long4 solid = is_solid();
+        double4 side = this->side();
+        Vec3x4 normal = normal_ * (side / size_);
+        if (bits(solid) != 15) normal = select(solid, normal, -(direction_ / length(direction_)));
+        Vec3x4 shading = normal;
         if (any([](const TriangleHit& hit) { return hit.mesh->corner_normals; })) {
             Vec3x4 smooth = smooth_normal();
             double4 size = length(smooth);
-            shading = select(long4(size > zero), smooth * (side / size), normal);
+            shading = select(long4(size > splat4(0.0)), smooth * (side / size), normal);
         }
-        Vec3x4 position = corner_[0] + b1_ * first_ + b2_ * second_;
-        double4 cosine = -dot(normal, direction_) / distance, offset = this->offset();
-        unsigned turned = bits(long4(side < zero));
+        return {corner_[0] + b1_ * first_ + b2_ * second_, normal, shading, offset()};
+    }
+    // Writes the surfaces to *found[0], …; material: the slot of the object.
+    void interactions(Interaction* const* found) const {
+        SurfacePoint<double4> points = this->points();
+        double4 cosine = -dot(points.normal, direction_) / length(direction_);
+        unsigned turned = bits(long4(side() < splat4(0.0)));
         for (int i = 0; i < count_; i++) {
             const TriangleMesh& mesh = *hits_[i].mesh;
             uint32_t triangle = hits_[i].triangle;
             Interaction& to = *found[i];
-            to.position = lane(position, i), to.normal = lane(normal, i), to.shading = lane(shading, i);
-            to.offset = offset[i], to.t = t_[i], to.cosine = cosine[i];
+            static_cast<SurfacePoint<double>&>(to) = lane(points, i);
+            to.t = t_[i], to.cosine = cosine[i];
             to.backside = bool(turned >> i & 1) != hits_[i].object->mirrored;
             to.material = uint32_t(mesh.materials[triangle]);
             to.has_uv = mesh.corner_uvs;
@@ -279,6 +285,10 @@ class TriangleSurfaces {
     template <class Value> Value interpolate(int i, Value a, Value b, Value c) const {
         return a * (1 - b1_[i] - b2_[i]) + b * b1_[i] + c * b2_[i];
     }
+
+    // What is no surface, but was found to be hit, looks at the ray, and all else, too: −1 where the normal is turned for that.
+    long4 is_solid() const { return long4(size_ > splat4(0.0)) & long4(size_ < splat4(INFINITE)); }
+    double4 side() const { return select(long4(dot(normal_, direction_) > splat4(0.0)) & is_solid(), splat4(-1.0), splat4(1.0)); }
 
     // The longest side over the height on it; slimmer triangles than float32 can tell from a line are no surface.
     double4 slenderness() const { return min(longest_squared_ / size_, splat4(MOST_SLENDER)); }
