@@ -159,7 +159,7 @@ def write_wheel(path: Path, info: str, contents: dict[str, bytes]) -> None:
 
 
 class CoreBuildHook(BuildHookInterface):
-    """What hatchling calls when pip builds the project."""
+    """The hook that hatchling calls when pip builds the project."""
 
     def dependencies(self) -> list[str]:
         """A compiler, where the system has none."""

@@ -46,7 +46,7 @@ def wheels_of(platform: str) -> list[Path]:
 
 
 def pure_wheels() -> list[Path]:
-    """Those that any Python takes on any platform."""
+    """The wheels that any Python takes on any platform."""
     return [wheel for package, version in PURE_WHEELS.items() for wheel in _wheels("any", package, version, "py3-none-any")]
 
 

@@ -1,4 +1,4 @@
-"""What a batch saves, and what it takes: `BLENDER=… python -m benchmarks.batch speed|memory`, in the real Blender.
+"""The time and memory that a batch saves and takes: `BLENDER=… python -m benchmarks.batch speed|memory`, in the real Blender.
 
     speed    shots of the studio still by `viewcam batch` and by a loop of `blender -b … -f` a shot: seconds, and whether each
              pixel is the same
@@ -72,7 +72,7 @@ class Blender:
         return subprocess.Popen(command, env=self._environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
     def run(self, *arguments: object) -> Seconds:
-        """What it took; SystemExit if it failed."""
+        """The seconds that the command took; SystemExit if it failed."""
         started, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
         process = self.start(*arguments)
         said, _ = process.communicate()
@@ -107,7 +107,7 @@ def without_denoising(blender: Blender, folder: Path) -> Path:
 
 
 def same_pixels(shots: list[Job], loop: Path, batch: Path) -> int:
-    """How many shots are the same to the bit in every channel."""
+    """The number of shots that are the same to the bit in every channel."""
 
     def channels(path: Path) -> dict[str, np.ndarray]:
         parts = OpenEXR.File(str(path), separate_channels=True).parts
@@ -142,7 +142,7 @@ def speed(count: int, in_loop: int, cases: list[tuple[str, int, bool]], blender:
 
 
 def memory(count: int, engine: str, blender: Blender, folder: Path) -> Iterator[str]:
-    """What the batch's process takes, as it goes on."""
+    """A line for each stage of the batch: the memory that its process takes."""
     still = STILL.resized(64, 36)
     shots = [replace(shot, engine=engine, samples=1) for shot in orbit(still, count)]
     (folder / "shots.json").write_text(json.dumps([shot.to_json() for shot in shots]), encoding="utf-8")

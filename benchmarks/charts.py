@@ -123,7 +123,7 @@ class Chart:
         return sentences
 
     def lines(self) -> list[str]:
-        """What the shell says beside the reading."""
+        """The lines that the shell prints beside the reading."""
         return []
 
     def figures(self) -> dict[str, Any]:
@@ -366,7 +366,7 @@ def run_all(
     only: Sequence[str] = (),
     quick: bool = False,
 ) -> tuple[int, dict[str, Any]]:
-    """The same for sweeps that are given as name → a function of `quick`."""
+    """`run` for sweeps that are given as name → a function of `quick`."""
     unknown = set(only) - set(sweeps)
     if unknown:
         raise InputError(f"there is no sweep {min(unknown)!r}: choose from {', '.join(sweeps)}")
@@ -386,7 +386,7 @@ def run_all(
 
 
 def read(figures: Path) -> dict[str, Any]:
-    """What an earlier run has measured, as `run_all` tells it. figures : the JSON that it wrote.
+    """The figures of an earlier run, as `run_all` tells them. figures : the JSON that it wrote.
 
     Raises
     ------
@@ -418,7 +418,7 @@ def redraw(earlier: dict[str, Any], folder: Path) -> tuple[int, dict[str, Any]]:
 
 
 def beside(earlier: dict[str, Any], measured: dict[str, Any]) -> tuple[int, dict[str, Any]]:
-    """What a run of some sweeps has measured, with what an earlier one had of the others, as `run_all` tells it."""
+    """The figures of a run of some sweeps, with those that an earlier run had of the others, as `run_all` tells them."""
     anew = tuple(f"{each['title']}: " for each in measured["charts"].values())
     behind = [sentence for sentence in earlier["behind"] if not sentence.startswith(anew)] + measured["behind"]
     return (1 if behind else 0), {"behind": behind, "charts": earlier["charts"] | measured["charts"]}

@@ -54,7 +54,7 @@ _ERROR, _MOST, _CONVERGED, _FEW, _MANY = 0.01, 256, 128, 16, 64
 
 
 def measure(names: Sequence[str], sabotage: Callable[[], None] | None = None) -> Ratios:
-    """What is measured → its ratio, in a process of its own. sabotage : picklable; called there before."""
+    """Each measured name → its ratio, in a process of its own. sabotage : picklable; called there before."""
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, spawn) as pool:
         return pool.submit(_measure, names, sabotage).result()
@@ -163,7 +163,7 @@ class Yardstick:
         return np.zeros_like(directions)
 
     def points(self, directions: Rays) -> Rays:
-        """Where rays from the eye meet the mesh, a little before it; those that meet nothing are left out."""
+        """Points where rays from the eye meet the mesh, a little before it; those that meet nothing are left out."""
         found = self._embree.run(self.eyes(directions), directions, output=True)
         met = found["geomID"] >= 0
         return directions[met] * (found["tfar"][met, None] * np.float32(1 - 1e-4))
@@ -174,7 +174,7 @@ class Yardstick:
         return (np.array(sun.towards) + aside).astype(np.float32)
 
     def of_light(self, samples: int) -> Callable[[], None]:
-        """What traces the rays of so many samples of each pixel, the eye's and those of shadows."""
+        """A function that traces the rays of so many samples of each pixel, the eye's and those of shadows."""
         rng = np.random.default_rng(0)
         pixels = self._camera.width * self._camera.height
         directions = np.concatenate([self.eye_rays(*rng.random((2, pixels))) for _ in range(samples)])

@@ -98,13 +98,13 @@ def main() -> int:
 
 
 def judged(seconds: Mapping[str, Spent], differing: Mapping[str, float]) -> bool:
-    """Whether the labels are the same, and ours are not the slower."""
+    """True if the labels are the same, and ours are not the slower."""
     theirs = seconds["passes"].wall + seconds["made of them"].wall
     return seconds["ours"].wall <= theirs and max(differing.values()) <= ON_EDGES
 
 
 def measured(shots: Sequence[Job], folder: Path) -> dict[str, Spent]:
-    """What ours, Cycles' passes, and what is made of them have taken; all files are in the folder."""
+    """The time that ours, Cycles' passes, and what is made of them have taken; all files are in the folder."""
     blend, middle = folder / "indexed.blend", len(shots) // 2
     with race.Contestant(prepare_passes, blend, list(shots), folder / "passes") as blender:
         passes = blender.runners()["passes"]
@@ -117,7 +117,7 @@ def measured(shots: Sequence[Job], folder: Path) -> dict[str, Spent]:
 
 
 def labelled(blend: Path, shots: Sequence[Job], folder: Path) -> Spent:
-    """What `viewcam batch` takes, which makes a folder named as the first shot; SystemExit if it fails."""
+    """The time of `viewcam batch`, which makes a folder named as the first shot; SystemExit if it fails."""
     listed = blend.with_name("shots.json")
     listed.write_text(json.dumps([shot.to_json() for shot in shots]), encoding="utf-8")
     arguments = ["batch", blend, listed, "--labels", KINDS, "--labels-only", "--out", folder / shots[0].name]
@@ -176,7 +176,7 @@ def prepare_passes(blend: Path, shots: Sequence[Job], folder: Path) -> dict[str,
 
 
 def of_passes(path: Path, folder: Path) -> None:
-    """What a picture's passes tell, beside them: depths and ids as PNG, boxes and run lengths of each index as JSON."""
+    """Write a picture's passes as labels beside them: depths and ids as PNG, boxes and run lengths of each index as JSON."""
     folder.mkdir(exist_ok=True)
     passes = image.read(path, ("Depth", "Object Index")).passes
     index = passes["Object Index"][..., 0].astype(np.int64)
@@ -202,7 +202,7 @@ def table(seconds: Mapping[str, Spent], count: int) -> Iterator[str]:
 
 
 def compared(shots: Sequence[Job], folder: Path) -> dict[str, float]:
-    """Of each pass the share of all pixels that differ."""
+    """The share of all pixels that differ, for each pass."""
     shares = [
         differences(_ours(folder / "ours", shot), image.read(folder / "passes" / f"{number:04d}.exr", tuple(TOLERANCES)).passes)
         for number, shot in enumerate(shots, 1)
@@ -221,7 +221,7 @@ def _ours(folder: Path, shot: Job) -> dict[str, NDArray]:
 
 
 def differences(ours: Mapping[str, NDArray], theirs: Mapping[str, NDArray]) -> dict[str, float]:
-    """Of each pass the share of one picture's pixels that differ. What is no number differs."""
+    """The share of one picture's pixels that differ, for each pass. What is no number differs."""
     depth, result = ours["Depth"].astype(float), {}
     for name, tolerance in TOLERANCES.items():
         allowed = tolerance * depth if name in ("Depth", "Position") else tolerance

@@ -53,7 +53,7 @@ class Contestant:
         self._process.join()
 
     def runners(self) -> dict[str, Runner]:
-        """What can be asked for, as functions of this process; their arguments are sent along."""
+        """The functions of this process that can be asked for; their arguments are sent along."""
         return {name: functools.partial(self._ask, name) for name in self.names}
 
     def _ask(self, name: str, *arguments: object) -> float:
@@ -61,7 +61,7 @@ class Contestant:
         return self._answer()
 
     def _answer(self) -> Any:
-        """What comes back; what went wrong over there is raised here."""
+        """The answer that comes back; an error over there is raised here."""
         try:
             answer = self._here.recv()
         except EOFError:

@@ -1,4 +1,4 @@
-"""What sets are built of: plain-colour materials, boxes, turned shapes, text, lights, a world.
+"""The parts that sets are built of: plain-color materials, boxes, turned shapes, text, lights, a world.
 
 Plain colours only, so that the scenes show geometry and light, need no picture files and stay small.
 """

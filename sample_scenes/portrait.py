@@ -72,7 +72,7 @@ def _arch():
 
 
 def _on_frame(x: float, z: float, spring: float):
-    """Where the ray from the arch's centre through (x, z) meets the bay's outline."""
+    """The point where the ray from the arch's center through (x, z) meets the bay's outline."""
     reach = min(BAY / 2 / abs(x) if x else math.inf, (STOREY - spring) / z if z else math.inf)
     return BAY / 2 + x * reach, spring + z * reach
 

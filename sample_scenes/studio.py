@@ -114,7 +114,7 @@ def frond():
 
 
 def distant_hills():
-    """What the gate frames: three soft hills and a few cypresses."""
+    """The hills that the gate frames: three soft ones and a few cypresses."""
     sage, blue = b.matte("Sage", "8fae86"), b.matte("Distant blue", "86a9b4")
     b.ball("Hill", 1.0, sage, (0.2, 7.4, -0.35), scale=(3.4, 1.8, 1.55))
     b.ball("Far hill", 1.0, blue, (4.6, 9.6, -0.4), scale=(4.6, 1.6, 2.5))
@@ -205,7 +205,7 @@ def _steps(start: float, end: float, count: int) -> list[float]:
 
 
 def _to_rectangle(x: float, z: float, angle: float, left: float, right: float, bottom: float, top: float):
-    """Where a ray from (x, z) leaves the rectangle."""
+    """The point where a ray from (x, z) leaves the rectangle."""
     c, s = math.cos(angle), math.sin(angle)
     reach = []
     if abs(c) > 1e-9:

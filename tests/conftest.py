@@ -1,4 +1,4 @@
-"""What every test may ask for: the registered add-on, an empty Blender, the folder of real models.
+"""Fixtures that every test may ask for: the registered add-on, an empty Blender, the folder of real models.
 
 Modules that need Blender start with `bpy = pytest.importorskip("bpy")`, so that after collection `sys.modules` tells whether
 this session is one with Blender. Rejected: registering through `addon_utils.enable`, which any `read_factory_settings` undoes.

@@ -79,12 +79,12 @@ def snapshot():
 
 
 def _is_blenders(name, module):
-    """Whether a module is one of Blender's own scripts, which keep registries."""
+    """True if a module is one of Blender's own scripts, which keep registries."""
     return name.split(".")[0] in {"bpy", "bpy_extras", "addon_utils", "bl_ui", "bl_operators", "bpy_types", "_bpy_types"}
 
 
 def _items(value):
-    """What a container holds, in a text each; of dictionaries the keys."""
+    """The items that a container holds, in a text each; of dictionaries the keys."""
     return {repr(each) if isinstance(each, _PLAIN) else _named(each) for each in list(value)}
 
 
@@ -104,7 +104,7 @@ def _is_registered(each):
 
 
 def blender_lets_go():
-    """Whether Blender lets go of an unregistered class of properties. 4.2 never does, and with it keeps whole modules."""
+    """True if Blender lets go of an unregistered class of properties. 4.2 never does, and with it keeps whole modules."""
 
     class Properties(bpy.types.PropertyGroup):
         pass
@@ -118,7 +118,7 @@ def blender_lets_go():
 
 
 def survivors(package):
-    """What the package has defined and something still holds, once the package has been forgotten."""
+    """The objects that the package has defined and something still holds, once the package has been forgotten."""
     for name in [name for name in sys.modules if f"{name}.".startswith(f"{package}.")]:
         module = sys.modules.pop(name)
         parent, _, own = name.rpartition(".")
@@ -141,7 +141,7 @@ def new_file():
 
 
 def use():
-    """What makes an add-on remember things: cameras that follow an object, frames, other pictures, files, undo."""
+    """Use the add-on so that it remembers things: cameras that follow an object, frames, other pictures, files, undo."""
     scene = new_file()
     camera, target = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera")), bpy.data.objects.new("Target", None)
     for block in (camera, target):

@@ -20,7 +20,7 @@ time.sleep(60)
 
 
 def is_there(process):
-    """Whether a process runs; one that has ended and whom nobody has asked for its status does not."""
+    """True if a process runs; one that has ended and whom nobody has asked for its status does not."""
     try:
         with open(f"/proc/{process}/stat") as file:
             return file.read().rpartition(")")[2].split()[0] != "Z"

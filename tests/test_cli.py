@@ -187,7 +187,7 @@ def test_a_scene_file_that_is_no_json_or_not_there_is_refused(tmp_path, capfd):
 
 
 class Exploit:
-    """What a pickle could do on being read."""
+    """A pickle that makes a folder on being read."""
 
     def __reduce__(self):
         return (os.mkdir, ("was-executed",))

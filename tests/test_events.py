@@ -1,4 +1,4 @@
-"""What a command tells on its way: JSON lines alone on standard output, sentences on standard error, a bar on a terminal."""
+"""The events of a command on its way: JSON lines alone on standard output, sentences on standard error, a bar on a terminal."""
 
 import json
 import os

@@ -102,7 +102,7 @@ REFUSED = object()
 
 
 def answer(function, *arguments):
-    """What the function gives, or REFUSED where it raises InputError with one good sentence. Nothing else may be raised."""
+    """The value of the function, or REFUSED where it raises InputError with one good sentence. Nothing else may be raised."""
     try:
         return function(*arguments)
     except InputError as error:

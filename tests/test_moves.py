@@ -51,7 +51,7 @@ def axes_error(first, second):
 
 
 def turn_allowed(pinhole):
-    """What an eye rounded once (three operations on components up to M) turns the view by, and 16e-16 of two bases.
+    """The turn of the view by an eye rounded once (three operations on components up to M), and 16e-16 of two bases.
 
     The roll turns by as much over the sine of the angle between the view and up.
     """

@@ -269,7 +269,7 @@ def test_imports_inside_the_package_are_relative():
 
 
 def names_of(tree: ast.Module) -> set[str]:
-    """What a module defines or imports at its top level, in `if` and `try` as well."""
+    """The names that a module defines or imports at its top level, in `if` and `try` as well."""
     found, waiting = set(), list(tree.body)
     for node in waiting:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -285,7 +285,7 @@ def names_of(tree: ast.Module) -> set[str]:
 
 
 def missing_names(trees: dict[Path, ast.Module]) -> list[str]:
-    """What files import from others of the package that those do not have."""
+    """The names that files import from others of the package that those do not have."""
     defined, missing = {path: names_of(tree) for path, tree in trees.items()}, []
     inside = {}
     for path in trees:
@@ -363,7 +363,7 @@ METHODS = {"numbers", "precision"}
 
 
 def uses_of_the_property_group(source: str) -> list[str]:
-    """Where `source` reads `….virtual_pinhole`, or takes or gives a PropertyGroup."""
+    """The lines where `source` reads `….virtual_pinhole`, or takes or gives a PropertyGroup."""
     found = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Attribute) and node.attr in ("virtual_pinhole", "PropertyGroup"):
@@ -430,7 +430,7 @@ def test_what_the_readme_says_viewcam_does_it_does(capsys):
 
 
 def paths_named_in(text: str) -> set[str]:
-    """What stands in backticks and begins with a folder of the project."""
+    """The words in backticks that begin with a folder of the project."""
     return set(re.findall(r"`((?:viewcam_addon|tests|docs|benchmarks|sample_scenes)/[\w./-]*)`", text))
 
 
@@ -472,7 +472,7 @@ def races() -> dict[tuple[str, str, str], float]:
 
 
 def untrue_of_races(page: str) -> list[str]:
-    """What a page's table of races says otherwise than was measured. Cells: race, error, picture, wanted, job, wanted."""
+    """The cells of a page's table of races that say otherwise than measured: race, error, picture, wanted, job, wanted."""
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in page.splitlines() if line.count("|") == 7]
     told = {
         (race.replace(" ", "-"), error, figure): cell

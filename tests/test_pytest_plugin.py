@@ -38,7 +38,7 @@ def run(pytester, monkeypatch):
 
 @pytest.fixture
 def asked(monkeypatch):
-    """What is asked of jobs.check, none of which is done; blue.blend fails, and none.blend is not there."""
+    """The questions put to jobs.check, none of which is done; blue.blend fails, and none.blend is not there."""
     calls = []
 
     def answer(name):

@@ -54,7 +54,7 @@ def dot(a, b):
 
 
 def is_near(have, true, error):
-    """Whether a float is the true number to within the error; infinite, where that is beyond float64's range."""
+    """True if a float is the true number to within the error; infinite, where that is beyond float64's range."""
     if math.isinf(have):
         return abs(true) + error >= LARGEST and (have > 0) == (true > 0)
     return abs(mpmath.mpf(float(have)) - true) <= error + 5e-324

@@ -1,4 +1,4 @@
-"""What is printed shows itself and nothing else: no name from a file writes a line of its own or moves the cursor."""
+"""Printed text shows itself and nothing else: no name from a file writes a line of its own or moves the cursor."""
 
 import ast
 import json

@@ -10,7 +10,7 @@ PACKAGE = Path(viewcam_addon.__file__).parent
 
 
 def walk(action: Callable[[], object], rooms: tuple[str, ...]) -> tuple[list[str], list[str]]:
-    """What a call enters, as "jobs/job.py Job.to_json", and what calls upward.
+    """The functions that a call enters, as "jobs/job.py Job.to_json", and the calls upward.
 
     rooms : folders of the package from below; what lies in none of them counts for nothing.
     """

@@ -61,7 +61,7 @@ class CameraValues:
     asked: tuple[tuple[str, float], ...] = ()
 
     def view(self) -> Pinhole:
-        """Where the values look, in a picture of one pixel and whatever a held roll is.
+        """The direction in which the values look, in a picture of one pixel and whatever a held roll is.
 
         Raises
         ------

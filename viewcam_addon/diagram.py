@@ -72,7 +72,7 @@ def diagram(pinhole: Pinhole, up: Triple, share: float) -> Diagram:
 
 
 def up_tip(eye: Triple, look_at: Triple, up: Triple, share: float) -> Triple:
-    """Where up's arrow ends, in world space; it starts at the eye, and its length says nothing. Parameters as in `diagram`."""
+    """The tip of up's arrow, in world space; it starts at the eye, and its length says nothing. Parameters as in `diagram`."""
     length = _UP * share * math.dist(eye, look_at) / math.hypot(*up)
     return tuple(e + length * component for e, component in zip(eye, up, strict=True))
 
@@ -88,7 +88,7 @@ def arrow(tip: Array) -> Array:
 
 
 def pixels_in_a_cell(width: int, height: int) -> int:
-    """How many pixels there are between two lines of the grid: 1, 2, 5, 10, 20 …, so that there are not too many lines."""
+    """The number of pixels between two lines of the grid: 1, 2, 5, 10, 20 …, so that there are not too many lines."""
     least = max(width, height) / _CELLS
     power = 10 ** max(math.floor(math.log10(least)), 0)
     return next(step for step in (power, 2 * power, 5 * power, 10 * power, 20 * power) if step >= least)

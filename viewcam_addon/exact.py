@@ -75,7 +75,7 @@ def sum_terms(terms: Sequence[Number]) -> tuple[Number, Number, bool | NDArray[n
 
 
 def _misrounded(high: NDArray[np.float64], low: NDArray[np.float64], rest: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Where high may be a step off: low is half a step, and so was rounded to even with no regard to what comes after."""
+    """True where high may be a step off: low is half a step, and so was rounded to even with no regard to what comes after."""
     return (rest != 0) & ((high + 2 * low) - high == 2 * low)
 
 

@@ -1,4 +1,4 @@
-"""What of the machine this process may use: cores, and memory, asked before what a file claims to hold is allocated.
+"""The part of the machine that this process may use: cores, and memory, asked before what a file claims to hold is allocated.
 
 Rejected: to allocate and see. Linux promises more than it has, and ends the process that then uses it.
 """

@@ -138,7 +138,7 @@ def _known_distance(distance: float | None) -> float | None:
 
 
 def _eye_of(known: KnownEdge, edges: Sequence[tuple[str, ArrayLike, ArrayLike]], solution: Solution, like: Pinhole) -> Array:
-    """Where the camera stands that sees an edge of known length begin in a known place."""
+    """The eye of the camera that sees an edge of known length begin in a known place."""
     length = checks.number("length", known.length)
     if length <= 0:
         raise InputError(f"the known edge has a length of {length:g}: give one above 0")

@@ -290,7 +290,7 @@ class Pinhole:
         return exact.of_one_scale(self._slope(0, column), self._slope(1, row), one)
 
     def project(self, points: ArrayLike) -> tuple[Array, Array, Array]:
-        """Where points appear in the picture.
+        """The pixels where points appear in the picture.
 
         points : (..., 3), world space, finite.
 

@@ -55,7 +55,7 @@ def say(*lines: str) -> None:
 
 
 def copy_of(stream: int) -> TextIO:
-    """Where standard output (1) or standard error (2) leads now, to write to inside `silent_libraries` as well."""
+    """A copy of standard output (1) or standard error (2) as it leads now, to write to inside `silent_libraries` as well."""
     encoding = getattr(sys.stdout if stream == 1 else sys.stderr, "encoding", None) or "utf-8"
     return open(os.dup(stream), "w", encoding=encoding, errors="backslashreplace")
 

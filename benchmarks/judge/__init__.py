@@ -1,4 +1,4 @@
-"""How good the judge is: of faults that a renderer could have, how many it finds, and how often it blames a good picture.
+"""The quality of the judge: of faults that a renderer could have, how many it finds, and how often it blames a good picture.
 
 `python -m benchmarks judge` injects the faults of faults.py, lets the rivals of rivals.py judge as well, and draws a chart
 for each family of faults.

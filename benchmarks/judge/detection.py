@@ -56,7 +56,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
 
 
 def judged(number: int, with_faults: bool) -> Judged:
-    """What all judges say of one block."""
+    """The verdicts of all judges on one block."""
     block = Block(_bench(), number)
     return block.good(), [block.faulty(fault) for fault in FAULTS] if with_faults else []
 
@@ -74,7 +74,7 @@ def drawn(blocks: Iterable[Judged]) -> tuple[Chart, ...]:
 
 
 def together(scores: np.ndarray, share: float = 0.01) -> float:
-    """Of pairs with one side in common with one that is among so many highest, how many are among them, too.
+    """The share of pairs among so many highest, where a pair with one side in common is among them.
 
     scores : (blocks × SIDE × SIDE,), as blocks have them.
     """

@@ -105,7 +105,7 @@ def _put(key: str, value: object) -> Callable[[Document], None]:
 
 
 def _light(change: Callable[[NDArray], NDArray]) -> Callable[[Passes, np.random.Generator], None]:
-    """Of the colours of Combined."""
+    """A fault that changes the colors of Combined."""
 
     def of_picture(passes: Passes, _: np.random.Generator) -> None:
         passes["Combined"][..., :3] = change(passes["Combined"][..., :3])
@@ -114,7 +114,7 @@ def _light(change: Callable[[NDArray], NDArray]) -> Callable[[Passes, np.random.
 
 
 def _whole(change: Callable[[NDArray], NDArray]) -> Callable[[Passes, np.random.Generator], None]:
-    """Of all passes alike."""
+    """A fault that changes all passes alike."""
 
     def of_picture(passes: Passes, _: np.random.Generator) -> None:
         for name in passes:

@@ -1,4 +1,4 @@
-"""Who judges: each gives a number for how different two pictures are, and 1 is where it says so by itself.
+"""The judges: each gives a number for how different two pictures are, and 1 is where it says so by itself.
 
 A picture is shown to each as it is used. Ours: geometry and light, the test being several pictures of few samples. The others:
 the mean of these beside the reference, with the thresholds of the projects that use them.

@@ -1,4 +1,4 @@
-"""How light converges: error against samples, for each method that the tracer uses or could have used.
+"""The convergence of light: error against samples, for each method that the tracer uses or could have used.
 
 Every module is one sweep, as in benchmarks/stability. `python -m benchmarks light` measures and draws all of them.
 """

@@ -1,4 +1,4 @@
-"""How fast noise falls: error against samples, on integrals whose answers are known, and in pictures.
+"""The speed at which noise falls: error against samples, on integrals whose answers are known, and in pictures.
 
 RMS error over many pixels, each with an integral of its own:
 
@@ -147,7 +147,7 @@ def _lamps(pixels: int) -> tuple[Integrand, Array]:
 
 
 def _corner_share(a: Array, b: Array) -> Array:
-    """What a rectangle with one corner straight above, of sides a and b, fills of a floor's hemisphere (Howell, C-11)."""
+    """The share of a floor's hemisphere that a rectangle of sides a and b fills, one corner straight above (Howell, C-11)."""
     far, wide = np.sqrt(1 + a * a), np.sqrt(1 + b * b)
     return (a / far * np.arctan(b / far) + b / wide * np.arctan(a / wide)) / (2 * np.pi)
 

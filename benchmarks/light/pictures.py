@@ -1,4 +1,4 @@
-"""How fast the noise of pictures falls: the tracer's, beside Cycles' and that of random numbers, on the same Blender scenes.
+"""The speed at which the noise of pictures falls: the tracer's, beside Cycles' and random numbers', on the same Blender scenes.
 
 RMS error over all pixels, of a mean radiance of about 1: an edge of what shines by itself, which is anti-aliasing alone; a soft
 shadow, cast on a floor by a board under a square lamp; and the same in a corner of white walls, at three bounces.

@@ -1,4 +1,4 @@
-"""How fast each renderer is at each accuracy: error against time, every method a curve and every parameter a point.
+"""The speed of each renderer at each accuracy: error against time, every method a curve and every parameter a point.
 
 Two figures of every picture. The *picture*: acceleration structures built and kept (a Tracer, Cycles with persistent data, a
 loaded scene of Mitsuba), and no file. The *whole job*: from the loaded scene to the EXR on the disk.

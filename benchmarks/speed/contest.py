@@ -61,7 +61,7 @@ Tracks = dict[Method, list[Point]]
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured. enough : the error at which a method stops. longest : seconds of a picture that is not followed by
+    """The extent of a race. enough : the error at which a method stops. longest : seconds of a picture that is not followed by
     a longer one."""
 
     rounds: int

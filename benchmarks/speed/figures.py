@@ -39,7 +39,7 @@ class Still:
 
 @dataclass(frozen=True)
 class Figure:
-    """What is timed. key : as contestants know it. name, seconds : as charts say it."""
+    """A duration that is compared. key : as contestants know it. name, seconds : as charts say it."""
 
     key: str
     name: str

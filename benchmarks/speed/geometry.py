@@ -36,7 +36,7 @@ METHODS = (
 
 @dataclass(frozen=True)
 class Claim:
-    """What is `ratio` times something. wanted : at least."""
+    """A claim that its first thing is `ratio` times its second. wanted : at least."""
 
     sentence: str
     ratio: float
@@ -99,7 +99,7 @@ def _beside_cycles(size: tuple[int, int], rounds: int) -> tuple[dict[Figure, con
 
 
 def _share(level: str, scene_name: str, size: tuple[int, int], rounds: int) -> Claim:
-    """How much of bare Embree's speed the tracer has."""
+    """The share of bare Embree's speed that the tracer has."""
     threads = os.cpu_count() or 1
     samples = _SAMPLES if level == "direct" else 0
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as processes:

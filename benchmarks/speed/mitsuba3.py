@@ -32,7 +32,7 @@ JOB = Path(__file__).with_name("mitsuba_job.py")
 
 
 def variants() -> tuple[str, ...]:
-    """Those that run here, none where Mitsuba is not installed. LLVM ends the process where it can't be used: so in another."""
+    """The variants that run here, none without Mitsuba. LLVM ends the process where it can't be used: so in another."""
     if importlib.util.find_spec("mitsuba") is None:
         return ()
     return tuple(variant for variant in (LLVM, SCALAR) if _runs(variant))

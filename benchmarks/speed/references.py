@@ -1,4 +1,4 @@
-"""What errors are measured against: a picture converged by two renderers, and how far off it is itself.
+"""The references that errors are measured against: pictures converged by two renderers, and how far off each is itself.
 
 Each of two sides renders two halves with seeds of their own. The halves of a side tell its noise; the reference is the mean of
 both sides, each weighted with the inverse of its variance. How much the sides differ beyond their noise tells whether they

@@ -1,4 +1,4 @@
-"""Who is ahead: from points to the time that an error takes, and from that to charts that say so and judge it."""
+"""The standings: from points to the time that an error takes, and from that to charts that say who is ahead and judge it."""
 
 import itertools
 import math

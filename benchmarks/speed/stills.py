@@ -58,7 +58,7 @@ def charts(still: Still, quick: bool) -> tuple[Chart, ...]:
 
 
 def start_contestant(processes: contextlib.ExitStack, *arguments: object, **options: object) -> dict[str, Runner]:
-    """What a process offers, which ends with the others."""
+    """The runners that a process offers, which ends with the others."""
     return processes.enter_context(Contestant(*arguments, **options)).runners()
 
 

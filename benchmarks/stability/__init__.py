@@ -1,4 +1,4 @@
-"""How stable each method is that the project uses or could have used: a chart for each way to fail.
+"""The stability of each method that the project uses or could have used: a chart for each way to fail.
 
 Every module is one sweep towards a failure, with all candidates on it, and offers `charts(quick)`. The candidates that lost
 live here and nowhere else; the method in use is called from viewcam_addon. `python -m benchmarks stability` measures and

@@ -1,4 +1,4 @@
-"""How far off in the picture a point is when camera and scene stand far from the origin, from 1 to 1e9 units.
+"""Errors in the picture where camera and scene stand far from the origin, from 1 to 1e9 units.
 
 A place at (K, K, K); the camera stands some ten units beside it, d = 150 px. Two leagues, in pixels, the median.
 
@@ -110,7 +110,7 @@ def _relative_to_the_eye(pinhole: Pinhole, matrix: Array, points: Array) -> Arra
 
 
 def _in_world_space(kind: type) -> object:
-    """The same by world coordinates, in arithmetic of this kind; the basis is exact."""
+    """A projection by world coordinates, in arithmetic of this kind; the basis is exact."""
 
     def project(pinhole: Pinhole, matrix: Array, points: Array) -> Array:
         world = points.astype(kind) @ matrix[:3, :3].T.astype(kind) + matrix[:3, 3].astype(kind)

@@ -1,4 +1,4 @@
-"""What Blender's float32 channels cost a pose, and what they cost it in gimbal lock.
+"""The error that Blender's float32 channels add to a pose, and to one in gimbal lock.
 
 A camera rolled on its side looks along its own X axis, and the middle one of its three Euler angles comes near a right angle:
 cos β is the distance from gimbal lock. The error is that of the largest entry of the matrix that Blender evaluates, after it

@@ -220,7 +220,7 @@ def _mesh(corners: Array) -> Mesh:
 def _hits(
     corners: Array, chosen: NDArray[np.bool_], size: float, distance: float, rays: int, side: int
 ) -> tuple[CoreScene, Leaving]:
-    """What rays from the eye that aim at a thing meet, and a ray from each hit to the eye's side (1) or the other (−1).
+    """The hits of rays from the eye that aim at a thing, and a ray from each hit to the eye's side (1) or the other (−1).
 
     corners : (m, 3, 3), of the triangles. chosen : (m,), whose hits count. The eye is at the origin.
     """
@@ -330,7 +330,7 @@ def _of_spheres(distance: float, rays: int) -> dict[str, float]:
 
 
 def _meets_its_sphere(centres: Array, starts: Array, directions: Array) -> NDArray[np.bool_]:
-    """Whether rays meet unit spheres, each its own: (n, 3)."""
+    """True where rays meet unit spheres, each its own: (n, 3)."""
     met = np.empty(len(starts), bool)
     for ray, (centre, start, direction) in enumerate(zip(centres, starts, directions, strict=True)):
         alone = _core_of(Spheres(centre[None], np.ones(1), np.zeros(1, np.int32)))

@@ -1,4 +1,4 @@
-"""What the sweeps that ask Blender have in common: an empty file with one camera in it, and a reader of its pictures."""
+"""The stage of all sweeps that ask Blender: an empty file with one camera in it, and a reader of its pictures."""
 
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor

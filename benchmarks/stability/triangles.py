@@ -121,7 +121,7 @@ def _leaks(ratios: Array, fans: int) -> tuple[tuple[Curve, ...], tuple[Curve, ..
 
 
 def _hits_of_fans(size: float, fans: int, random: np.random.Generator) -> Iterator[tuple[str, Array]]:
-    """How many triangles of its fan each ray meets. size : of the triangles, in distances."""
+    """The number of triangles of its fan that each ray meets. size : of the triangles, in distances."""
     side = int(np.clip(0.4 / size, 1, 16))  # fans stand in a square, apart from one another
     groups = [_Fans(size, side, random) for _ in range(min(60, -(-fans // side**2)))]
     for name, test in _FORMULAS.items():
@@ -164,7 +164,7 @@ class _Fans:
         self.x, self.y = aimed[:, 0] / aimed[:, 2], aimed[:, 1] / aimed[:, 2]
 
     def hits(self, test: Callable[..., Array]) -> Array:
-        """How many triangles of its fan a test says that each ray meets."""
+        """The number of triangles of its fan that a test says each ray meets."""
         result = np.zeros(len(self.fan), int)
         for number in range(self._TRIANGLES):
             a, b, c = self.corners[:, self.fan * self._TRIANGLES + number].transpose(0, 2, 1)
@@ -172,7 +172,7 @@ class _Fans:
         return result
 
     def first_hits(self, depth: Callable[..., Array]) -> Array:
-        """The same of what reports the first hit only: a scene for the first triangles of the fans, and so on."""
+        """`hits` for a test that reports the first hit only: a scene for the first triangles of the fans, and so on."""
         result = np.zeros(len(self.fan), int)
         for number in range(self._TRIANGLES):
             result += np.isfinite(depth(self.corners[:, number :: self._TRIANGLES], self.x, self.y))
@@ -180,7 +180,7 @@ class _Fans:
 
 
 def _depth_errors(shape: Callable[..., Array], sweep: Array, count: int, rays: int) -> tuple[Curve, ...]:
-    """How far the depths of nine in ten rays are off that meet the insides of triangles of a shape."""
+    """Errors of the depths of nine in ten rays that meet the insides of triangles of a shape."""
     errors: dict[str, list[float]] = {}
     for value in sweep:
         random = np.random.default_rng(8)
@@ -238,7 +238,7 @@ def _seen_on_the_ground(extents: Array, count: int) -> tuple[Curve, ...]:
 
 
 def _first_on_the_ground(extent: float, random: np.random.Generator) -> Iterator[tuple[str, Array]]:
-    """Which triangle each method meets first, −1 if none: those of the ground, then those of a mat at which all rays are aimed.
+    """Each method's first triangle, −1 if none: those of the ground, then those of a mat at which all rays are aimed.
 
     extent : of the ground, in heights of the eye.
     """
@@ -289,7 +289,7 @@ def _core(corners: Array, x: Array, y: Array) -> tuple[CoreScene, Array]:
 
 
 def _core_depth(corners: Array, x: Array, y: Array, packets: bool) -> Array:
-    """Where the core first meets something, inf where nothing is."""
+    """The depths at which the core first meets something, inf where nothing is."""
     core, rays = _core(corners, x, y)
     return core.closest(rays, packets=packets)[0]
 

@@ -164,7 +164,7 @@ class BothSides:
     comparison: geometry.GeometryComparison
 
     def hits(self, object_index):
-        """How many pixels of Cycles' picture show the object."""
+        """The number of pixels of Cycles' picture that show the object."""
         return int((self.cycles["Object Index"] == object_index).sum())
 
     def check(self):

@@ -26,7 +26,7 @@ MOST = 28
 
 
 def walk_of(action):
-    """What a call runs of this package: ({(room, function)} of blender/, [calls from a room to one above it])."""
+    """The functions of this package that a call runs: ({(room, function)} of blender/, [calls from a room to one above it])."""
     functions, upward, stack = set(), [], [None]
 
     def note(frame, event, _argument):

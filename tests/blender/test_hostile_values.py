@@ -29,7 +29,7 @@ TEXTS = (
 
 @pytest.fixture(autouse=True)
 def numpy_raises():
-    """What NumPy would warn of is an error; underflow is nothing that it warns of."""
+    """Turn NumPy's warnings into errors, except of underflow, of which it doesn't warn."""
     with np.errstate(divide="raise", over="raise", invalid="raise"), warnings.catch_warnings():
         warnings.simplefilter("error")
         yield
@@ -61,7 +61,7 @@ def operate(operator, camera_object):
 
 
 def warnings_of(camera_object, scene):
-    """What the panel warns of."""
+    """The sentences of the panel's warnings."""
     return [notice.sentence for notice in panel.notices(camera_object, scene)]
 
 

@@ -222,7 +222,7 @@ def test_a_sun_with_an_angle(stage, add_lamp):
 
 
 def same_within_noise(exported, ours, theirs):
-    """Whether light is the same but for noise, and the lines that say so."""
+    """True if light is the same but for noise, and the lines that say so."""
     images = [Image(passes) for passes in theirs]
     comparison = radiance.compare(Image(ours, {"samples": "64"}), images, exported.camera, test_samples=16)
     return all(row.ok for row in comparison.rows if row.name != "Diffuse Color"), "\n".join(comparison.lines())

@@ -226,7 +226,7 @@ def hostile_file(way, folder):
 
 
 def made(folder, known):
-    """What is below a folder and was not known."""
+    """The paths below a folder that were not known."""
     return sorted(path for path in folder.rglob("*") if path not in known and path.suffix != ".blend1")
 
 
@@ -236,7 +236,7 @@ def remove(paths):
 
 
 def left_by(blend, trust, out):
-    """What each command leaves behind beside what was asked for: name of the command → paths."""
+    """The paths that each command leaves behind beside what was asked for: name of the command → paths."""
     folder, left = blend.parent.parent, {}
     known = set(folder.rglob("*"))
     for name, command in COMMANDS.items():

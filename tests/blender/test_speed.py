@@ -1,4 +1,4 @@
-"""What following costs: what is done for one camera among many, what is written, and what 10,000 updates leave behind.
+"""The cost of following: the work for one camera among many, what is written, and what 10,000 updates leave behind.
 
 What takes time is measured as a multiple of what Blender itself takes for the like in the same process, so that slow and busy
 machines count on both sides; what matters is counted.
@@ -154,7 +154,7 @@ def depsgraph():
 
 
 def seconds_each(action, count=100, rounds=3):
-    """Of the processor, in the best of a few rounds: other programs take none of them."""
+    """Seconds of the processor for each action, in the best of a few rounds: other programs take none of them."""
     durations = []
     for _ in range(rounds):
         start = time.process_time()
@@ -178,7 +178,7 @@ def least_of_few(measured, allowed, attempts=3):
 
 
 def as_multiple_of_blenders_own_move(once, plain):
-    """What an update takes, in moves of a plain camera."""
+    """The time of an update, in moves of a plain camera."""
 
     def move(i):
         plain.location.x = 0.01 * i
@@ -238,7 +238,7 @@ def test_an_edit_that_places_its_camera_ten_times_would_be_noticed(posed_camera,
 
 
 def others_cost(cameras_at_rest, target):
-    """What another object's move takes where these are enabled, as a multiple of what it takes where they are plain cameras.
+    """The time of another object's move where these are enabled, as a multiple of its time where they are plain cameras.
 
     Each the least of rounds that take turns, so that what else the machine does falls on both.
     """
@@ -290,7 +290,7 @@ def leftovers(once, count, rounds=3):
 
 
 def kept():
-    """What there is without what is remembered for a while, which is a fixed number of entries."""
+    """Allocated blocks, memory and datablocks without what is remembered for a while, which is a fixed number of entries."""
     cameras.forget_all()
     storage._parsed.cache_clear()
     gc.collect()

@@ -1,4 +1,4 @@
-"""What files hold.
+"""The values that files hold.
 
 `saved/values.blend` was saved with Blender 4.2 by the last version without CameraValues; `saved/values.json` is what that read.
 """
@@ -20,7 +20,7 @@ READ_BY_THE_OLD_VERSION = json.loads((SAVED / "values.json").read_text(encoding=
 
 
 def digits(camera_object):
-    """What the values ask for, to the bit."""
+    """The numbers that the values ask for, to the bit."""
     stated = cameras.stated(camera_object, bpy.context.scene)
     if stated is None:
         return None

@@ -1,4 +1,4 @@
-"""What becomes of targets: loops, deletion, stating anew, copies, libraries, files, and Blender without the add-on."""
+"""The fate of targets: loops, deletion, stating anew, copies, libraries, files, and Blender without the add-on."""
 
 import numpy as np
 import pytest

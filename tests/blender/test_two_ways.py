@@ -17,7 +17,7 @@ def update():
 
 
 def differences(camera_object, scene):
-    """What differs between values and camera by more than float32 storage explains."""
+    """Differences between values and camera by more than float32 storage explains."""
     update()
     reach = pose.reach(camera_object, bpy.context.evaluated_depsgraph_get())
     return findings.differences(cameras.stated(camera_object, scene), cameras.read(camera_object, scene), reach)

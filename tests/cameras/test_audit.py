@@ -113,7 +113,7 @@ MADE = {
 
 
 def named(kind, seed):
-    """What the audit makes of a dataset with a mistake: nothing if it is named, alone or with what can't be told from it."""
+    """The audit's verdict on a dataset with a mistake: nothing if it is named, alone or with what can't be told from it."""
     random = np.random.default_rng([seed, len(kind)])
     views, middle = a_right_dataset(random)
     tracks = points_in_pictures(random, views, middle, random.uniform(0.1, 1.0))

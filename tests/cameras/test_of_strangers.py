@@ -1,4 +1,4 @@
-"""What files that strangers published say in ways of their own: read as their program sees them, or refused.
+"""Files as strangers publish them, in ways of their own: read as their program sees them, or refused.
 
 Each text is the least that shows what was read wrongly, or refused without need, of files that stand in public repositories.
 """

@@ -32,7 +32,7 @@ class PaperScene:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def surface_at(self, columns, rows, px=0.5, py=0.5):
-        """What rays through sub-pixel positions see: pass name → (n, channels) float32."""
+        """The values that rays through sub-pixel positions see: pass name → (n, channels) float32."""
         origin = np.array(self.pinhole.eye)
         directions = self.pinhole.ray_directions(np.asarray(columns), np.asarray(rows), px, py)
         count = len(directions)
@@ -113,6 +113,6 @@ def paper_scene() -> PaperScene:
 
 @pytest.fixture(scope="session")
 def far_scene() -> PaperScene:
-    """The same 5 km from the origin: float32 moves its rays by a hundredth of a pixel, so that many of them cross an edge."""
+    """The scene 5 km from the origin: float32 moves its rays by a hundredth of a pixel, so that many of them cross an edge."""
     offset = (5000.0, 0.0, 0.0)
     return PaperScene(_pinhole(offset), offset=offset)

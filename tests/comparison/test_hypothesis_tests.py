@@ -47,19 +47,19 @@ def even(rng, samples):
 
 
 def batched(rng, samples):
-    """The same; the variance is that of 16 batches of the samples."""
+    """`even`, but the variance is that of 16 batches of the samples."""
     mean, _ = even(rng, samples)
     return mean, TRUTH**2 / samples * rng.chisquare(15, TRUTH.shape) / 15
 
 
 def grey(rng, samples):
-    """The same, but all channels have the same noise."""
+    """`even`, but all channels have the same noise."""
     mean = rng.gamma(samples, 1.0 / samples, (HEIGHT, WIDTH, 1)) * TRUTH
     return mean, TRUTH**2 / samples * rng.chisquare(samples - 1, (HEIGHT, WIDTH, 1)) / (samples - 1)
 
 
 def fireflies(rng, samples, chance=2e-5, size=3000.0):
-    """The same, and one sample in fifty thousand is three thousand times as bright."""
+    """`even`, but one sample in fifty thousand is three thousand times as bright."""
     mean, variance = even(rng, samples)
     count = rng.poisson(samples * chance, (HEIGHT, WIDTH, 1))
     return mean + TRUTH * count * size / samples, variance + TRUTH**2 * count * size**2 / samples**2

@@ -20,7 +20,7 @@ LEDGER = (
 
 
 class Page(HTMLParser):
-    """What a browser would make of it: tags with attributes, balanced, and the text."""
+    """The page as a browser would make it: tags with attributes, balanced, and the text."""
 
     VOID = frozenset(("meta", "img", "input", "br", "link", "hr"))
 

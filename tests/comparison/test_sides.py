@@ -1,4 +1,4 @@
-"""What light is compared in: means and variances of several seeds, quantities that are linear, and what no number is."""
+"""The quantities that light is compared in: means and variances of several seeds, what is linear, and what no number is."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What `blender` does with the words that the pages give it, done by a wheel, which has no such command."""
+"""A stand-in for the command `blender`, by a wheel, which has none: it does what the pages say of it."""
 
 import os
 import sys

@@ -95,14 +95,14 @@ def of_page(page: str, text: str) -> list[Example]:
 
 
 def is_run(example: Example, real: bool) -> bool:
-    """Whether a test runs it, in a real Blender or with a wheel."""
+    """True if a test runs it, in a real Blender or with a wheel."""
     only_shown = (example.page, example.language) in WRITTEN
     is_possible = ONLY_WHEEL not in example.text if real else example.text not in ONLY_REAL
     return not only_shown and example.text not in NOT_RUN and is_possible
 
 
 def pages(real: bool) -> list[str]:
-    """Those of which something is run."""
+    """The pages of which something is run."""
     return list(dict.fromkeys(example.page for example in examples() if is_run(example, real)))
 
 
@@ -112,7 +112,7 @@ def _commands(block: str) -> list[str]:
 
 
 class Reader:
-    """Who follows the pages: folder for its work, and the Blender that it has.
+    """A reader who follows the pages: folder for its work, and the Blender that it has.
 
     blender, viewcam : what these commands are, in a shell's words. python : the command that runs a program with `bpy`.
     environment : more variables. package : what the add-on is called there. extension : the zip to install, where one can be.

@@ -1,4 +1,4 @@
-"""What reads a hostile file, as a program: `targets.py KIND FIRST COUNT FOLDER` feeds mutants FIRST … to it, one after another.
+"""A program that reads a hostile file: `targets.py KIND FIRST COUNT FOLDER` feeds mutants FIRST … to it, one after another.
 
 A mutant that is met with anything but success, a failed comparison or one sentence is told as a line of JSON. Before each its
 number goes into FOLDER/current, so that who started this knows which one ended it: SIGALRM after `SECONDS`, a crash. All that

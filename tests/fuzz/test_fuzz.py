@@ -48,7 +48,7 @@ def failures(kind: str, count: int, folder: Path) -> list[str]:
 
 
 def as_a_user_sees(mutant: Path) -> list[str]:
-    """What is wrong with how the command line answers a .blend that crashes Blender: a sentence and a status are right."""
+    """The faults of the command line's answer to a .blend that crashes Blender: a sentence and a status are right."""
     try:
         targets.command(mutant)
     except targets.Said as error:

@@ -119,14 +119,14 @@ def stand_in(stand_in_program, monkeypatch) -> StandIn:
 
 @pytest.fixture
 def blend(tmp_path) -> Path:
-    """What the stand-in takes for a .blend."""
+    """A file that the stand-in takes for a .blend."""
     path = tmp_path / "scene.blend"
     path.write_text("a scene")
     return path
 
 
 def runs(process: int | str) -> bool:
-    """Whether a process of this number runs; one that has ended and was not asked for its status does not."""
+    """True if a process of this number runs; one that has ended and was not asked for its status does not."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -134,7 +134,7 @@ def runs(process: int | str) -> bool:
 
 
 def until(is_so, seconds: float = 30.0):
-    """What `is_so` gives, as soon as it is true or so many seconds have passed: many times as many as it takes."""
+    """The value of `is_so`, as soon as it is true or so many seconds have passed: many times as many as it takes."""
     ends = time.monotonic() + seconds
     while not (found := is_so()) and time.monotonic() < ends:
         time.sleep(0.02)

@@ -31,7 +31,7 @@ TIMING = re.compile(rb'"timing": \{[^}]*\}')
 
 
 class Ear:
-    """What was told."""
+    """A listener that keeps each event that it is told."""
 
     def __init__(self):
         self.told = []

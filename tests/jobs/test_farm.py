@@ -1,4 +1,4 @@
-"""What docs/farm.md tells a farm to run does what it says, word by word. This machine is the farm, Blender a stand-in."""
+"""The commands of docs/farm.md do what it says, word by word. This machine is the farm, Blender a stand-in."""
 
 import json
 import re
@@ -80,7 +80,7 @@ def test_scheduler_worker_and_batch_as_the_page_starts_them(here, stand_in, tmp_
 
 
 def managers():
-    """Of each manager the command of part 1, with the words that are replaced there."""
+    """The command of part 1 for each manager, with the words that are replaced there."""
     texts = [block.strip() for language, block in BLOCKS if language == "text"]
     opencue, deadline, flamenco = texts
     yield pytest.param(opencue, "#IFRAME#", id="OpenCue")

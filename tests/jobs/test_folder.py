@@ -1,4 +1,4 @@
-"""What stands in a batch's folder: when a shot counts as done, and what of a killed batch is swept away."""
+"""A batch's folder: when a shot counts as done, and what of a killed batch is swept away."""
 
 import errno
 import json

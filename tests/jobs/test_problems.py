@@ -1,4 +1,4 @@
-"""What is wrong with a list of shots is told at once, whole, and with its place."""
+"""Problems of a list of shots are told at once, whole, and with their places."""
 
 import json
 import sys
@@ -165,7 +165,7 @@ def test_each_problem_is_one_printable_line_in_the_order_of_the_file(tmp_path):
 
 
 def line_of_first_good():
-    """Of two rows called alike the first is right: here rows of one name stand below none of that name."""
+    """The line of the first of two rows called alike, which is right: here rows of one name stand below none of that name."""
     return next(number for number, (changes, _) in enumerate(KINDS, start=2) if changes == {"name": "SHOT2"})
 
 
@@ -369,7 +369,7 @@ def test_unknown_cameras_are_guessed_at_for_the_problems_that_are_shown_and_no_o
 
 
 def steps_of(run):
-    """How many functions a call calls, Python's and C's: the same in every run, on any machine."""
+    """The number of functions that a call calls, Python's and C's: the same in every run, on any machine."""
     steps = 0
 
     def count(_frame, event, _argument):

@@ -434,7 +434,7 @@ def test_a_rectangle_covers_what_it_covers_on_paper(discrepancy, x, other_x, y, 
 
 @pytest.fixture(scope="module")
 def discrepancy():
-    """How much a box in the pixel may differ from its share of the places, found by trying all boxes between them."""
+    """The largest difference of a box in the pixel from its share of the places, found by trying all boxes between them."""
     i = np.arange(coverage.SAMPLES)
     points = np.stack([(i + 0.5) * STEP, (i * coverage._STEP % coverage.SAMPLES + 0.5) * STEP])
     edges = np.append(np.append(0.0, (i + 0.5) * STEP), 1.0)

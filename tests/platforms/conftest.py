@@ -55,6 +55,6 @@ def sample_scenes(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def hashes_here(sample_scenes):
-    """What this machine computes of the sample scenes: 'scene level pass' → hash."""
+    """The hashes of the sample scenes' pictures on this machine: 'scene level pass' → hash."""
     done = subprocess.run([sys.executable, HASHES, "2", *sample_scenes], check=True, capture_output=True, text=True)
     return json.loads(done.stdout)

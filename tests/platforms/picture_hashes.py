@@ -1,4 +1,4 @@
-"""What the core computes on the machine that runs this: `python picture_hashes.py THREADS SCENE.json…` prints it as JSON.
+"""Hashes of what the core computes on this machine: `python picture_hashes.py THREADS SCENE.json…` prints it as JSON.
 
 For each scene and level the SHA-256 of every pass, and that of the core's own functions. Needs NumPy alone.
 """

@@ -1,4 +1,4 @@
-"""What each Blender's own installer makes of the wheels in the zips: every file where Python imports it, of every platform.
+"""Blender's own installers and the wheels in the zips: every file where Python imports it, of every platform.
 
 The installers are those of the Blenders that are wheels in .venv and .venvs (`make test-matrix`), run as they stand.
 """
@@ -40,7 +40,7 @@ extension = loaded("viewcam_ci_extension", ROOT / ".ci" / "extension.py")
 
 
 class Installer:
-    """What a Blender does with the wheels of a zip: choose among them, then unpack."""
+    """Blender's installer of the wheels of a zip: choose among them, then unpack."""
 
     def __init__(self, scripts: Path) -> None:
         name = f"bl_pkg_{scripts.parent.name.replace('.', '_')}"
@@ -61,7 +61,7 @@ class Installer:
 
     @property
     def moves_files(self) -> bool:
-        """Whether it does as pip with what a wheel keeps in platlib and purelib."""
+        """True if it does as pip with what a wheel keeps in platlib and purelib."""
         return hasattr(self._manager, "_wheel_zipfile_normalize")
 
     def chosen(self, wheels: list[Path], platform: str, python: str) -> list[Path]:
@@ -93,7 +93,7 @@ class Installer:
 
 
 def files_of_pip(wheel: Path) -> set[str]:
-    """What pip puts into the folder of modules, but for what it knows of the wheel."""
+    """The files that pip puts into the folder of modules, but for what it knows of the wheel."""
     with zipfile.ZipFile(wheel) as archive:
         names = [name for name in archive.namelist() if not name.endswith("/")]
     files = set()

@@ -23,7 +23,7 @@ DATASETS = {"coco": "coco.json", "panoptic": "panoptic.json", "bop": "bop", "col
 
 
 def is_same(name: str, ours: bytes | None, theirs: bytes | None) -> bool:
-    """Whether a file's bytes are the same; of angles and rotations, all but what each system's libraries round otherwise."""
+    """True if a file's bytes are the same; of angles and rotations, all but what each system's libraries round otherwise."""
     rounded = re.search(r"(bop/(objects|scene_gt)|transforms)\.json$", name)
     if ours == theirs or ours is None or theirs is None or not rounded:
         return ours == theirs

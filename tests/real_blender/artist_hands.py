@@ -1,4 +1,4 @@
-"""What the parts of an artist's first day share: pictures of the window, tabs, fields that are dragged."""
+"""The tools that the parts of an artist's first day share: pictures of the window, tabs, fields that are dragged."""
 
 import importlib
 import sys
@@ -18,7 +18,7 @@ def room(name):
 
 
 def warnings():
-    """What the panel warns of."""
+    """The warnings of the panel."""
     bpy.context.view_layer.update()
     return room("interface.panel").notices(camera(), bpy.context.scene)
 

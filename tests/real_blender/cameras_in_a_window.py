@@ -27,7 +27,7 @@ Camera "perspective" "float fov" 30
 
 
 def state():
-    """What an import or a paste may change, to the bit."""
+    """The names and numbers that an import or a paste may change, to the bit."""
     scene, data = bpy.context.scene, bpy.data
     found = {name: sorted(getattr(data, name).keys()) for name in ("objects", "cameras", "collections", "images", "actions")}
     found["scene"] = (scene.camera.name, scene.render.resolution_x, scene.render.resolution_y, scene.frame_current)

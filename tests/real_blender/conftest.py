@@ -24,7 +24,7 @@ PLATFORMS = {("Linux", "x86_64"): "linux-x64", ("Darwin", "arm64"): "macos-arm64
 
 
 def pytest_collection_modifyitems(items):
-    """What takes minutes begins first: else one process takes the tour alone when the other has nothing left."""
+    """Begin with the tests that take minutes: else one process takes the tour alone when the other has nothing left."""
     items.sort(key=lambda item: item.path not in LONGEST)
 
 
@@ -37,7 +37,7 @@ class Host:
 
     @property
     def is_real(self) -> bool:
-        """Whether this is a program, not a Python module."""
+        """True if this is a program, not a Python module."""
         return self.command[0] == os.environ["BLENDER"]
 
     def run(self, *arguments: str | Path) -> subprocess.CompletedProcess:
@@ -57,7 +57,7 @@ class Host:
 
 @contextlib.contextmanager
 def one_at_a_time():
-    """Of the processes that the tests are shared among, one makes what they all have."""
+    """A lock, so that one of the processes that share the tests makes what they all have."""
     (ROOT / ".venvs").mkdir(exist_ok=True)
     with open(ROOT / ".venvs" / "lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)

@@ -51,7 +51,7 @@ def pixel_of(point, view=None):
 
 
 def carried(point, from_pixel, to_pixel):
-    """Where a mouse carries a point of the user's view: in the plane that faces the viewer.
+    """The point to which a mouse carries a point of the user's view: in the plane that faces the viewer.
 
     In float64: what bpy_extras gives is off by up to 0.06 pixels.
     """

@@ -76,7 +76,7 @@ def begin():
 
 
 def begin_and_stop():
-    """The same, and its processes are stopped: it is on its way until it is ended, however quick machine and tracer are."""
+    """`begin`, and its processes are stopped: it is on its way until it is ended, however quick machine and tracer are."""
     comparison, y = yield from begin()
     os.killpg(comparison._process._first.pid, signal.SIGSTOP)
     return comparison, y

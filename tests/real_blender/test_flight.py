@@ -69,7 +69,7 @@ def roundings(pinhole, picture):
 
 
 def beyond_the_tolerance(pictures, pinholes):
-    """What is not within tolerance over all frames, in words; empty where all is."""
+    """The shares that are not within tolerance over all frames, in words; empty where all are."""
     counts = np.concatenate([roundings(pinholes[frame], pictures[frame]) for frame in pinholes])
     found = np.percentile(counts, tolerances.PERCENTILES)
     return [

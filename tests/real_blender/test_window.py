@@ -136,7 +136,7 @@ def test_compare_with_cycles_comes_to_a_verdict_and_ends_in_every_other_way_with
 
 
 def _command_lines():
-    """Of the processes that run."""
+    """The command lines of the processes that run."""
     lines = []
     for file in Path("/proc").glob("[0-9]*/cmdline"):
         with contextlib.suppress(OSError):  # it has just ended

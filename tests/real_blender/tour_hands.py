@@ -1,4 +1,4 @@
-"""What an artist's hand does in a real Blender with a window: finds a button and clicks it, types, drags, looks at the screen.
+"""An artist's hand in a real Blender with a window: finds a button and clicks it, types, drags, looks at the screen.
 
 Everything is a generator that a timer steps (panel_in_a_window.py), so that Blender handles the events and draws in between. No
 coordinate of a button is assumed: the mouse moves over the panel, and Blender is asked which property or operator it is on.
@@ -41,7 +41,7 @@ def begin():
 
 
 def under_the_mouse(where):
-    """What the button under the mouse is for: 'virtual_pinhole.eye[2]', 'viewcam.dolly_camera(camera="Camera")' or ''."""
+    """The use of the button under the mouse: 'virtual_pinhole.eye[2]', 'viewcam.dolly_camera(camera="Camera")' or ''."""
     area, part = region(*where)
     with bpy.context.temp_override(window=window(), area=area, region=part):
         if found := bpy.context.property:

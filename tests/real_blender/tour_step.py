@@ -1,4 +1,4 @@
-"""What a step of the tour is, the scene that it starts in, and what is compared.
+"""A step of the tour, the scene that it starts in, and what is compared.
 
 A step is done by hand in a window (tour_in_a_window.py) and by script in a Blender without one (tests/blender/test_tour.py);
 the check is the same. So the mouse and the operators can't drift apart, and docs/artists.md shows what is tested.
@@ -36,7 +36,7 @@ class Step:
         yield
 
     def by_script(self):
-        """The same by properties and operators."""
+        """The step by properties and operators."""
 
     def check(self):
         """Fail unless what the step is for has happened."""
@@ -112,7 +112,7 @@ def _plain(group, name):
 
 
 def differing(one, other):
-    """What differs between two states, in words."""
+    """The differences between two states, in words."""
     return {key: (one.get(key), other.get(key)) for key in one.keys() | other.keys() if one.get(key) != other.get(key)}
 
 

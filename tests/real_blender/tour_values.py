@@ -139,7 +139,7 @@ class Roll(Step):
 
 
 class KeepTheFieldOfView(Step):
-    """What the camera keeps when the picture gets another resolution, by the mouse wheel over the choice."""
+    """The choice of what the camera keeps when the picture gets another resolution, by the mouse wheel over it."""
 
     def prepare(self):
         values().keeps = "PIXELS"  # a new camera has the other

@@ -74,7 +74,7 @@ def reflected(direction, normal):
 
 
 def refracted(direction, normal, ratio: float):
-    """Where rays go, and where that is along the surface since all is reflected."""
+    """The refracted directions, and True where a ray runs along the surface since all is reflected."""
     through = specular(direction, normal, normal, ratio)[2]
     across = direction - (direction * normal).sum(axis=0) * normal
     return through, ((across / ratio) ** 2).sum(axis=0) >= 1.0
@@ -105,7 +105,7 @@ def radiance_seen(lamp: Lamp, starts, directions, nearest=0.0, farthest=np.inf):
 
 
 def evaluated(shown: Node, images=None, uv=(0.0, 0.0), incoming=(0.0, 0.0, -1.0), behind=False):
-    """What a node makes on a floor, z up, at (2, n) UV, met along (3, n): (3, n), and as a number (n,)."""
+    """The value of a node on a floor, z up, at (2, n) UV, met along (3, n): (3, n), and as a number (n,)."""
     uv, incoming = np.asarray(uv, np.float64).reshape(2, -1), np.asarray(incoming, np.float64).reshape(3, -1)
     count = max(uv.shape[1], incoming.shape[1])
     flat = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]]), np.zeros(1, np.int32))

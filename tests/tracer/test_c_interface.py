@@ -48,7 +48,7 @@ class Calls:
         self.core.scene_free(self.scene)
 
     def __call__(self, name, *arguments) -> bool:
-        """Whether a function did what it was asked for; if not, it says why."""
+        """True if a function did what it was asked for; if not, it says why."""
         status = getattr(self.core, name)(*arguments)
         assert status in (0, 1, 2), f"{name} returns {status}"
         if status:

@@ -1,4 +1,4 @@
-"""Where rays meet spheres and ellipsoids, against the quadric itself in many digits."""
+"""Rays that meet spheres and ellipsoids, against the quadric itself in many digits."""
 
 import warnings
 
@@ -19,7 +19,7 @@ CAMERA = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 1, 1, 1)
 
 
 def found_depths(placed, spheres, x, y, eye=(0.0, 0.0, 0.0)):
-    """Where the rays (x, y, −1) from an eye meet some spheres, as the core says: in units of that direction."""
+    """The depths where the rays (x, y, −1) from an eye meet some spheres, as the core says: in units of that direction."""
     core = CoreScene(Scene(CAMERA, {"spheres": spheres}, (placed,)), 1)
     directions = np.stack([x, y, np.full(np.shape(x), -1.0)], axis=-1)
     return core.closest(core.rays(np.asarray(eye, float)[None], directions))[0]

@@ -1,4 +1,4 @@
-"""What rays meet, by another judge: Embree in its robust mode, in float32."""
+"""Hits of rays, by another judge: Embree in its robust mode, in float32."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What rays meet in the core: against brute force, in packets and one by one; test_leaks.py has edges and vertices."""
+"""Hits of the core's rays: against brute force, in packets and one by one; test_leaks.py has edges and vertices."""
 
 import hashlib
 import os
@@ -33,7 +33,7 @@ def corners_of(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
 
 
 def brute_force(corners: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of all triangles: where a ray meets their planes, and the least of its barycentric coordinates (Möller, Trumbore)."""
+    """The hits with all triangles: depths in their planes, and the least of the barycentric coordinates (Möller, Trumbore)."""
     a, first, second = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across = np.cross(direction, second)
     with np.errstate(all="ignore"):

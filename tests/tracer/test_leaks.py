@@ -41,7 +41,7 @@ class Body:
         return points @ self.matrix[:3, :3].T + self.matrix[:3, 3]
 
     def hits(self, origins: np.ndarray, ends: np.ndarray) -> int:
-        """How many rays to these ends meet it, single ones, in packets and such that ask for a light: a third of them each."""
+        """The number of rays to these ends that meet it: single, in packets and asking for a light, a third of them each."""
         rays = self.core.rays(origins, ends - origins, farthest=2.0)
         single, packets, lights = np.array_split(rays, 3)
         _, of_single, _ = self.core.closest(single, packets=False)

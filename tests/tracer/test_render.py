@@ -329,7 +329,7 @@ def pictures(tracer):
 
 
 def differing(kept, fresh):
-    """Of the passes of both pictures, how many pixels differ where any do."""
+    """The number of pixels that differ in each pass of both pictures, where any do."""
     found = {}
     for one, other in zip(kept, fresh, strict=True):
         counts = {name: int((one[name] != other[name]).any(axis=-1).sum()) for name in one}
@@ -338,7 +338,7 @@ def differing(kept, fresh):
 
 
 def copied(scene):
-    """The same in other arrays, as the next frame's export makes them."""
+    """A copy of the scene in other arrays, as the next frame's export makes them."""
 
     def copy(geometry):
         arrays = {name: value.copy() for name, value in vars(geometry).items() if isinstance(value, np.ndarray)}

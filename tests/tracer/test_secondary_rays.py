@@ -54,7 +54,7 @@ def onwards(normals, rng, sides=1.0) -> np.ndarray:
 
 
 def traced(core: CoreScene, starts, directions, lengths=np.inf) -> tuple[np.ndarray, np.ndarray]:
-    """What rays from `leaving` meet, and whether anything hides them, one by one and in packets."""
+    """The hits of rays from `starts`, and whether anything hides them, one by one and in packets."""
     rays = np.column_stack([starts, directions, np.zeros(len(starts)), np.broadcast_to(lengths, len(starts))])
     met, hidden = (
         [getattr(core, name)(rays, packets=packets) for packets in (False, True)] for name in ("closest", "occluded")

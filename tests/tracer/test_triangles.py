@@ -1,4 +1,4 @@
-"""Where rays meet triangles, what is interpolated there, and which way normals point."""
+"""Rays that meet triangles, what is interpolated there, and which way normals point."""
 
 from fractions import Fraction
 

@@ -604,7 +604,7 @@ def _free(camera_object: bpy.types.Object) -> frozenset[str]:
 
 
 def _moved(camera_object: bpy.types.Object, wanted: Pinhole, found: Pinhole, depsgraph: bpy.types.Depsgraph) -> set[str]:
-    """Which of EYE, VIEW and DISTANCE Blender has moved by more than a rounding, and nobody holds where they are."""
+    """The parts EYE, VIEW and DISTANCE that Blender has moved by more than a rounding, and nobody holds where they are."""
     differing = findings.differences(wanted, found, pose.reach(camera_object, depsgraph)).keys()
     moved = set(conversion.PARTS & differing)
     if findings.EYE in moved and np.array_equal(np.float32(wanted.eye), np.float32(found.eye)):

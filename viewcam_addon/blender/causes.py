@@ -1,4 +1,4 @@
-"""Who in a .blend may keep a camera from being what its four values say. Reads Blender, changes nothing."""
+"""The things in a .blend that may keep a camera from being what its four values say. Reads Blender, changes nothing."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import replace
@@ -157,7 +157,7 @@ def _drivers(camera_object: bpy.types.Object) -> Iterator[Cause]:
 def keyed(
     camera_object: bpy.types.Object, curves: Callable[[bpy.types.ID], list[bpy.types.FCurve]]
 ) -> list[tuple[bpy.types.ID, str]]:
-    """Which of the camera's own channels keyframes set: (object or data, data path). curves : of a datablock."""
+    """The camera's own channels that keyframes set: (object or data, data path). curves : of a datablock."""
     blocks = camera_object, camera_object.data
     return [(block, path) for block in blocks for path in _paths(curves(block)) if _channel(path)[0] not in (None, CENTRE)]
 

@@ -1,4 +1,4 @@
-"""How every command opens a .blend: what in it would run, or write files, is off unless the file is trusted.
+"""Opening a .blend, for every command: what in it would run, or write files, is off unless the file is trusted.
 
 Blender itself leaves registered texts and drivers in Python alone when it is told to (`use_scripts`). What it does not guard is
 switched off here, before anything of the file is evaluated: `load_post` comes just before Blender's first evaluation, which

@@ -183,7 +183,7 @@ def no_size(camera_object: bpy.types.Object) -> InputError:
 
 
 def who_shears(camera_object: bpy.types.Object) -> str:
-    """Why the camera's axes are not perpendicular, and what to do about it: the end of a sentence."""
+    """The reason that the camera's axes are not perpendicular, and what to do about it: the end of a sentence."""
     for child in (camera_object, *ancestors(camera_object)):
         parent = child.parent
         if parent and parent.type == "ARMATURE" and child.parent_type == "BONE":

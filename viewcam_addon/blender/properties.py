@@ -73,7 +73,7 @@ _on_lens = _edit_of("distance")
 
 
 def _on_distance(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
-    """Who states a distance means the pixels of the picture as it is now."""
+    """Take a stated distance as the pixels of the picture as it is now."""
     if storage.is_storing:
         return
     camera_object = group.id_data
@@ -137,7 +137,7 @@ def _roll(group: "VirtualPinhole") -> float:
 
 
 def _looks_like(look: str) -> Callable[["VirtualPinhole"], float]:
-    """How a lens reads that is one of datablocks.LENSES."""
+    """The lens's value as one of datablocks.LENSES reads it."""
     unit = datablocks.LENSES[look]
     return lambda group: cameras.lens(group.id_data, unit)
 

@@ -115,7 +115,7 @@ class _Code:
         self._numbers: dict[str, float | None] = {}
 
     def _value_of(self, at: int) -> int | None:
-        """Where the value begins that a name gets: by =, : (also behind a quote), <- or <<."""
+        """The beginning of the value that a name gets: by =, : (also behind a quote), <- or <<."""
         words, places = self._words, self._places
         behind = places[at] + len(words[at])
         if dimensions := _DIMENSIONS.match(self.text, behind):

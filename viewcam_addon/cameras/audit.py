@@ -551,7 +551,7 @@ def _of_focal_factor(views: Views, evidence: "Tracks | Depths") -> Mistake:
 
 
 def _factor_of_tracks(views: Views, evidence: Tracks) -> float:
-    """How many times as far from the principal point as the cameras say pictures show a point, in the median."""
+    """The factor by which pictures show a point farther from the principal point than the cameras say, in the median."""
     places, depth = views.project(evidence.which, evidence.points)
     center = views.center[(evidence.which + views.shifted) % len(views.eye)]
     with np.errstate(all="ignore"):

@@ -149,7 +149,7 @@ def notes_in(source: Source) -> list[str]:
 
 
 def model(source: Source) -> tuple[tuple[str, ...], str] | None:
-    """Where in a folder the model is, part by part, and the suffix of its files; None if there is none."""
+    """The place of the model in a folder, part by part, and the suffix of its files; None if there is none."""
     if not source.is_folder:
         path = source.path
         ours = path and path.stem in (*_FILES, "points3D", "rigs", "frames") and path.suffix in (".txt", ".bin")

@@ -28,7 +28,7 @@ _STEP = 1e-6  # of the differences that make its Jacobian: they are right to 1e-
 
 @dataclass(frozen=True)
 class Lens:
-    """How a lens bends a pinhole's picture.
+    """The lens: how it bends a pinhole's picture.
 
     terms : (name, value) of its coefficients, as its program calls them. projection : one of PROJECTIONS, and parameters its
     own. radial : of r², r⁴, … of the polynomial. divisor : the same of what divides it. tangential : OpenCV's p1, p2. prism :
@@ -223,7 +223,7 @@ def refuse(lens: Lens | None, plane: ViewPlane, what: str, place: str) -> None:
 
 
 def displacement(lens: Lens, plane: ViewPlane) -> float:
-    """How far the lens moves the corner that it moves most, in pixels."""
+    """The displacement of the corner that the lens moves most, in pixels."""
     (d_x, d_y), (c_x, c_y) = plane.distance, plane.principal_point
     corners = np.array([[column - c_x, c_y - row] for column in (0, plane.width) for row in (0, plane.height)])
     with np.errstate(all="ignore"):

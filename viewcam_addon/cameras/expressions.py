@@ -184,7 +184,7 @@ class Expressions:
         return (Unknown(first.start) if value is None else value), last.end
 
     def _past_calls(self, at: int, depth: int) -> int:
-        """Where .normalize().x[0] and its like end, behind what is called or indexed."""
+        """The end of .normalize().x[0] and its like, behind what is called or indexed."""
         while True:
             following = self._token(at)
             if following.text == "." and (part := self._token(following.end)).kind == "name":
@@ -195,7 +195,7 @@ class Expressions:
                 return at
 
     def _skipped(self, at: int, closing: str) -> int:
-        """Where what is not understood ends: at the comma after it, or the bracket around it."""
+        """The end of what is not understood: at the comma after it, or the bracket around it."""
         depth = 0
         for sign, place in tokens.outside_strings(self.text, at):
             self._steps += 1

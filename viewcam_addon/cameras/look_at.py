@@ -295,7 +295,7 @@ class _Code:
         return names
 
     def _view_moved(self) -> int | None:
-        """Where the first of _VIEW_MOVED stands that moves a view."""
+        """The place of the first of _VIEW_MOVED that moves a view."""
         words = self._words
         for at, word in enumerate(words):
             if _VIEW_MOVED.fullmatch(word) and words[at + 1] == "(" and _is_name(words[at + 2]):

@@ -348,7 +348,7 @@ _ITEM = re.compile(r"\s*['\"](\w+)['\"]\s*:\s*")
 
 
 def _enclosing(text: str, at: int) -> int:
-    """Where the innermost { before a place opens."""
+    """The place where the innermost { before another opens."""
     depth = 0
     for place in range(at - 1, max(-1, at - 20_000), -1):
         if text[place] == "}":
@@ -388,7 +388,7 @@ def _dictionary(text: str, opened: int, kind: str, name: str) -> _Sensor:
 
 
 def _end_of_value(text: str, at: int, end: int) -> int:
-    """Where the comma after a value stands, or its dictionary ends."""
+    """The place of the comma after a value, or the end of its dictionary."""
     depth = 0
     for sign, place in tokens.outside_strings(text, at, end):
         if sign in "([{":
@@ -401,7 +401,7 @@ def _end_of_value(text: str, at: int, end: int) -> int:
 
 
 def _start_of(text: str, at: int) -> int:
-    """Where the product of transforms begins in which a look_at stands: names, dots, @ and calls before it."""
+    """The beginning of the product of transforms in which a look_at stands: names, dots, @ and calls before it."""
     depth, start = 0, at
     for place in range(at - 1, max(-1, at - 400), -1):
         sign = text[place]

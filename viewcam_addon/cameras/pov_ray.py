@@ -87,7 +87,7 @@ def _size(text: str) -> tuple[int, int] | None:
 
 
 def _in_use(text: str) -> tuple[int, int] | None:
-    """Where the block of the camera in use opens, and how many others there are; None if there is no camera."""
+    """The opening of the block of the camera in use, and how many others there are; None if there is no camera."""
     blocks = [found.end() - 1 for found in _CAMERA.finditer(text)]
     if not blocks:
         return None
@@ -139,7 +139,7 @@ class _Block:
         return self._values[place]
 
     def _declared_at(self, name: str) -> int | None:
-        """Where it was declared before it is used: what it stands for is not what it is declared as later."""
+        """The place where it was declared before it is used: what it stands for is not what it is declared as later."""
         places = self.declared.get(name, [])
         count = bisect.bisect_left(places, self._before)
         if not count:
@@ -312,7 +312,7 @@ def _place(value: object, at: int) -> int:
 
 
 def _conditions(text: str) -> list[tuple[int, int]]:
-    """Where #if … #end and their like begin and end."""
+    """The beginnings and ends of #if … #end and their like."""
     result, opened = [], []
     for found in _CONDITION.finditer(text):
         if found[1] != "end":

@@ -102,7 +102,7 @@ class Source:
 
     @cached_property
     def _encoding(self) -> tuple[str, str]:
-        """How the characters are written, and what is wrong with what an XML file says of that."""
+        """The encoding of the characters, and what is wrong with what an XML file says of that."""
         data, utf_16 = self.data, self._utf_16
         usual = utf_16 or "utf-8-sig"
         head = data[:1024].decode(utf_16, errors="ignore").encode("ascii", errors="ignore") if utf_16 else data[:1024]
@@ -156,7 +156,7 @@ class Source:
 
     @property
     def json_problem(self) -> str:
-        """Why something that looks like JSON is none, or nothing."""
+        """The reason that something that looks like JSON is none, or nothing."""
         return self._json[1]
 
     @cached_property

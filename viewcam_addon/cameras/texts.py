@@ -73,7 +73,7 @@ def numbers(text: str, at: int, count: int, name: str) -> tuple[tuple[float, ...
 
 
 def closing(text: str, opened: int, brackets: str) -> int:
-    """Where the bracket that opens at `opened` closes."""
+    """The place where the bracket that opens at `opened` closes."""
     depth = 0
     for found in re.compile("[" + re.escape(brackets) + "]").finditer(text, opened):
         depth += 1 if found[0] == brackets[0] else -1

@@ -71,7 +71,7 @@ def read(source: Source, options: Options) -> list[Camera]:
 
 
 def _kind(source: Source) -> str | None:
-    """Which of them it is, by its first lines that are none of comments; "chan" if it is Nuke's, which looks alike."""
+    """The kind of trajectory, by its first lines that are none of comments; "chan" if it is Nuke's, which looks alike."""
     if source.is_folder or source.is_binary or source.text[:1] in "{[<%":
         return None
     if re.match(r"#\s*timestamp.*p_(?:RS_)?R_?", source.text[:400]):
@@ -100,7 +100,7 @@ def _is_of_chan(row: list[float]) -> bool:
 
 
 def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | None, Lens | None, tuple[str, ...]]:
-    """Where EuRoC's cam0 stands on the body, and how it sees."""
+    """The pose of EuRoC's cam0 on the body, and how it sees."""
     file = next((found for up in ("..", "../..") if (found := source.file(*up.split("/"), "cam0", "sensor.yaml"))), None)
     if file is None:
         raise InputError(

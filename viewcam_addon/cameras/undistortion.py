@@ -78,7 +78,7 @@ def undistorted(lens: Lens, plane: ViewPlane, blank: float = 0.0) -> ViewPlane:
 
 @lru_cache(maxsize=1)
 def places(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> np.ndarray:
-    """Where in the photograph the centers of the undistorted picture's pixels are seen.
+    """The places in the photograph at which the centers of the undistorted picture's pixels are seen.
 
     plane : of the photograph. cut : of the picture. (rows, columns, 2), from the corner, y down; NaN where the lens shows none.
     """

@@ -38,7 +38,7 @@ class NotModelled:
     seen_otherwise: tuple[str, ...] = ()
 
     def sorted_by(self, in_one_place: Sequence[str], seen_otherwise: Sequence[str]) -> "NotModelled":
-        """The same, with which of its objects are modelled."""
+        """A copy that tells which of its objects are modeled."""
         one_place, otherwise = (tuple(name for name in self.names if name in some) for some in (in_one_place, seen_otherwise))
         return replace(self, in_one_place=one_place, seen_otherwise=otherwise)
 

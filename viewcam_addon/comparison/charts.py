@@ -36,7 +36,7 @@ class Lane(NamedTuple):
 
 
 def histogram(roundings: NDArray[np.float64]) -> str:
-    """How the positions' errors are distributed, in roundings of float32, with the tolerances.
+    """A chart of the positions' errors, in roundings of float32, with the tolerances.
 
     roundings : (n,) error of each pixel over what one rounding causes there.
     """
@@ -61,7 +61,7 @@ def histogram(roundings: NDArray[np.float64]) -> str:
 
 
 def bell(errors: NDArray[np.float64], limit: float) -> str:
-    """How the tiles' differences are distributed, in standard errors, below the curve that chance alone makes.
+    """A chart of the tiles' differences, in standard errors, below the curve that chance alone makes.
 
     errors : (n,). limit : standard errors, what is allowed.
     """

@@ -225,7 +225,7 @@ def _check_reference(source: str, expected: Seen, found: NDArray, agreement: Sur
 
 
 def _displacement(pinhole: Pinhole, seen: Seen) -> tuple[Array, Array, Array]:
-    """How far the positions, projected, lie from the centres of their pixels, to the right and upwards; and their depths."""
+    """The offsets of the positions, projected, from the centers of their pixels, to the right and upwards; and their depths."""
     row, column = np.divmod(np.arange(pinhole.width * pinhole.height), pinhole.width)
     # A position that is no number, like one behind the eye, has no picture: it counts as far off as the picture is large.
     numbers = np.isfinite(seen["Position"]).all(axis=-1, keepdims=True)

@@ -47,7 +47,7 @@ _KNIGHTS_MOVES = tuple((i, j) for i in (-2, -1, 1, 2) for j in (-2, -1, 1, 2) if
 
 @dataclass(frozen=True)
 class Place:
-    """Where a difference is.
+    """The place of a difference.
 
     columns, rows : first and last, rows from the bottom. channel : its name, empty where there is one only.
     reference, test : means there, in that channel. errors : the difference in standard errors, signed.

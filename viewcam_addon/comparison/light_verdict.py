@@ -195,7 +195,7 @@ def samples_text(comparison: RadianceComparison) -> str:
 
 
 def place_text(place: Place, size: int) -> str:
-    """Where: in columns 32 to 63, rows 0 to 31."""
+    """The place in words: in columns 32 to 63, rows 0 to 31."""
     if size == WHOLE:
         return "over the whole picture"
     if size == CONTOURS:

@@ -85,7 +85,7 @@ def poisson_allowance(mean: float, level: float) -> int:
 
 
 def tile_starts(length: int, size: int) -> NDArray[np.intp]:
-    """Where the tiles of one axis start: as even as can be, none smaller than `size` unless the axis is; 0 is one tile."""
+    """The starts of the tiles of one axis: as even as can be, none smaller than `size` unless the axis is; 0 is one tile."""
     count = max(length // size, 1) if size else 1
     return np.arange(count) * length // count
 

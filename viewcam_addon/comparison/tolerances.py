@@ -168,7 +168,7 @@ def radiance_error(value: Array, brightest: Array | float, samples: int) -> Arra
 
 
 def slopes(values: NDArray, belongs: NDArray) -> Array:
-    """How much a pass changes from pixel to pixel: the largest distance to the four neighbours that show the same object.
+    """The change of a pass from pixel to pixel: the largest distance to the four neighbors that show the same object.
 
     values : (height, width, channels). belongs : (height, width), the object of each pixel, negative for none.
 

@@ -71,7 +71,7 @@ class GeometryComparison:
 
     @property
     def allowed_unexplained(self) -> int:
-        """How many mismatches may stay unexplained in a picture of this size."""
+        """The number of mismatches that may stay unexplained in a picture of this size."""
         return allowed_unexplained(self.pinhole)
 
     @property
@@ -166,12 +166,12 @@ class GeometryComparison:
 
 
 def allowed_unexplained(pinhole: Pinhole) -> int:
-    """How many mismatches may stay unexplained in a picture of this size."""
+    """The number of mismatches that may stay unexplained in a picture of this size."""
     return pinhole.width * pinhole.height // PIXELS_PER_UNEXPLAINED
 
 
 def in_one_place_text(in_one_place: InOnePlace) -> str:
-    """Who: pixels show another of several surfaces in one place: 'Floor' and 'Carpet', and 2 more pairs."""
+    """The sentence: pixels show another of several surfaces in one place: 'Floor' and 'Carpet', and 2 more pairs."""
     return f"pixels show another of several surfaces in one place: {pairs_text(in_one_place.pairs())}"
 
 

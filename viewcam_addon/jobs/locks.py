@@ -1,4 +1,4 @@
-"""Who renders which shot, where several batches work in one folder.
+"""Locks that tell who renders which shot, where several batches work in one folder.
 
 The locks are the kernel's, on bytes of one file that stays. Byte 0 is shared by all live batches, so that whoever gets it for
 himself is alone; byte 1 belongs to the one that sums up; and each shot has a byte of its own, by the hash of its name. A

@@ -1,4 +1,4 @@
-"""How jobs are carried out: into which folder, by which processes, and what becomes of what is there already.
+"""The plan of a batch: into which folder, by which processes, and what becomes of what is there already.
 
 What another process is to do stands in a file (`write`, `read`): its jobs, and a plan or the files of one check.
 """
@@ -16,7 +16,7 @@ from .job import Job
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """How the jobs of one file are carried out.
+    """The plan by which the jobs of one file are carried out.
 
     Parameters
     ----------
@@ -86,5 +86,5 @@ def read(path: Path) -> tuple[list[Job], Plan | None, dict[str, str]]:
 
 
 def result_of(path: Path) -> Path:
-    """Where the result of a check stands that was to be done by this file."""
+    """The path of the result of a check that was to be done by this file."""
     return path.with_name("result.json")

@@ -1,4 +1,4 @@
-"""Which shots of a batch one of several machines renders, without any word between them."""
+"""The shots of a batch that one of several machines renders, without any word between them."""
 
 import re
 from collections.abc import Sequence

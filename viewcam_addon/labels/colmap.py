@@ -144,7 +144,7 @@ def _sampled(
 def _shown(
     sampled: _Sampled, number: int, camera: Pinhole, depth: Array, state: NDArray[np.int64]
 ) -> tuple[NDArray[np.intp], Array]:
-    """Which points a picture shows, and where: (n, 2), x to the right and y **down** from the picture's corner."""
+    """The points that a picture shows, and their places: (n, 2), x to the right and y **down** from the picture's corner."""
     column, row, z = camera.project(sampled.positions)
     x, y = column - 0.5, camera.height - row - 0.5  # 0 at the first pixel's centre
     with np.errstate(invalid="ignore"):

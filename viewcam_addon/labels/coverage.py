@@ -1,4 +1,4 @@
-"""How much of each pixel each instance covers, as Cryptomatte has it: pairs of an id and a share, the largest share first.
+"""The share of each pixel that each instance covers, as in Cryptomatte: pairs of an id and a share, the largest share first.
 
 A share is that of the pixel's square, each part of it as much as any other (a box filter one pixel wide), and of what is
 visible. It is counted: at SAMPLES places that a lattice spreads over the square, the same in each pixel, so that an upright or

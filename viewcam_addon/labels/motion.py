@@ -1,4 +1,4 @@
-"""Where what the pixels show is in another frame: optical flow, scene flow, and what is hidden there.
+"""The motion of what the pixels show to another frame: optical flow, scene flow, and what is hidden there.
 
 The point is the same of the same primitive: of a triangle by its barycentric coordinates, of a sphere by its direction from the
 centre. So rigid bodies, deforming meshes and moving cameras are one formula, and no flow is interpolated or searched for.

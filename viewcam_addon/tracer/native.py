@@ -246,7 +246,7 @@ def array(values: object, dtype: type, shape: Sequence[int | None]) -> NDArray:
 
 
 class _Links:
-    """Which objects lights light, and which cast their shadows, as bits: one for each set of objects that some light has."""
+    """The objects that lights light, and that cast their shadows, as bits: one for each set of objects that some light has."""
 
     def __init__(self, lights: Sequence[Lamp | Object] = ()) -> None:
         self._receivers = list(dict.fromkeys(light.receivers for light in lights if light.receivers is not None))
@@ -662,7 +662,7 @@ def sobol(seed: int, samples: int, pixels: NDArray, numbers: NDArray, first: int
 
 
 def _filter_width(scene: Scene) -> float:
-    """How many pixels away the slopes of displacements are taken, as Cycles takes them, which has had a choice since 4.5."""
+    """The distance in pixels at which slopes of displacements are taken, as by Cycles, which has had a choice since 4.5."""
     return 0.1 if scene.cycles >= (4, 5) else 1.0
 
 

@@ -132,7 +132,7 @@ def test_an_fspy_project_brings_its_picture(scene, tmp_path):
 
 @pytest.fixture
 def trajectory(tmp_path):
-    """Of TUM: three poses that turn about z, at 10, 10.5 and 12 seconds."""
+    """A trajectory of TUM: three poses that turn about z, at 10, 10.5 and 12 seconds."""
     lines = []
     for time, angle in ((10, 0), (10.5, 1), (12, 2)):
         lines.append(f"{time} {angle} 2 3 0 0 {math.sin(angle / 2)!r} {math.cos(angle / 2)!r}\n")

@@ -125,7 +125,7 @@ def state(scene):
 
 
 def changed(before, after):
-    """What is not as it was."""
+    """The values that are not as they were."""
     return {name: (before.get(name), value) for name, value in after.items() if value != before.get(name)}
 
 

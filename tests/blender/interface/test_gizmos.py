@@ -1,4 +1,4 @@
-"""What dragging a handle does to values and camera. With mouse and keys: tests/real_blender/handles_in_a_window.py."""
+"""Dragging a handle changes values and camera. With mouse and keys: tests/real_blender/handles_in_a_window.py."""
 
 import math
 

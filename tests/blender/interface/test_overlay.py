@@ -1,4 +1,4 @@
-"""Whose diagram a viewport draws, and how often its lines are made.
+"""The diagram in a viewport: whose camera it is of, and how often its lines are made.
 
 What it looks like, and that the mouse can drag it, is looked at in tests/real_blender/handles_in_a_window.py.
 """
@@ -29,7 +29,7 @@ def shown(posed_camera, scene, monkeypatch):
 
 
 def _contrast(one, other):
-    """Of two colors as a screen gets them, as the Web's guidelines have it: from 1 to 21."""
+    """The contrast of two colors as a screen gets them, as the Web's guidelines have it: from 1 to 21."""
     dark, light = sorted(
         float(np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) @ (0.2126, 0.7152, 0.0722)) for c in (one, other)
     )

@@ -190,12 +190,12 @@ class Layout:
         return self._draw("operator", name, look)
 
     def is_all(self, name):
-        """Whether this layout and all around it are active, or enabled."""
+        """True if this layout and all around it are active, or enabled."""
         return getattr(self, name) and (self.above is None or self.above.is_all(name))
 
 
 def drawn(each, width=300):
-    """What a panel draws for the camera that is shown."""
+    """The layout that a panel draws for the camera that is shown."""
     layout = Layout()
     context = SimpleNamespace(
         scene=bpy.context.scene,

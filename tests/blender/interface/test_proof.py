@@ -74,7 +74,7 @@ def outcome(tmp_path, fresh_blender):
 
 
 def columns(image):
-    """Which of r, g, b each column of the image is, all the way up."""
+    """The letter r, g or b of each column of the image, all the way up."""
     pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
     image.pixels.foreach_get(pixels)
     pixels = pixels.reshape(image.size[1], image.size[0], 4)
@@ -143,7 +143,7 @@ def test_no_editor_loses_the_render_result_the_viewer_or_the_artist_s_own_image(
 
 
 def escape(monkeypatch, playing):
-    """What the modal operator does with Escape while a comparison is on its way: (its answer, whether it was ended)."""
+    """The modal operator's response to Escape while a comparison is on its way: (its answer, whether it was ended)."""
     ended, said = [], []
     monkeypatch.setattr(proof.background, "running", SimpleNamespace(cancel=lambda: ended.append(True)))
     screen = SimpleNamespace(is_animation_playing=playing, areas=[])

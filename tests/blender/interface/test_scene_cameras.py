@@ -1,4 +1,4 @@
-"""Which camera the panel is about, the way to the others, a new one."""
+"""The panel's camera, the way to the others, a new one."""
 
 from types import SimpleNamespace
 

@@ -55,7 +55,7 @@ def blend(tmp_path_factory, registered_addon):
 
 
 class Ear:
-    """What was told."""
+    """A listener that keeps each event that it is told."""
 
     def __init__(self):
         self.told = []
@@ -123,7 +123,7 @@ class Batch:
         return {process: children_of(process) for process in self.machines._client.run(os.getpid).values()}
 
     def has_done(self, count):
-        """Whether so many shots are done, within the time; False at once if the batch has ended before."""
+        """True if so many shots are done within the time; False at once if the batch has ended before."""
         done = self.ear.shots
         until(lambda: len(done("shot_done")) >= count or not self._thread.is_alive())
         return len(done("shot_done")) >= count

@@ -80,7 +80,7 @@ def shoot(path, shots, outputs):
 
 
 def told(path, name):
-    """What its labels.json tells of a shot: its picture, and its instances by name."""
+    """The labels of a shot: their picture, and the instances of its labels.json by name."""
     document = json.loads((path / f"{name}.labels.json").read_text())
     return image.read(path / f"{name}.labels.exr"), {each["name"]: each for each in document["instances"]}
 

@@ -1,4 +1,4 @@
-"""What a batch is made from: the hash follows the content of every file that the .blend reads, and nothing else."""
+"""The files that a batch is made from: the hash follows the content of each that the .blend reads, and nothing else."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""What Blender keeps from shot to shot makes no picture another: unlike shots of one batch against each by itself."""
+"""Blender's data that is kept from shot to shot changes no picture: unlike shots of one batch against each by itself."""
 
 import math
 from dataclasses import replace
@@ -82,7 +82,7 @@ def pictures(stage, tmp_path):
 
 
 def differing(pictures, shots):
-    """Which of the shots are others in a batch than alone."""
+    """The shots that are others in a batch than alone."""
     together, alone = pictures(shots), pictures(shots, alone=True)
     assert len(set(alone)) == len(set(shots)), "two of the shots are one picture, and would hide a leak"
     return [shot for shot, one, other in zip(shots, together, alone, strict=True) if one != other]

@@ -1,4 +1,4 @@
-"""Which way Cycles' mirrors and refraction send rays, pixel by pixel: a world that shows its own directions tells.
+"""Directions of Cycles' mirrored and refracted rays, pixel by pixel: a world that shows its own directions tells.
 
 The surface is a jagged sheet with smooth normals, seen flatly, so that most of these send a mirror's ray below the sheet.
 """
@@ -87,7 +87,7 @@ def rays(sheet, shown_directions, scene, make_material, read_passes, tmp_path):
 
 
 def check(found, expected):
-    """The same ways, but for a hundredth of them. Cycles' vectors are float32: off by 1e-7, and ten times that where bent."""
+    """Assert the same directions, but for a hundredth. Cycles' are float32: off by 1e-7, and ten times that where bent."""
     shown = found.any(axis=0)
     error = np.sqrt(dot(found - expected, found - expected))[shown]
     assert shown.mean() > 0.1, "nearly all of the sheet is black"

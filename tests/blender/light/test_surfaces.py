@@ -1,4 +1,4 @@
-"""What surfaces are made of, under one sun and one sample: colours, textures and stand-ins, all without noise."""
+"""Surfaces under one sun and one sample: colors, textures and stand-ins, all without noise."""
 
 import sys
 
@@ -38,7 +38,7 @@ def floor(stage):
 
 
 def check(sides, tolerance):
-    """The same light on both sides, but for a hundredth of the pixels, that lie on edges of textures."""
+    """Assert the same light on both sides, but for a hundredth of the pixels, that lie on edges of textures."""
     for each in sides:
         ours, theirs = each.traced["Combined"], each.cycles[0]["Combined"]
         error = np.abs(ours - theirs)[..., :3].max(axis=-1) / theirs[..., :3].max()
@@ -85,7 +85,7 @@ def test_a_principled_surface_without_gloss(pictures, make_material):
 
 
 def is_gloss(colours):
-    """Whether what scatters diffusely is another share at each angle; the plain material scatters the same everywhere."""
+    """True if what scatters diffusely is another share at each angle; the plain material scatters the same everywhere."""
     return len(np.unique(colours[..., 0])) > 100
 
 

@@ -173,7 +173,7 @@ def graphs(image, straight):
 
 
 def curves(color):
-    """Of colours, vectors and numbers; beyond their ends either way."""
+    """Curves of colors, vectors and numbers; beyond their ends either way."""
     bent = (((0.1, 0.9), (0.4, 0.2), (0.8, 1.3)), ((0.0, 0.0), (1.0, 0.6)), ((-0.2, 0.1), (0.5, 0.5), (0.9, -0.3)))
     common = ((0.0, 0.1), (0.7, 0.4), (1.0, 1.0))
     found = {}
@@ -185,7 +185,7 @@ def curves(color):
 
 
 def conversions(a, b):
-    """Of ways to write colours, of ranges, of vectors."""
+    """Conversions between ways to write colors, of ranges, of vectors."""
     found = {}
     for mode in ("HSV", "HSL"):
         parts = N("SeparateColor", {"Color": a}, mode=mode)

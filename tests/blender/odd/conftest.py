@@ -1,4 +1,4 @@
-"""What holds docs/odd-blender.md to its word: its rows, each with the stages through which a test takes its scene."""
+"""The rows of docs/odd-blender.md, each with the stages through which a test takes its scene."""
 
 import dataclasses
 import inspect
@@ -36,7 +36,7 @@ class _Panel:
 
 
 class _Over:
-    """What Blender has, with something that only a window adds to it."""
+    """Blender's own modules, with something that only a window adds to them."""
 
     def __init__(self, blenders, **more):
         self._blenders = blenders

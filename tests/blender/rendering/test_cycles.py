@@ -160,7 +160,7 @@ def test_every_override_for_light_is_restored(crowded, tmp_path, request_):
 
 @pytest.fixture
 def settings_of_renders(monkeypatch):
-    """What of Cycles' settings each render is made with, in place of rendering."""
+    """The settings of Cycles that each render is made with, in place of rendering."""
     seen = []
 
     def look(scene, to_file):

@@ -77,7 +77,7 @@ def written(name, found, layer="ViewLayer"):
 
 
 def traced(level="path", samples=SAMPLES, seed=SEED):
-    """The same picture the other way: exported, and traced outside of any engine."""
+    """The engine's picture by another way: exported, and traced outside of any engine."""
     return render(jobs.export(Job(level=level)), level, samples, seed, threads=1)
 
 
@@ -102,7 +102,7 @@ def test_every_pass_is_what_the_tracer_computes_bit_for_bit(lit, write, level):
 
 @pytest.fixture
 def prepared(monkeypatch):
-    """Of each tracer that is made, whether it has the hierarchies of one before it."""
+    """One word for each tracer that is made: "same" if it has the hierarchies of one before it, else "new"."""
     made = []
     real = renders.Tracer.__init__
 

@@ -63,7 +63,7 @@ for part in OpenEXR.File(sys.argv[1], separate_channels=True).parts:
 
 
 def outside(program, *arguments):
-    """What a program prints that uses OpenEXR, in a process without Blender."""
+    """The text that a program prints that uses OpenEXR, in a process without Blender."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     return subprocess.run(
         [sys.executable, "-c", program, *map(str, arguments)], env=environment, check=True, text=True, capture_output=True

@@ -28,7 +28,7 @@ def ball(fresh_blender, scene):
 
 
 def settings(scene):
-    """What a raster render overrides, as it stands."""
+    """The settings that a raster render overrides, as they stand."""
     shading, layer = scene.display.shading, scene.view_layers[0]
     return [
         scene.render.engine,

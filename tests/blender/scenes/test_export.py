@@ -1,4 +1,4 @@
-"""What Cycles sees is what the tracer gets: scenes of all kinds, each rendered by both and compared pass by pass."""
+"""The tracer gets what Cycles sees: scenes of all kinds, each rendered by both and compared pass by pass."""
 
 import numpy as np
 import pytest

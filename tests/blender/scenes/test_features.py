@@ -1,4 +1,4 @@
-"""What the tracer does not model is told, and taken out of Cycles' picture, so that the rest is the same on both sides."""
+"""Features that the tracer lacks are told, and taken out of Cycles' picture, so that the rest is the same on both sides."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -44,14 +44,14 @@ def show(material, node):
 
 
 def exactly(material):
-    """What a material is that needs no stand-in."""
+    """The tracer's reading of a material that needs no stand-in."""
     reading = shaders.read(material)
     assert not reading.reasons, reading.reasons
     return reading.material
 
 
 def approximately(material, *words):
-    """What stands in for a material, whose first reason holds these words."""
+    """The stand-in of a material, whose first reason holds these words."""
     reading = shaders.read(material)
     assert reading.reasons and all(word in reading.reasons[0] for word in words), reading.reasons
     return reading.material

@@ -78,7 +78,7 @@ def shifted_direction(tree, coordinate="Generated"):
 
 
 def directions(width):
-    """Of the pixels of an equirectangular image, (width / 2, width, 3)."""
+    """The directions of the pixels of an equirectangular image, (width / 2, width, 3)."""
     azimuth = (0.5 - (np.arange(width) + 0.5) / width) * 2 * np.pi
     height = ((np.arange(width // 2) + 0.5) / (width // 2) - 0.5)[:, None] * np.pi
     return np.stack([np.cos(height) * np.cos(azimuth), np.cos(height) * np.sin(azimuth), np.sin(height) + 0 * azimuth], axis=-1)

@@ -1,4 +1,4 @@
-"""Which light a point is lit by: whatever the choice, the mean is the sum of all lights. Pictures of a floor, from above."""
+"""The choice of the light that a point is lit by: whatever it is, the mean is the sum of all lights. A floor, from above."""
 
 import time
 from dataclasses import replace

@@ -58,19 +58,19 @@ def red(scene, samples=4, level="path"):
 
 
 def seen(scene, samples=4):
-    """What the left half and the right half show."""
+    """The light that the left half and the right half show."""
     picture = red(scene, samples)
     return picture[:, :15].mean(), picture[:, 17:].mean()
 
 
 def same(one, other, samples=16, level="path"):
-    """Whether two scenes' pictures are the same but for float32's rounding."""
+    """True if two scenes' pictures are the same but for float32's rounding."""
     return np.allclose(red(one, samples, level), red(other, samples, level), rtol=ROUNDING, atol=0)
 
 
 @pytest.fixture(params=["mesh", "spheres"])
 def light(request, square, make_spheres):
-    """What covers all that a mirror below shows."""
+    """A light that covers all that a mirror below shows."""
     return square(-20, 20, -20, 20, 8) if request.param == "mesh" else make_spheres([[0, 0, 60]], 45)
 
 

@@ -35,7 +35,7 @@ def halves(make_mesh, make_lit):
 
 
 def seen(scene, samples=1):
-    """What the left half and the right half show, red."""
+    """The red light that the left half and the right half show."""
     passes = render(scene, "direct", samples, threads=1)
     red = passes["Combined"][..., 0].astype(np.float64)
     return red[:, :15].mean(), red[:, 17:].mean()

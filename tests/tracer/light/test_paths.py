@@ -44,7 +44,7 @@ def box(make_mesh, half=1.0):
 
 
 def deviation(passes, expected):
-    """How many standard errors the mean of the picture, of all channels, is off, and the standard error relative to it."""
+    """The error of the picture's mean over all channels, in standard errors, and the standard error relative to it."""
     picture, variance = (passes[name][..., :3].astype(np.float64) for name in ("Combined", "Variance"))
     mean, error = picture.mean(), np.sqrt(variance.sum()) / picture.size
     return (mean - np.mean(expected)) / max(error, ROUNDED * np.mean(expected)), error / np.mean(expected)

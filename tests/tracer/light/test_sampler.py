@@ -21,7 +21,7 @@ def sets(sampler, pixels, samples, first, count):
 
 
 def stratified(first, second, bits):
-    """Whether each elementary interval of a pair of (pixels, 2^bits) numbers holds one."""
+    """True if each elementary interval of a pair of (pixels, 2^bits) numbers holds one."""
     for halvings in range(bits + 1):
         cells = np.floor(first * 2**halvings) * 2 ** (bits - halvings) + np.floor(second * 2 ** (bits - halvings))
         if not (np.sort(cells, axis=-1) == np.arange(2**bits)).all():
@@ -30,7 +30,7 @@ def stratified(first, second, bits):
 
 
 def correlation(first, second):
-    """How many standard errors the correlation of uniform numbers is from 0."""
+    """The correlation of uniform numbers, in standard errors from 0."""
     return np.mean((first - 0.5) * (second - 0.5)) * 12 * np.sqrt(first.size)
 
 

@@ -275,7 +275,7 @@ def mass(x):
 
 
 def places(u, width=1.0):
-    """Where Blackman-Harris puts numbers, in widths from the centre."""
+    """The places of numbers under Blackman-Harris, in widths from the center."""
     return (offsets(Film("BLACKMAN_HARRIS", width), np.stack([u, u]))[0] - 0.5) / width
 
 
@@ -285,7 +285,7 @@ def gaussian_mass(x):
 
 
 def gaussian_places(u, width=1.0):
-    """Where GAUSSIAN puts numbers, in parts of its reach from the centre."""
+    """The places of numbers under GAUSSIAN, in parts of its reach from the center."""
     return (offsets(Film("GAUSSIAN", width), np.stack([u, u]))[0] - 0.5) / (1.5 * width)
 
 

@@ -1,4 +1,4 @@
-"""What light goes straight through, on paper: colours multiply, alphas cover, and a white furnace stays white."""
+"""Light that goes straight through, on paper: colors multiply, alphas cover, and a white furnace stays white."""
 
 import numpy as np
 import pytest
@@ -122,7 +122,7 @@ def seen(make_lit, make_mesh):
 
 
 def differing(found, expected):
-    """How many of the pixels differ by a thousandth of the brightest one: a shift by a gap goes across an edge in few."""
+    """The share of the pixels that differ by a thousandth of the brightest one: a shift by a gap goes across an edge in few."""
     return (np.abs(found - expected).max(axis=1) > 1e-3 * expected.max()).mean()
 
 

@@ -1,4 +1,4 @@
-"""What a scene refuses, each in a sentence that names the object."""
+"""Scenes that are refused, each in a sentence that names the object."""
 
 import functools
 from dataclasses import replace

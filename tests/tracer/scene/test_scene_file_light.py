@@ -1,4 +1,4 @@
-"""What gives light, in a scene file: nothing is lost on the way, a hand can write it, and what is wrong is named."""
+"""Lights in a scene file: nothing is lost on the way, a hand can write it, and what is wrong is named."""
 
 import functools
 import json
@@ -29,7 +29,7 @@ def example():
 
 
 def differences(first, second, where="scene"):
-    """Where two values are not the same to the last bit."""
+    """The places where two values are not the same to the last bit."""
     if type(first) is not type(second):
         yield f"{where}: {first!r} became {second!r}"
     elif isinstance(first, np.ndarray):

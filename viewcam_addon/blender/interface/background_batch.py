@@ -80,7 +80,7 @@ class BackgroundBatch:
 
     @property
     def done(self) -> int:
-        """How many shots."""
+        """The number of shots that are done."""
         return min(len(list(self.folder.glob(self._files))), self.count)
 
     def wait(self) -> None:

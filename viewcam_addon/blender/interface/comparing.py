@@ -147,7 +147,7 @@ class RunningComparison:
         return start(copy, scene, [job], self.folder / _SAID, files=files)
 
     def progress(self) -> tuple[float, str]:
-        """How far it is, from 0 to 1 in steps of unequal length, and what it is doing."""
+        """The progress, from 0 to 1 in steps of unequal length, and the name of the step."""
         done, words = _step({"name": "rendering", "number": 1}, self._pictures)
         traced = 0.0
         for event in child_process.events_in(self._said().splitlines()):
@@ -206,7 +206,7 @@ class RunningComparison:
 
 
 def _step(event: Mapping[str, Any], pictures: int) -> tuple[int, str]:
-    """How many steps are done before one of them, and what it is called. pictures : of Cycles."""
+    """The number of steps before one of them, and what it is called. pictures : of Cycles."""
     if event["name"] == "rendering":
         number = event["number"]
         if number > pictures:

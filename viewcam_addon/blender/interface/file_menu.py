@@ -95,7 +95,7 @@ def text(name: str) -> str:
 
 
 def summary(ledger: Sequence[LedgerEntry]) -> str:
-    """How many objects came along: one line for the status bar."""
+    """The number of objects that came along: one line for the status bar."""
     counts = {status: sum(entry.status == status for entry in ledger) for status in ("exported", "approximated", "skipped")}
     total = len(ledger)
     parts = [f"{counts['exported']} of {total} object{'' if total == 1 else 's'} exported whole"]

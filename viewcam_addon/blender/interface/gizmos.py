@@ -65,7 +65,7 @@ def camera_in(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def place(camera_object: bpy.types.Object, name: str) -> Triple | None:
-    """Where a handle stands, in world space, or None: an object has the point, or the values make no camera."""
+    """The place of a handle, in world space, or None: an object has the point, or the values make no camera."""
     group = camera_object.virtual_pinhole
     if getattr(group, f"{name}_target", None):
         return None
@@ -142,7 +142,7 @@ def _handle_property(name: str, description: str) -> bpy.props.FloatVectorProper
 
 
 class Handles(bpy.types.PropertyGroup):
-    """Where the handles stand in the viewport that is drawn or used, world space. Setting one drags it."""
+    """The handles' places in the viewport that is drawn or used, world space. Setting one drags it."""
 
     eye: _handle_property("eye", "Drag the eye. Ctrl snaps to what is under the mouse, Shift is precise, Escape takes it back")
     look_at: _handle_property(

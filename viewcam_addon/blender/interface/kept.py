@@ -36,7 +36,7 @@ def restore(camera_object: bpy.types.Object, before: dict[str, object]) -> None:
 
 
 def key_changes(camera_object: bpy.types.Object, before: dict[str, object], scene: bpy.types.Scene) -> None:
-    """Where auto keying is on, keyframes for what has changed since and has keyframes: as Blender's own fields get them.
+    """Insert keyframes for what has changed and has keyframes, where auto keying is on: as Blender's own fields get them.
 
     That is values, and channels of the camera itself, which would win over the values at the next frame.
     """

@@ -97,7 +97,7 @@ class Writing(BackgroundBatch):
         super().__init__(scene, settings.into(), f"{camera_object.name} {frame:04d} labels", [row], "*.labels.json", outputs)
 
     def poll(self) -> tuple[Path | None, str] | None:
-        """Where they are, and a sentence; None while it runs."""
+        """The folder of the labels, and a sentence; None while it runs."""
         ended = self.ended()
         if ended is None:
             return None

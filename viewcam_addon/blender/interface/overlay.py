@@ -193,7 +193,7 @@ def _clearest(lines: list[Vector]) -> Vector:
 
 
 def mark(context: bpy.types.Context) -> Vector | None:
-    """Where the context's region has the look-at point of the camera that its viewport looks through."""
+    """The place in the context's region of the look-at point of the camera that its viewport looks through."""
     found = looked_through(context)
     if found is None or not found.virtual_pinhole.show_overlay or not context.space_data.overlay.show_overlays:
         return None
@@ -225,7 +225,7 @@ def _draw_mark(context: bpy.types.Context) -> None:
 
 
 def _pixel(point: Iterable[float], context: bpy.types.Context) -> Vector | None:
-    """Where the context's region shows a point in world space, or None where it lies beyond what the viewport shows."""
+    """The place in the context's region of a point in world space, or None where it lies beyond what the viewport shows."""
     clipped = context.region_data.perspective_matrix @ Vector((*point, 1.0))
     if abs(clipped.z) > clipped.w:
         return None

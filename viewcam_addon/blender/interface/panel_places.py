@@ -1,4 +1,4 @@
-"""Where a camera's panels stand, each in two places: among its data's properties and in the 3D viewport's sidebar."""
+"""The places of a camera's panels, two for each: among its data's properties and in the 3D viewport's sidebar."""
 
 from typing import ClassVar
 

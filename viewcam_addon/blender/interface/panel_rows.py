@@ -114,7 +114,7 @@ def value(column: bpy.types.UILayout, owner: bpy.types.bpy_struct, name: str, un
 
 
 def buttons(column: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.UILayout:
-    """Where buttons with words go: beside one another, or one below the other."""
+    """The layout for buttons with words: beside one another, or one below the other."""
     return column.column(align=True) if is_narrow(context) else column.row(align=True)
 
 

@@ -257,7 +257,7 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
         self._leave(context, cancelled=True)
 
     def _in_picture(self, event: bpy.types.Event) -> tuple[Pair, float]:
-        """Where in the picture the mouse is, and how many of its pixels one of the screen shows."""
+        """The mouse's place in the picture, and how many of its pixels one of the screen shows."""
         left, bottom, right, top = self.frame
         like = self.drawing.like
         x, y = event.mouse_region_x + 0.5, event.mouse_region_y + 0.5

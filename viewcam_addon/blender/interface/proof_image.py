@@ -72,7 +72,7 @@ def labels(view: str, sides: Collection[str]) -> list[str]:
 
 
 def begins(number: int, count: int, width: int) -> float:
-    """Where one of several pictures side by side begins, from 0 to 1. width : of all together, pixels."""
+    """The beginning of one of several pictures side by side, from 0 to 1. width : of all together, pixels."""
     return number * (width + _GAP) / (count * width)
 
 

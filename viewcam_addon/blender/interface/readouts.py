@@ -99,7 +99,7 @@ def _figure(value: float) -> str:
 
 
 def _corner(camera: Pinhole) -> float:
-    """How far the farthest corner of the picture is from the principal point, in pixels."""
+    """The distance of the picture's farthest corner from the principal point, in pixels."""
     x, y = camera.principal_point
     return max(math.dist((x, y), corner) for corner in product((0, camera.width), (0, camera.height)))
 

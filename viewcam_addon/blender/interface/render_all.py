@@ -73,7 +73,7 @@ class Rendering(BackgroundBatch):
         super().__init__(scene, into, "all cameras", shots(scene, animation), "*.exr", Outputs(check=check))
 
     def progress(self) -> tuple[float, str]:
-        """How far it is, from 0 to 1, and what it is doing."""
+        """The progress, from 0 to 1, and the picture that is being rendered."""
         return self.done / self.count, f"Rendering picture {min(self.done + 1, self.count)} of {self.count}"
 
     @property

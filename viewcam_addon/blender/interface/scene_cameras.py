@@ -181,7 +181,7 @@ class VIEWCAM_UL_cameras(bpy.types.UIList):
 
 
 def draw_header(layout: bpy.types.UILayout, camera_object: bpy.types.Object, context: bpy.types.Context) -> None:
-    """Which camera it is about, the way to the others, and whether it is the scene's."""
+    """Draw the panel's camera, the way to the others, and whether it is the scene's."""
     layout = layout.column()
     layout.use_property_split = layout.use_property_decorate = False
     is_scenes = camera_object == context.scene.camera
@@ -198,7 +198,7 @@ def draw_header(layout: bpy.types.UILayout, camera_object: bpy.types.Object, con
 
 
 def draw_none(layout: bpy.types.UILayout) -> None:
-    """Where there is no camera."""
+    """Draw the panel of a scene without a camera."""
     layout.label(text="There is no camera", icon="INFO")
     column = layout.column(align=True)
     column.operator("viewcam.add_camera", icon="ADD")

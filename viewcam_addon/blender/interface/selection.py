@@ -1,4 +1,4 @@
-"""Where in the world the selection is: the points of what is selected. Reads Blender, changes nothing.
+"""The selection's points in the world. Reads Blender, changes nothing.
 
 Of objects it is the geometry that the viewport shows, modifiers, instances and all; an object without geometry is its origin.
 In the edit modes of meshes, curves, surfaces, lattices and armatures, and in pose mode, it is the selected vertices, control

@@ -1,4 +1,4 @@
-"""Why a shot can't be rendered, known before anything is: of a batch of a thousand, the last one counts as well."""
+"""The obstacles to rendering a shot, known before anything is: of a batch of a thousand, the last one counts as well."""
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence

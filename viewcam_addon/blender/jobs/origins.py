@@ -181,7 +181,7 @@ def _layers() -> Iterator[str]:
 
 
 def _folders() -> Iterator[str]:
-    """Where simulations were baked to: point caches beside the .blend and elsewhere, fluids, nodes."""
+    """Folders that simulations were baked to: point caches beside the .blend and elsewhere, fluids, nodes."""
     blend = Path(bpy.data.filepath)
     folders = [str(blend.with_name(f"blendcache_{blend.stem}"))] if blend.name else []
     for block in bpy.data.objects:

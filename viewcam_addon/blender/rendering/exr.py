@@ -60,7 +60,7 @@ def _is_multipart(file: BinaryIO) -> bool:
 
 
 def _offsets(file: BinaryIO, headers: list[_Header]) -> tuple[int, ...]:
-    """Where in the file each chunk of pixels is, of all parts."""
+    """The offsets in the file of each chunk of pixels, of all parts."""
     count = sum(map(_chunk_count, headers))
     return struct.unpack(f"<{count}Q", file.read(8 * count))
 

@@ -294,7 +294,7 @@ def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) ->
 
 
 class Placement(NamedTuple):
-    """Where a surface is drawn.
+    """The placement of a surface: where it is drawn.
 
     matrices : (n, 4, 4), to world space, one for each instance. random : (n,), or None where no material asks for it.
     """

@@ -29,7 +29,7 @@ def film_of(scene: bpy.types.Scene) -> Film:
 
 
 def bounces_of(scene: bpy.types.Scene, ledger: Ledger) -> Bounces:
-    """How often light may bounce in a render of the scene."""
+    """The number of times that light may bounce in a render of the scene."""
     cycles = getattr(scene, "cycles", None)
     if cycles is None:
         return Bounces()

@@ -39,7 +39,7 @@ def missing(tree: bpy.types.NodeTree | None) -> list[str]:
 
 
 def obstacle(image: bpy.types.Image | None) -> str | None:
-    """Why this image, which is not missing, can't be a picture, one clause, or None where it can."""
+    """The reason that this image, which is not missing, can't be a picture, one clause, or None where it can."""
     if image.source not in ("FILE", "GENERATED"):
         return f"shows {image.name!r}, which is no single still image"
     if not min(image.size):
@@ -51,7 +51,7 @@ def obstacle(image: bpy.types.Image | None) -> str | None:
 
 
 def alpha_obstacle(image: bpy.types.Image) -> str | None:
-    """Why the alpha of an image without another obstacle can't be a picture's, one clause, or None where it can."""
+    """The reason that the alpha of an image without another obstacle can't be a picture's, one clause, or None where it can."""
     if image.channels != 4 or image.alpha_mode == "NONE" or image.colorspace_settings.is_data or is_multiplied(image):
         return None
     return f"shows the alpha of {image.name!r}, which is kept as {image.alpha_mode.lower().replace('_', ' ')}"

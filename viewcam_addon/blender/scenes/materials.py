@@ -1,4 +1,4 @@
-"""Which materials change where a surface is or what its passes say, and the plain one that stands in for them in Cycles.
+"""The materials that change where a surface is or what its passes say, and the plain one that stands in for them in Cycles.
 
 Level geometry models no material. Most leave the passes of geometry alone; some do not: displacement moves the surface, bump
 and normal maps turn the Normal pass, and where a surface is transparent Cycles writes what lies behind. For the time of a
@@ -36,7 +36,7 @@ _SHADERS = {
 
 
 def departures(material: bpy.types.Material, lit: bool = False) -> list[str]:
-    """Why this material's surface is not what level geometry models, one clause each; empty for most materials.
+    """The reasons that this material's surface is not what level geometry models, one clause each; empty for most materials.
 
     lit : or what the levels of light do, beside what shaders.py says.
     """

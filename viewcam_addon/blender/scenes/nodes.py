@@ -58,7 +58,7 @@ def _counts(link: bpy.types.NodeLink) -> bool:
 
 
 def _through(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...]) -> Input | None:
-    """Where the search goes on behind an output, or None where it ends."""
+    """The socket at which the search goes on behind an output, or None where it ends."""
     if node.type == "REROUTE":
         return Input(node.inputs[0], groups)
     if node.mute:

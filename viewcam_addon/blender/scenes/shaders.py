@@ -530,7 +530,7 @@ class Tree:
         return self._value(nodes.source(of))
 
     def _departure(self, output: Output, ours: str) -> str | None:
-        """Why a node that we know is another here, one clause."""
+        """The reason that a node that we know is another here, one clause."""
         node = output.node
         if hasattr(node, "texture_mapping") and not maps_plainly(node):
             return "has a mapping of its own"
@@ -635,14 +635,14 @@ def _quarter_further(rotation: Colour | Node) -> Colour | Node:
 
 
 def in_space_of(matrix: object) -> Node:
-    """Where a point of a surface is in the space of an object with this matrix."""
+    """The position of a point of a surface in the space of an object with this matrix."""
     inverse, position = np.linalg.inv(np.array(matrix, np.float64)), _node("geometry", output="position")
     rows = (_node("math", operation="add", a=dot(position, row[:3]), b=row[3]) for row in inverse[:3])
     return _node("combine_xyz", **dict(zip("xyz", rows, strict=True)))
 
 
 def dot(vector: Node, by: object) -> Node:
-    """How far a vector goes along another."""
+    """The length of a vector along another."""
     return _node("vector_math", operation="dot_product", a=vector, b=tuple(float(number) for number in by))
 
 

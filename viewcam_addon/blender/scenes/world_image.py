@@ -37,7 +37,7 @@ class Rendered:
 
 
 def obstacle(world: bpy.types.World) -> str | None:
-    """Why no image can stand in for a world, one clause, or None where one can."""
+    """The reason that no image can stand in for a world, one clause, or None where one can."""
     for each in _feeding(world):
         node, output = each.node, each.socket.name
         image = getattr(node, "image", None)

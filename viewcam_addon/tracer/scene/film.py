@@ -1,4 +1,4 @@
-"""How light becomes a picture, as data: what an artist sets among the render settings."""
+"""The film, as data: it makes light a picture, and an artist sets it among the render settings."""
 
 from dataclasses import dataclass
 
@@ -60,7 +60,7 @@ class Film:
 
 @dataclass(frozen=True)
 class Bounces:
-    """How often light is scattered before it must reach a lamp: in all, and by each kind of surface; 0 is light that comes
+    """The most scatterings of light before it must reach a lamp: in all, and by each kind of surface; 0 is light that comes
     straight from a lamp. transparent : how often it may go straight through a surface. Cycles' own counting and defaults."""
 
     total: int = values.value(12, _bounces, "whole", 0)

@@ -124,7 +124,7 @@ def _type_a(across: NDArray, up: NDArray, watts: NDArray) -> tuple[NDArray, NDAr
 
 
 def _type_b(across: NDArray, up: NDArray, watts: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Whose axis lies flat: the angles change their places."""
+    """Angles and candela of type B, whose axis lies flat: the angles change their places."""
     turned, values = _around(up, watts.T)
     risen, values = _around(across, values.T)
     return turned, risen, values.T

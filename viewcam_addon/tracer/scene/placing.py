@@ -1,4 +1,4 @@
-"""Where something in a scene file stands: a matrix, or what a hand writes instead of one."""
+"""The place of something in a scene file: a matrix, or what a hand writes instead of one."""
 
 from collections.abc import Sequence
 

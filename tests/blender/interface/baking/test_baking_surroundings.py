@@ -1,4 +1,4 @@
-"""What stands around a camera that is baked: parents, constraints, targets, NLA, libraries; and what is refused."""
+"""Baking a camera among others: parents, constraints, targets, NLA, libraries; and what is refused."""
 
 import numpy as np
 import pytest

@@ -99,7 +99,7 @@ def crowd(scene, look, add, add_map, mesh_from):
 
 
 def assert_moved(plain, moved):
-    """The same objects with as many instances, and each point of each stands where the plain export has it, less the origin."""
+    """Assert that each object has as many instances, and each point stands where the plain export has it, less the origin."""
     found, wanted = ([(each.name, len(each.matrices)) for each in scene.objects] for scene in (moved, plain))
     assert found == wanted, "not the same objects with the same number of instances"
     for was, now in zip(plain.objects, moved.objects, strict=True):

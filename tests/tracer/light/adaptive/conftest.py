@@ -41,7 +41,7 @@ def sunny(make_lit, floor, make_spheres):
 
 @pytest.fixture(scope="session")
 def soft(sunny):
-    """The same under an area lamp and a sky."""
+    """The sunny scene under an area lamp and a sky."""
     matrix = np.eye(4)
     matrix[:3, 3] = (1, -1, 4)
     lamp = Area("area", matrix=matrix, size=(2, 2), power=(150, 150, 150))

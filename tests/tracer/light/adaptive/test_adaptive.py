@@ -174,7 +174,7 @@ def test_shadows_of_wires_above_the_picture(with_things, make_mesh):
 
 
 def assert_no_light_is_lost(scene, seeds=48):
-    """What few samples meet is noise of a pixel, but neither too dark nor too bright: the sum over many seeds is right."""
+    """Assert that few samples, noisy as they are, are neither too dark nor too bright: the sum over many seeds is right."""
     truth = render(scene, "direct", 1024, 77)
     spread = np.sqrt(truth["Variance"].astype(float).mean(axis=-1).sum())
     sums = [render(scene, "direct", 1024, seed, error=WANTED)["Combined"][..., :3].mean(axis=-1).sum() for seed in range(seeds)]
