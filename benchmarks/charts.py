@@ -33,13 +33,13 @@ from viewcam_addon.errors import InputError
 from viewcam_addon.files import written_whole
 from viewcam_addon.terminal import silent_libraries
 
-# matplotlib's categories, as dark as paper needs them, without the grey of the grid and the blue of the method in use.
+# matplotlib's categories, as dark as paper needs them, without the gray of the grid and the blue of the method in use.
 _COLOURS = ("#d2620a", "#248c24", "#d62728", "#9467bd", "#8c564b", "#c9519f", "#85860f", "#0e8a99")
 _MARKERS = "osv^Dd<>"
 _OURS = "#0b3d91"
 _OURS_STYLES = tuple((_OURS, marker, line) for marker, line in zip("osD^", ("-", "--", "-.", ":"), strict=True))
 _INK, _BACKGROUND, _FAINT, _GRID = "#1f2328", "#ffffff", "#656d76", "#e5e8eb"
-# What these are where pages are dark. A picture on a page knows what its reader prefers, and not the page's own colours: so it
+# What these are where pages are dark. A picture on a page knows what its reader prefers, and not the page's own colors: so it
 # brings its paper along.
 _IN_THE_DARK = {_INK: "#e6edf3", _BACKGROUND: "#0d1117", _FAINT: "#9198a1", _GRID: "#30363d", _OURS: "#58a6ff"}
 _LIGHTER = ("#ff9a3c", "#4cc24c", "#ff7b72", "#bc8cff", "#c69083", "#f19cd2", "#cfd03a", "#39cfe0")
@@ -224,7 +224,7 @@ def draw(chart: Chart, path: Path, command: str, measured_on: str = "") -> None:
 
 
 def _dark_rules() -> str:
-    """CSS that turns the colours, which matplotlib writes into each element, where the reader prefers a dark page."""
+    """CSS that turns the colors, which matplotlib writes into each element, where the reader prefers a dark page."""
     rules = [
         f'[style*="{what}: {light}"] {{{what}: {dark} !important}}'
         for light, dark in _IN_THE_DARK.items()
@@ -307,7 +307,7 @@ def _decades(chart: Chart) -> tuple[float, float]:
 
 
 def _styles(chart: Chart) -> list[tuple[Curve, str, str, str]]:
-    """Each curve with its colour, marker and line; those in use last, so that they lie on top."""
+    """Each curve with its color, marker and line; those in use last, so that they lie on top."""
     ours = itertools.cycle(_OURS_STYLES)
     others = iter(zip(_COLOURS, _MARKERS, strict=True))
     styled = [

@@ -1,6 +1,6 @@
 """The parts that sets are built of: plain-color materials, boxes, turned shapes, text, lights, a world.
 
-Plain colours only, so that the scenes show geometry and light, need no picture files and stay small.
+Plain colors only, so that the scenes show geometry and light, need no picture files and stay small.
 """
 
 import math
@@ -10,7 +10,7 @@ import bpy
 
 
 def colour(code: str) -> tuple[float, float, float, float]:
-    """The scene-linear colour of an sRGB hex code such as "e7a58b"."""
+    """The scene-linear color of an sRGB hex code such as "e7a58b"."""
     levels = [int(code[i : i + 2], 16) / 255 for i in (0, 2, 4)]
     linear = [level / 12.92 if level <= 0.04045 else ((level + 0.055) / 1.055) ** 2.4 for level in levels]
     return (*linear, 1.0)
@@ -232,7 +232,7 @@ def softbox(name: str, watts: float, code: str, location, target, width: float, 
 
 
 def sky(code: str, strength: float = 1.0):
-    """A world of one colour."""
+    """A world of one color."""
     world = bpy.data.worlds.new("Sky")
     world.use_nodes = True
     background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")

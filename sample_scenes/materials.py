@@ -97,7 +97,7 @@ def glass(name: str = "Glass", code: str = "f4fff8", roughness: float = 0.0, ior
 
 
 def concrete(name: str = "Concrete", code: str = "9a948c"):
-    """Grey with spots, and rough to the touch."""
+    """Gray with spots, and rough to the touch."""
 
     def shade(s):
         noise = s.add("TexNoise", {"Vector": s.place(), "Scale": 6.0, "Detail": 4.0, "Roughness": 0.6}, "Fac")

@@ -16,7 +16,7 @@ class Shading:
     def add(self, kind: str, inputs=None, output=None, **properties):
         """Add a shader node; returns the first output that is in use, or that of a name.
 
-        kind : its class, without "ShaderNode". inputs : by identifier or name; sockets, numbers, or colours as hex codes.
+        kind : its class, without "ShaderNode". inputs : by identifier or name; sockets, numbers, or colors as hex codes.
         """
         node = self.tree.nodes.new(f"ShaderNode{kind}")
         for name, value in properties.items():
@@ -39,7 +39,7 @@ class Shading:
         return self.add("Math", dict(zip(("Value", "Value_001", "Value_002"), values, strict=False)), operation=operation)
 
     def mix(self, factor, a, b, blend: str = "MIX"):
-        """A mixture of colours."""
+        """A mixture of colors."""
         return self.add("Mix", {"Factor_Float": factor, "A_Color": a, "B_Color": b}, data_type="RGBA", blend_type=blend)
 
     def mix_shaders(self, factor, first, second):

@@ -13,7 +13,7 @@ from staging import fresh_scene, state_camera
 
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 SPACING = 0.053  # the n-th pearl lies at SPACING · √n from the middle
-BANDS = [  # pearls from the middle outwards: how many, and their colour
+BANDS = [  # pearls from the middle outwards: how many, and their color
     (90, "ffe9c9"),
     (260, "f7c59f"),
     (520, "ea8f79"),

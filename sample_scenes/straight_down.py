@@ -34,7 +34,7 @@ def build():
 
 
 def floor():
-    """Tiles of two colours in a chequer, laid by geometry nodes."""
+    """Tiles of two colors in a checker, laid by geometry nodes."""
     tile = b.box("Tile", (0.298, 0.298, 0.02), b.matte("Unglazed", "c9b79a"), (0, 0, -0.02), bevel=0.004)
     tile.hide_render = tile.hide_viewport = True
     group = _tiles(tile)

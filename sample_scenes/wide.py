@@ -11,7 +11,7 @@ import building as b
 from nodes import Nodes, use_nodes
 from staging import distance_for, fresh_scene, state_camera
 
-BAY, ROW = 3.0, 4.2  # metres from column to column and from arcade to arcade
+BAY, ROW = 3.0, 4.2  # meters from column to column and from arcade to arcade
 BAYS, ROWS = 35, 6
 COLUMN_HEIGHT, WALL_DEPTH = 2.5, 0.5
 

@@ -90,7 +90,7 @@ def no_warnings():
 
 @pytest.fixture(scope="session")
 def models_folder() -> Path:
-    """The folder of real scanned and modelled meshes that VIEWCAM_MODELS names; they are no part of the project."""
+    """The folder of real scanned and modeled meshes that VIEWCAM_MODELS names; they are no part of the project."""
     folder = os.environ.get("VIEWCAM_MODELS")
     if not folder:
         pytest.skip("VIEWCAM_MODELS names no folder of models")

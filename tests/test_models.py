@@ -1,4 +1,4 @@
-"""Scanned and modelled meshes as users import them, checked at level `geometry`. VIEWCAM_MODELS names their folder."""
+"""Scanned and modeled meshes as users import them, checked at level `geometry`. VIEWCAM_MODELS names their folder."""
 
 import json
 

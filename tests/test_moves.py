@@ -25,7 +25,7 @@ margins = st.floats(0, 0.4)
 
 @st.composite
 def pinholes(draw):
-    """Cameras whose view is a metre long or more, of any up that is not within 1e-3 of it, of any principal point nearby."""
+    """Cameras whose view is a meter long or more, of any up that is not within 1e-3 of it, of any principal point nearby."""
     eye, look_at, up = draw(triples), draw(triples), draw(triples)
     assume(math.dist(eye, look_at) > 1 and math.hypot(*up) > 1e-3)
     width, height = draw(st.integers(1, 4000)), draw(st.integers(1, 4000))

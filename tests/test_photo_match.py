@@ -21,7 +21,7 @@ MANY = pytest.param(10000, marks=pytest.mark.exhaustive)
 
 
 class Views:
-    """Random cameras, a few metres away from the origin, not level, of 20 to 80 degrees, and what they see."""
+    """Random cameras, a few meters away from the origin, not level, of 20 to 80 degrees, and what they see."""
 
     def __init__(self, kind, count, seed=0):
         rng = np.random.default_rng(seed)

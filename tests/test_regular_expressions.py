@@ -109,7 +109,7 @@ def alone(parsed, operator, arguments):
 
 
 def sample(parsed):
-    """A short text that a parsed expression matches, but for what it asks of its neighbours."""
+    """A short text that a parsed expression matches, but for what it asks of its neighbors."""
     result = ""
     for operator, arguments in parsed:
         name = str(operator)

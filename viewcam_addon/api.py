@@ -86,7 +86,7 @@ def label(
     next: Scene | File | None = None,
     threads: int | None = None,
 ) -> "Labels":
-    """The ground truth of a scene's picture, exact at the centre of each pixel.
+    """The ground truth of a scene's picture, exact at the center of each pixel.
 
     scene : or the path of a scene file, as the others. labels : some of "depth", "normals", "position", "masks", "amodal",
     "flow" and "coverage"; docs/labels.md says what each brings. previous, next : the frames before and after, for "flow".
@@ -124,7 +124,7 @@ def compare(
     scene : what the reference shows, with which pixels on edges are traced again. Without it none of them is explained.
     test_samples : of each test picture, where that is not what its file tells. renderer : who made it, one of
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
-    enough. everything : Cycles' picture with all that the scene's ledger says is not modelled, of the first test's seed; it
+    enough. everything : Cycles' picture with all that the scene's ledger says is not modeled, of the first test's seed; it
     tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object are
     different, and no error.
 

@@ -1,7 +1,7 @@
 """One command, `viewcam`, over all of the project: in the shell, and inside Blender as `blender -b FILE --command viewcam`.
 
 Exit status: 0 all well; 1 the comparison failed; 2 bad input or usage, with one line on stderr; 3 something could not be
-modelled under --strict. No traceback reaches a user.
+modeled under --strict. No traceback reaches a user.
 
 Here are the names of the commands; their options, and what they do, are in commands/.
 """

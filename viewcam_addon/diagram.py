@@ -2,7 +2,7 @@
 
 All of it is relative to the eye, so that a drawing in float32 keeps its shape far from the origin. Pixels have no length in the
 world: the view plane is drawn at a share of the way to the look-at point, where its rectangle covers what the picture shows.
-Rejected: d units from the eye (a kilometre away, for the usual 1000 pixels), and a length (every scene would need another one).
+Rejected: d units from the eye (a kilometer away, for the usual 1000 pixels), and a length (every scene would need another one).
 """
 
 import math

@@ -1,6 +1,6 @@
 """HTML pages: the templates' engine, and what every page has in common.
 
-A template stands beside the code that fills it and extends html_page.html, which has the colours by day and by night, the type
+A template stands beside the code that fills it and extends html_page.html, which has the colors by day and by night, the type
 and the head. A page is one file that holds all it needs, to be mailed and kept. Whatever is put into a template is text there,
 whoever wrote it: Jinja2 escapes it. Rejected: string.Template, which escapes nothing, so that each name had to be escaped where
 it was put in, and knows no lists, so that tables were strings of Python.

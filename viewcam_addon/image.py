@@ -62,7 +62,7 @@ _GEOMETRY = {
     "Magnitude": _Pass("X"),
     "Facing": _Pass("X"),
 }
-# Variance is the tracer's own: the estimated variance of Combined's colour, which is a mean of samples. Here, too, the order is
+# Variance is the tracer's own: the estimated variance of Combined's color, which is a mean of samples. Here, too, the order is
 # the core's (capi_light.h).
 _LIGHT = {
     "Combined": _Pass("RGBA"),
@@ -372,7 +372,7 @@ def _camera_attributes(camera: Pinhole) -> dict[str, Any]:
     (d_x, d_y), (c_x, c_y) = camera.distance, camera.principal_point
     with np.errstate(all="ignore"):
         to_camera[3, :3] = -np.array(camera.eye) @ to_camera[:3, :3]
-        # x and y of normalised device coordinates run over [−1, 1] across the picture; z is −1 at infinity, as OpenGL has it.
+        # x and y of normalized device coordinates run over [−1, 1] across the picture; z is −1 at infinity, as OpenGL has it.
         to_ndc[0, 0], to_ndc[1, 1] = 2 * d_x / camera.width, 2 * d_y / camera.height
         to_ndc[2] = [1 - 2 * c_x / camera.width, 1 - 2 * c_y / camera.height, -1, -1]
         matrices = {"worldToCamera": to_camera, "worldToNDC": to_camera @ to_ndc}

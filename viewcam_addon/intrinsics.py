@@ -1,6 +1,6 @@
 """Blender's lens, sensor, fit, shift, pixel aspect, percentage and border ↔ the view plane. Pure arithmetic, no Blender.
 
-Blender says in millimetres on a sensor what the text says in pixels on the view plane. With W × H the picture at the resolution
+Blender says in millimeters on a sensor what the text says in pixels on the view plane. With W × H the picture at the resolution
 percentage and n the number of square units along the side that the sensor fits,
 
     d_x = lens / sensor · n / pixel_aspect_x          c_x = W/2 − shift_x · n / pixel_aspect_x      from the left edge
@@ -33,7 +33,7 @@ _FLOAT32_STEP = 2.0**-23
 
 @dataclass(frozen=True)
 class CameraData:
-    """A perspective camera's data as Blender stores it. Lengths in millimetres, shift in units of the fitted side.
+    """A perspective camera's data as Blender stores it. Lengths in millimeters, shift in units of the fitted side.
 
     Raises
     ------

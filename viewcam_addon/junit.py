@@ -89,7 +89,7 @@ def _seconds(shot: Mapping[str, Any]) -> float:
 
 
 def _outcome_of(shot: Mapping[str, Any], strict: bool) -> tuple[str | None, str]:
-    """The outcome of a shot of a summary, and why. strict : whether what is not modelled fails it."""
+    """The outcome of a shot of a summary, and why. strict : whether what is not modeled fails it."""
     if shot["state"] == "failed":
         return "error", shot["error"]
     if shot["state"] == "left":

@@ -1,6 +1,6 @@
 """A camera from a photograph: from edges that run along known axes, or from points whose places are known.
 
-Pixels count from the lower left corner of the picture, with centres at + 0.5. The principal point is given (the picture's
+Pixels count from the lower left corner of the picture, with centers at + 0.5. The principal point is given (the picture's
 middle, unless it is known better) and pixels are square. What is unknown is d, unless the lens is known, the turn of the camera
 and the eye: points tell it, and so does one edge of known length and place.
 
@@ -8,7 +8,7 @@ An edge is where the picture of a straight line begins and ends; which way it wa
 two axes are enough for one camera without a mirror image. All of an axis' edges meet in its vanishing point, and by how far
 they miss it is weighed in pixels of their ends. A start comes from vanishing points (edges), a homography (points in a plane)
 or a direct linear transform (six or more points in space); then Gauss-Newton steps, damped as Levenberg and Marquardt have it,
-minimise the sum of squares in pixels. How certain the result is follows from how well pixels are known: the covariance is
+minimize the sum of squares in pixels. How certain the result is follows from how well pixels are known: the covariance is
 precision² · (JᵀJ)⁻¹.
 
 Everything runs over leading axes (..., n, 2), so that ten thousand cameras are matched at once; `from_edges`, `from_points` and
@@ -426,7 +426,7 @@ def _solved(matrix: Array, vector: Array) -> Array:
 
 
 def _pose_of_a_plane(points: Array, pixels: Array) -> tuple[Array, Array, Array]:
-    """Rotation, R (centre − eye) and d of points in a plane, from their homography. pixels : of half the picture."""
+    """Rotation, R (center − eye) and d of points in a plane, from their homography. pixels : of half the picture."""
     _, _, within = np.linalg.svd(points)
     frame = within[..., :2, :]  # two directions in the plane
     flat = np.einsum("...ij,...nj->...ni", frame, points)

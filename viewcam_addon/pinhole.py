@@ -6,10 +6,10 @@ The viewing coordinates have their origin at the eye e. w points away from the v
 is right-handed. The view plane lies at the distance d before the eye and holds width × height pixels of unit size: d is in
 pixels. The sample point (p_x, p_y) in [0, 1)² of the pixel in column c (from the left) and row r (from the bottom) gives
 
-    x_v = c − width/2 + p_x    y_v = r − height/2 + p_y    direction = x_v u + y_v v − d w, normalised
+    x_v = c − width/2 + p_x    y_v = r − height/2 + p_y    direction = x_v u + y_v v − d w, normalized
 
 Blender's cameras ask for a little more, and the model gains just that: a distance for each axis (pixel aspect), a principal
-point in place of the centre (shift, border), and mirroring (negative scale), in which u points left.
+point in place of the center (shift, border), and mirroring (negative scale), in which u points left.
 
 **Singularity.** Where the view is exactly parallel to up, u does not exist, and the axes become canonical (`canonical_axes`).
 In every other pose the basis is that of exact arithmetic on the same float64 inputs to within 4e-16, however close to singular
@@ -49,7 +49,7 @@ class ViewPlane:
     """The part of a `Pinhole` that is not its pose.
 
     distance : in pixels, > 0; one float, or a pair (d_x, d_y) in pixel widths and pixel heights.
-    principal_point : (c_x, c_y) in pixels from the left and the bottom edge, the picture's centre if it is None.
+    principal_point : (c_x, c_y) in pixels from the left and the bottom edge, the picture's center if it is None.
     width, height : pixels of the picture.
 
     Raises
@@ -92,7 +92,7 @@ class Pinhole:
     distance : view-plane distance d in pixels, > 0; one float, or a pair (d_x, d_y) in pixel widths and pixel heights.
     width, height : pixels of the picture, whole numbers ≥ 1.
     principal_point : (c_x, c_y), where the view axis meets the picture, in pixels from its left and its bottom edge.
-        The picture's centre if it is None.
+        The picture's center if it is None.
     mirrored : whether u points left in the picture.
 
     Raises
@@ -294,7 +294,7 @@ class Pinhole:
 
         points : (..., 3), world space, finite.
 
-        Returns (column, row, depth), each (...) float64: continuous pixels from the left and from the bottom edge, the centre
+        Returns (column, row, depth), each (...) float64: continuous pixels from the left and from the bottom edge, the center
         of the first pixel at (0.5, 0.5), and the planar depth −w·(P − e) in world units. What does not lie before the eye
         (depth ≤ 0) has no picture: its column and row are nan. What exceeds float64's range is ±inf.
         """

@@ -22,8 +22,8 @@ _TEXTS = (b"tEXt", b"zTXt", b"iTXt", b"tIME")
 def encoded(pixels: NDArray[np.uint8] | NDArray[np.uint16], palette: bytes | None = None) -> bytes:
     """A picture as a PNG file.
 
-    pixels : rows from the top; (height, width, 3 or 4) colours, or (height, width): indices into `palette`, uint8, or greys.
-    palette : three bytes a colour; the first colour is see-through.
+    pixels : rows from the top; (height, width, 3 or 4) colors, or (height, width): indices into `palette`, uint8, or grays.
+    palette : three bytes a color; the first color is see-through.
     """
     height, width = pixels.shape[:2]
     lines = np.ascontiguousarray(pixels).astype(pixels.dtype.newbyteorder(">"), copy=False).view(np.uint8).reshape(height, -1)

@@ -156,7 +156,7 @@ class Block:
         for i in range(SIDE):
             test = self._surfaces(tracer, self._random(number, i))
             if fault.of_picture:
-                # A fault of the whole picture is one of geometry, too; one of its colours is not.
+                # A fault of the whole picture is one of geometry, too; one of its colors is not.
                 test["Combined"] = np.zeros((*faults.SIZE[::-1], 4), np.float32)
                 fault.of_picture(test, self._random(number, i))
             of_geometry = self._of_geometry(test)

@@ -5,7 +5,7 @@ the mean of these beside the reference, with the thresholds of the projects that
 
 - idiff: OpenImageIO's rule as Blender's tests use it, on what a screen shows in 8 bits: more than 1 % of the pixels differ in
   some channel by more than 0.016. Its own evaluation, since a number is wanted where idiff has a verdict.
-- SSIM (Wang and others, 2004) on grey as a screen shows it, uniform windows of 7 × 7 as in scikit-image: below 0.97, the
+- SSIM (Wang and others, 2004) on gray as a screen shows it, uniform windows of 7 × 7 as in scikit-image: below 0.97, the
   threshold that a broken build has passed.
 - FLIP (Andersson and others, 2020), by its authors' own library: a mean of 0.05.
 - z-test: as Mitsuba's tests have it: a z-test of each channel of each pixel by the reference's variance, with Šidák's

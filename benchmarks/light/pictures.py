@@ -5,7 +5,7 @@ shadow, cast on a floor by a board under a square lamp; and the same in a corner
 
 Each contestant is measured against a picture of its own of many more samples and another seed, so that what is compared is
 noise, whatever their filters differ by. Random numbers are pairs of samples in the same integrator, each pair with a seed of
-its own: a single sample would be the pixel's centre.
+its own: a single sample would be the pixel's center.
 """
 
 from collections.abc import Callable

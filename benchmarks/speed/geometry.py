@@ -1,4 +1,4 @@
-"""Level geometry at 1080p beside Cycles: how far positions lie from their pixels' centres against time; and how much of bare
+"""Level geometry at 1080p beside Cycles: how far positions lie from their pixels' centers against time; and how much of bare
 Embree's speed is left, here and where light comes straight from a sun.
 """
 

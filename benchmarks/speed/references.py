@@ -48,7 +48,7 @@ class Reference:
     halves: tuple[Half, Half]
 
     def error_of(self, path: Path) -> float:
-        """The RMSE of Combined's colour, the reference's own variance taken off."""
+        """The RMSE of Combined's color, the reference's own variance taken off."""
         measured = rms(combined(path) - self.picture)
         return math.sqrt(max(measured * measured - self.error * self.error, 0.0))
 
@@ -103,7 +103,7 @@ def combine(halves: Mapping[str, NDArray[np.float64]], samples: Mapping[str, int
 
 
 def combined(path: Path) -> NDArray[np.float64]:
-    """(height, width, 3): the colour of Combined."""
+    """(height, width, 3): the color of Combined."""
     return image.read(path, only=("Combined",))["Combined"][..., :3].astype(np.float64)
 
 

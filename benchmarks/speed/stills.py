@@ -1,4 +1,4 @@
-"""Pictures of light beside Cycles: six Suzannes, the studio still, in plain colours and in artists' materials, the sphere field
+"""Pictures of light beside Cycles: six Suzannes, the studio still, in plain colors and in artists' materials, the sphere field
 and the Cornell box.
 
 Ours renders with a wanted error, and with a number of samples for all pixels; Cycles with a number of samples, and with its own

@@ -6,8 +6,8 @@ Arithmetic: 200 points of an object are projected, against 60 digits of mpmath o
 object's vertices taken to world space and then projected, in float32 (as a renderer does) and in float64; and ours, the
 tracer's core, which takes an origin near the eye off the matrix before a vertex is added.
 
-Cycles: two objects and a ground are rendered, and each pixel's position must project to its centre (`viewcam check`): plain,
-and with the origin moved to the eye (`viewcam check --recenter`). At 1e9 neighbouring float32 numbers are 64 apart, and in the
+Cycles: two objects and a ground are rendered, and each pixel's position must project to its center (`viewcam check`): plain,
+and with the origin moved to the eye (`viewcam check --recenter`). At 1e9 neighboring float32 numbers are 64 apart, and in the
 plain picture nothing is left that could be compared.
 """
 
@@ -37,7 +37,7 @@ from .stage import empty_stage
 Array = NDArray[np.float64]
 
 WIDTH, HEIGHT, DISTANCE = 120, 90, 150
-# Picture coordinates up to 120 in float64: x and z by three products and their sums each, one quotient, d and the centre.
+# Picture coordinates up to 120 in float64: x and z by three products and their sums each, one quotient, d and the center.
 ARITHMETIC = 16 * 2.0**-53 * WIDTH
 # What one rounding costs near the origin: 2⁻²⁴ · d · (M + t)/z with M and t of at most 30 and z of at least 5 units.
 NEAR_ORIGIN = 2.0**-24 * DISTANCE * 60 / 5
@@ -160,7 +160,7 @@ def _unit(vector: mpmath.matrix) -> mpmath.matrix:
 
 
 def _cycles(places: Array) -> list[Curve]:
-    """The median of a check, plain and recentred; nan where no pixel can be compared."""
+    """The median of a check, plain and recentered; nan where no pixel can be compared."""
     methods = {"Cycles": False, "Cycles, recentred (ours)": True}
     exported = {}
     with TemporaryDirectory() as name:

@@ -6,8 +6,8 @@ truth is the quadric itself in 60 digits, of the very float64 numbers that the m
 nothing, as in Cycles, and that counts as right.
 
 Candidates, each in float32 and in float64: the textbook's quadratic; the same with the near root as c/q (Press et al.,
-Numerical Recipes, 5.6); and that with the discriminant of the perpendicular from the centre to the ray (Haines et al., Ray
-Tracing Gems, 2019, ch. 7). They are given the centre less the eye, subtracted in their own precision. Ours is
+Numerical Recipes, 5.6); and that with the discriminant of the perpendicular from the center to the ray (Haines et al., Ray
+Tracing Gems, 2019, ch. 7). They are given the center less the eye, subtracted in their own precision. Ours is
 tracer/core/shapes/sphere.h.
 """
 
@@ -195,7 +195,7 @@ def _centres(distance: float | Array, rays: int, random: np.random.Generator, sp
 
 
 def _aimed(matrix: Array, centers: Array, radii: Array, offset: Array, random: np.random.Generator) -> Shots:
-    """Rays from the origin that pass the centres at `offset` radii."""
+    """Rays from the origin that pass the centers at `offset` radii."""
     distance = np.linalg.norm(centers, axis=0)
     towards = centers / distance
     aside = np.cross(towards.T, random.normal(size=centers.shape).T).T

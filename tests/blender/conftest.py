@@ -82,7 +82,7 @@ def held_camera(posed_camera, over_the_top):
 
 @pytest.fixture
 def render_positions(fresh_blender, scene, tmp_path):
-    """A function that has Cycles render where in the world each pixel's centre falls, in a sphere about the origin.
+    """A function that has Cycles render where in the world each pixel's center falls, in a sphere about the origin.
 
     Its radius is 40. The surface shines with its own position, so that Blender's plain EXR is enough.
     animation : render all frames of the scene. also : objects that shall shine likewise.
@@ -140,7 +140,7 @@ def _shining_position(bpy):
 def picture_error():
     """A function (pinhole, positions) → (error, tolerance), for what `render_positions` renders.
 
-    error : pixels, the largest distance between the centre of a pixel and the picture of the point that was rendered there.
+    error : pixels, the largest distance between the center of a pixel and the picture of the point that was rendered there.
     tolerance : the most that float32 allows anywhere in it.
     """
 
@@ -269,7 +269,7 @@ def add_lamp(fresh_blender, scene):
 
 @pytest.fixture
 def set_world(fresh_blender, scene):
-    """set_world(colour, strength) → a new world of a Background node, which is the scene's."""
+    """set_world(color, strength) → a new world of a Background node, which is the scene's."""
 
     def make(colour=(1, 1, 1), strength=1.0):
         world = fresh_blender.data.worlds.new("World")
@@ -286,7 +286,7 @@ def set_world(fresh_blender, scene):
 
 @pytest.fixture
 def camera(camera_object):
-    """Above and before the origin, looking at it: a few metres around it are in the picture."""
+    """Above and before the origin, looking at it: a few meters around it are in the picture."""
     camera_object.location = (0.3, -7, 4)
     camera_object.rotation_euler = (math.atan2(7, 4), 0.02, 0.04)
     return camera_object

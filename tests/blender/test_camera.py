@@ -30,7 +30,7 @@ def wanted_axes(pinhole):
 
 
 def errors(camera_object, pinhole):
-    """(largest error of a normalised matrix entry, distance of the eyes) of the evaluated camera."""
+    """(largest error of a normalized matrix entry, distance of the eyes) of the evaluated camera."""
     evaluated = camera_object.evaluated_get(bpy.context.evaluated_depsgraph_get())
     matrix = np.array(evaluated.matrix_world)
     axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)

@@ -269,7 +269,7 @@ def test_applying_the_values_mends_a_camera_whose_own_channels_are_not_finite(po
 
 
 def test_blenders_matrices_are_computed_with_in_float64(posed_camera, empty, scene):
-    # From 5.0 on NumPy takes them for float32: a million metres away the location would be 0.06 m off.
+    # From 5.0 on NumPy takes them for float32: a million meters away the location would be 0.06 m off.
     assert rotation.float64(posed_camera.matrix_world).dtype == np.float64
     parent = empty("Parent", location=(1e6 / 3, -1e6 / 7, 1e5))
     posed_camera.parent = parent

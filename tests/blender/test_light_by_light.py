@@ -160,7 +160,7 @@ def test_a_sphere_of_light_and_how_it_is_seen(stage, add_lamp, kind, soft):
 
 
 def nodes(lamp, output):
-    """Let a lamp's colour be a Texture Coordinate of its place, without signs, and its light fall off with the distance."""
+    """Let a lamp's color be a Texture Coordinate of its place, without signs, and its light fall off with the distance."""
     if not lamp.data.node_tree:
         lamp.data.use_nodes = True
     lamp.data.use_nodes = True

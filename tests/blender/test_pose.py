@@ -14,7 +14,7 @@ from viewcam_addon.pinhole import Pinhole
 
 MODES = ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "QUATERNION", "AXIS_ANGLE"]
 FLOAT32 = 2.0**-24
-# What was asked for. Euler angles rounded alone stay below 3.2e-7 (pose.py); the choice among neighbours does for the others.
+# What was asked for. Euler angles rounded alone stay below 3.2e-7 (pose.py); the choice among neighbors does for the others.
 LARGEST_ROLL = 4e-7
 # A product of rotations in float32 rounds each entry by 4 · 2⁻²⁴ at most (four products of which the magnitudes sum to 1, and
 # their sum), and so an axis by √3 times that. A parent is two products, with its inverse and with the camera's own matrix. Its
@@ -101,7 +101,7 @@ def test_the_roll_is_stored_with_delta_transforms(camera_object, scene, mode):
     camera_object.rotation_mode = mode
     camera_object.delta_rotation_euler, camera_object.delta_rotation_quaternion = (0.1, 0.2, 0.3), (0.8, 0.1, 0.6, -0.2)
     camera_object.delta_scale = (1, 2, 3)
-    # The product with the delta rotation comes before the choice among neighbours, and is as much as it may miss.
+    # The product with the delta rotation comes before the choice among neighbors, and is as much as it may miss.
     check(camera_object, scene, random_poses(np.random.default_rng(3), 100), LARGEST_ROLL + PRODUCT)
 
 

@@ -330,7 +330,7 @@ def lines_changed(path, change):
 
 
 def test_a_principal_point_of_opencvs_calibration_in_colmap_is_half_a_pixel_off(model, capsys):
-    """colmap/colmap #2587: OpenCV's c has (0, 0) at the first pixel's centre."""
+    """colmap/colmap #2587: OpenCV's c has (0, 0) at the first pixel's center."""
     lines_changed(model[1] / "cameras.txt", lambda w: [*w[:-2], *(repr(float(x) - 0.5) for x in w[-2:])])
     assert run("audit", model[1]) == 1
     assert "half a pixel too small" in capsys.readouterr().out

@@ -57,7 +57,7 @@ def test_pinholes_of_arrays_are_those_of_the_constructor():
 )
 def test_a_wrong_line_of_a_trajectory_is_named(tmp_path, line, told):
     path = tmp_path / "groundtruth.txt"
-    right = "".join(f"{second} 1 2 3 0 0 0 1\n" for second in range(30))  # by more lines than it is recognised by
+    right = "".join(f"{second} 1 2 3 0 0 0 1\n" for second in range(30))  # by more lines than it is recognized by
     path.write_text(f"# timestamp tx ty tz qx qy qz qw\n{right}{line}\n")
     with pytest.raises(InputError, match=told):
         cameras.read(path, format="trajectories", options=Options(base=PLAIN))

@@ -106,7 +106,7 @@ def test_the_first_pixels_ray_is_the_one_that_the_ray_tracer_challenge_prints():
     pinhole = camera.pinhole
     assert pinhole.mirrored and any("left-handed" in note for note in camera.notes)
     column, row, _ = pinhole.project(np.array([[0.66519, 0.33259, -0.66851]]))
-    assert (column[0], row[0]) == pytest.approx((0.5, 100.5), abs=2e-3)  # the upper left pixel's centre, of five digits
+    assert (column[0], row[0]) == pytest.approx((0.5, 100.5), abs=2e-3)  # the upper left pixel's center, of five digits
 
 
 def test_the_books_angle_is_of_the_longer_side():

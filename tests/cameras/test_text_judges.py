@@ -696,7 +696,7 @@ def test_glm_sees_through_the_frustum_that_we_write_as_we_do(name):
 
 
 def test_vtks_window_centre_and_horizontal_angle_are_its_formulas():
-    """vtkCamera::ComputeProjectionTransform: xmin = (centre − 1) · w, of a w that the angle gives."""
+    """vtkCamera::ComputeProjectionTransform: xmin = (center − 1) · w, of a w that the angle gives."""
     text = CODE["vtk"] + "\ncamera.SetWindowCenter(0.1, -0.2)\n"
     centred = cameras.read(text, options=GL)[0].pinhole
     half = math.tan(math.radians(20)) * 16 / 9

@@ -45,7 +45,7 @@ def read(text, options=GIVEN):
 @pytest.mark.parametrize(
     ("head", "eye", "right"),
     [
-        ("", (0.03, 0.045, -0.015), (1, 0, 0)),  # nothing is said: centimetres, y up
+        ("", (0.03, 0.045, -0.015), (1, 0, 0)),  # nothing is said: centimeters, y up
         ('metersPerUnit = 0.01\n upAxis = "Y"', (0.03, 0.045, -0.015), (1, 0, 0)),
         ('metersPerUnit = 1\n upAxis = "Z"', (3, -1.5, -4.5), (1, 0, 0)),
         ('metersPerUnit = 0.0254\n upAxis = "Z"', (0.0762, -0.0381, -0.1143), (1, 0, 0)),

@@ -1,4 +1,4 @@
-"""The three answers: what each of them says, by which status it ends, and how much of a picture is not modelled."""
+"""The three answers: what each of them says, by which status it ends, and how much of a picture is not modeled."""
 
 import numpy as np
 import pytest

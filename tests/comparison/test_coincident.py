@@ -70,7 +70,7 @@ def reference(tracer):
 
 
 def as_cycles(seed, **scene):
-    """Pictures as Cycles makes them: rounding gives each pixel the floor's light, the carpet's, or none that comes by the two."""
+    """Pictures as Cycles makes them: rounding gives each pixel the floor's light, the carpet's, or none by the two."""
     random = np.random.default_rng(seed)
     without_carpet, without_floor = (pictures(a_scene(only=name, **scene)) for name in ("Carpet", "Floor"))
     shown = Tracer(a_scene(lift=1e-4), 1).render()["Object Index"][..., 0] == 2

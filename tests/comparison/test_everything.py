@@ -1,4 +1,4 @@
-"""On how much of a picture something is not modelled: by the bits of geometry, and by light beyond noise."""
+"""On how much of a picture something is not modeled: by the bits of geometry, and by light beyond noise."""
 
 from dataclasses import replace
 

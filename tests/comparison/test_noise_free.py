@@ -60,7 +60,7 @@ def test_a_float32_renderers_picture_is_the_same(paper_scene):
 
 
 def test_far_from_the_origin_pixels_on_edges_turn_and_are_within_their_number(far_scene):
-    """Five kilometres away rays are off by a hundredth of a pixel: some pixels on edges show the other side."""
+    """Five kilometers away rays are off by a hundredth of a pixel: some pixels on edges show the other side."""
     row = compare(picture(far_scene), [rendered(far_scene, roundings=1.0)], far_scene.pinhole).rows[0]
     assert 0 < row.edges.count <= row.edges.allowed and row.edges.ok
 

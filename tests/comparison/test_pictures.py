@@ -127,7 +127,7 @@ def test_figures_have_two_digits(value, words):
     assert html_page.figure(value) == words
 
 
-# --- The picture of what differs: in the colours of the report, and with a mark where another surface is seen
+# --- The picture of what differs: in the colors of the report, and with a mark where another surface is seen
 
 
 PINHOLE = Pinhole((5, -7, 4), (0.2, 0.1, 0.6), (0, 0, 1), 60.0, 64, 48)

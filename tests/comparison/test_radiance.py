@@ -22,7 +22,7 @@ TRUTH = np.stack([0.2 + 0.5 * columns / WIDTH, 0.3 + 0.3 * rows / HEIGHT, np.ful
 
 
 def picture(rng, samples, truth=TRUTH, attribute="samples", **passes):
-    """The mean of so many exponential variates in every pixel, grey noise, and its variance."""
+    """The mean of so many exponential variates in every pixel, gray noise, and its variance."""
     colour = rng.gamma(samples, 1.0 / samples, (HEIGHT, WIDTH, 1)) * truth
     combined = np.concatenate([colour, np.ones((HEIGHT, WIDTH, 1))], axis=-1)
     made = {"Combined": combined, "Variance": TRUTH**2 / samples, "Depth": np.full((HEIGHT, WIDTH, 1), 8.0), **passes}

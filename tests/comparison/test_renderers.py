@@ -132,7 +132,7 @@ def test_an_edge_that_a_rasteriser_moves_is_explained_and_no_farther_one(paper_s
     edges = renderers.RENDERERS["EEVEE"].edges
 
     def shifted(off):
-        """Its edges alone: where another object is seen than through the centre, what is seen beside it."""
+        """Its edges alone: where another object is seen than through the center, what is seen beside it."""
         exact, beside = paper_scene.picture(), paper_scene.picture(0.5 + off, 0.5)
         other = exact["Object Index"] != beside["Object Index"]
         passes = {name: np.where(other, beside[name], exact[name]) for name in ("Position", "Normal", "Object Index")}

@@ -114,7 +114,7 @@ def with_normals(scene, change):
 
 
 def shifted(scene, x, y):
-    """The film's filter beside the pixel's centre: the same as the picture shifted the other way."""
+    """The film's filter beside the pixel's center: the same as the picture shifted the other way."""
     (cx, cy), camera = scene.camera.principal_point, scene.camera
     return replace(scene, camera=replace(camera, principal_point=(cx - x, cy - y)))
 

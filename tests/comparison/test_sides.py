@@ -49,7 +49,7 @@ def test_a_reference_of_one_sample_that_tells_no_variance_has_none():
 
 
 def test_diffuse_light_is_compared_as_light_and_not_as_a_quotient():
-    """Two pictures whose light is 1 and 3 by other colours: the mean is 2 in either order."""
+    """Two pictures whose light is 1 and 3 by other colors: the mean is 2 in either order."""
     half, one = np.full((*SHAPE, 3), 0.5, np.float32), np.ones((*SHAPE, 3), np.float32)
     tests = [picture(Diffuse_Direct=2 * one, Diffuse_Color=half), picture(Diffuse_Direct=3 * one, Diffuse_Color=one)]
     found = sides(picture(Diffuse_Direct=one, Diffuse_Color=one), tests, "Diffuse Direct")

@@ -145,7 +145,7 @@ def test_an_error_beyond_the_tolerance_has_another_cause(compared):
 
 
 def test_where_no_pixel_can_be_compared_that_is_told(paper_scene):
-    """At 1e9 neighbouring float32 numbers are 64 apart: the test picture shows nothing at all."""
+    """At 1e9 neighboring float32 numbers are 64 apart: the test picture shows nothing at all."""
     offset = (1e9, 0.0, 0.0)
     eye, look_at = (tuple(np.add(point, offset)) for point in (paper_scene.pinhole.eye, paper_scene.pinhole.look_at))
     pinhole = replace(paper_scene.pinhole, eye=eye, look_at=look_at)

@@ -76,7 +76,7 @@ def test_each_pixels_point_projects_to_the_pixels_centre_from_the_world_and_from
                 worst = max([worst, *np.abs(x / w - columns), *np.abs(y / w - rows)])
                 shown = depth[rows, columns]
                 off = np.abs(points[:, 2] - shown)[shown > 0].max(initial=0.0)
-                # Half a step of the PNG, and in millimetres the rounding that PIXELS is of.
+                # Half a step of the PNG, and in millimeters the rounding that PIXELS is of.
                 assert off <= camera["depth_scale"] / 2 + 0.01, f"depth is off by {off:.3g} mm"
     assert 0 < worst <= PIXELS, f"a point projects {worst:.3g} pixels beside its pixel's centre"
 

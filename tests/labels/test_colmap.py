@@ -38,7 +38,7 @@ def written(tmp_path_factory):
 
 
 def points_of(model):
-    """By hand: positions, colours, and which image shows which point, (points, images)."""
+    """By hand: positions, colors, and which image shows which point, (points, images)."""
     lines = [line.split() for line in (model / "points3D.txt").read_text().splitlines() if not line.startswith("#")]
     shown = np.zeros((len(lines), len(list(model.parent.glob("shots/*.json")))), bool)
     for i, line in enumerate(lines):

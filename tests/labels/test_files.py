@@ -30,7 +30,7 @@ ENDINGS = [
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """The labels of a frame with both neighbours, and the folder that they were written to, as shot.*"""
+    """The labels of a frame with both neighbors, and the folder that they were written to, as shot.*"""
     folder = tmp_path_factory.mktemp("labels")
     frames = [room(ball=moved(0.1 * i, 0, 0.7), camera=replace(CAMERA, eye=(1 + 0.2 * i, -7, 3))) for i in range(3)]
     labels = vp.label(frames[1], KINDS, frames[0], frames[2])

@@ -39,7 +39,7 @@ def mask_of(segmentation):
 
 
 def test_a_ball_before_a_wall_is_what_it_is_on_paper():
-    """The eye at the origin looks along −z at a ball of radius 1 whose centre is 4 away, and at a wall 8 away."""
+    """The eye at the origin looks along −z at a ball of radius 1 whose center is 4 away, and at a wall 8 away."""
     camera = vp.Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 40, 33, 25)
     ball = Spheres(np.array([[0.0, 0, -4]]), np.array([1.0]), np.zeros(1, np.int32))
     wall = replace(CUBE, vertices=CUBE.vertices * [50, 50, 1])
@@ -125,7 +125,7 @@ def test_an_amodal_mask_is_the_object_alone(camera):
             alone = Surfaces(replace(scene, objects=(replace(placed, matrix=matrix),))).instance[::-1] == 0
             told = amodal.get((placed.name, number))
             mask = mask_of(told["segmentation"]) if told else np.zeros_like(alone)
-            # Two ways to one ray, rounded apart: only a centre within 1e-12 of an outline could differ, and none is.
+            # Two ways to one ray, rounded apart: only a center within 1e-12 of an outline could differ, and none is.
             np.testing.assert_array_equal(mask, alone, err_msg=f"{placed.name} {number}")
 
 
@@ -312,7 +312,7 @@ def test_backward_is_towards_the_previous_frame(scene):
 def test_what_stands_still_before_a_still_camera_has_no_flow_at_all(scene):
     found = vp.label(scene, ("masks", "flow"), next=room())
     shown = found.image["Instance"][..., 0] != 0
-    # The point is projected back onto its own centre, to the last bits.
+    # The point is projected back onto its own center, to the last bits.
     assert np.abs(found.image["Forward Flow"][shown]).max() < 1e-12
     assert (found.image["Forward Motion"][shown] == 0).all() and not found.image["Forward Hidden"].any()
     assert np.isnan(found.image["Forward Flow"][~shown]).all()
@@ -398,7 +398,7 @@ def test_far_from_the_origin_flow_is_as_exact(away):
     assert largest_difference(found, flow_of_poses(found, frames[0].camera, frames[1].camera, {})) < ALLOWED
 
 
-# --- Coverage: areas on paper, masks at the centres, and Cryptomatte as it is specified
+# --- Coverage: areas on paper, masks at the centers, and Cryptomatte as it is specified
 
 
 STEP = 1 / coverage.SAMPLES

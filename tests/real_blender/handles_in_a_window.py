@@ -300,7 +300,7 @@ def frame_point():
 
 
 def is_drawn(point):
-    """Steps that end with whether the view plane's frame is drawn there: blue, where everything else is grey."""
+    """Steps that end with whether the view plane's frame is drawn there: blue, where everything else is gray."""
     import gpu
 
     found = []

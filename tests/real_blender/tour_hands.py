@@ -270,7 +270,7 @@ def lowest_button(where=SIDEBAR):
 
 
 def photograph(where, path, share=100):
-    """Save what the screen shows of (left, bottom, width, height), in percent of its size and few colours."""
+    """Save what the screen shows of (left, bottom, width, height), in percent of its size and few colors."""
     left, bottom, width, height = map(int, where)
     crop = f"{width}x{height}+{left}+{SCREEN_HEIGHT - bottom - height}"
     few = ("+dither", "-colors", "192", "-depth", "8")

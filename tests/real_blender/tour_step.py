@@ -117,7 +117,7 @@ def differing(one, other):
 
 
 def make_the_scene():
-    """A floor, a monkey, a ball and a cone of plain colours, a sun and a camera; the camera is active."""
+    """A floor, a monkey, a ball and a cone of plain colors, a sun and a camera; the camera is active."""
     for block in list(bpy.data.objects):
         bpy.data.objects.remove(block)
     _mesh(bpy.ops.mesh.primitive_plane_add, "Floor", (0.55, 0.52, 0.48), size=9)

@@ -124,7 +124,7 @@ def evaluated(shown: Node, images=None, uv=(0.0, 0.0), incoming=(0.0, 0.0, -1.0)
 
 
 def looked_up(picture: Picture, uv, closest: bool):
-    """(3, n): the linear colours of an image at (2, n) UV."""
+    """(3, n): the linear colors of an image at (2, n) UV."""
     shown = node("image", image=Colour(WHITE, "shown"), interpolation="closest" if closest else "linear")
     return evaluated(shown, {"shown": picture}, uv)[0]
 

@@ -147,7 +147,7 @@ def light_up(draw, calls):
 
 
 def made_by(draw):
-    """A colour of a node, which there may be."""
+    """A color of a node, which there may be."""
     return native._Color((1.0, 1.0, 1.0), image=draw(mostly(st.just(-1), WHOLE)), node=draw(mostly(st.integers(-1, 1), WHOLE)))
 
 

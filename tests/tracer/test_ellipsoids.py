@@ -53,7 +53,7 @@ def test_the_near_root_agrees_with_the_quadric_in_sixty_digits(make_spheres, ran
     depth = found_depths(Object("object", "spheres", matrix), make_spheres([centre], radius), np.array([x]), np.array([y]))[0]
     exact, discriminant, unit_centre = quadric_root(matrix, centre, radius, x, y)
 
-    # In the space of the unit sphere, the centre stands at |f| and is rounded by some 2⁻⁵³ |f| times the matrix's condition; so
+    # In the space of the unit sphere, the center stands at |f| and is rounded by some 2⁻⁵³ |f| times the matrix's condition; so
     # is the foot of the perpendicular, and the discriminant 1 − l² by twice that.
     size = float(mpmath.norm(unit_centre))
     rounding = 32 * FLOAT64 * size * np.linalg.cond(matrix[:3, :3])
@@ -165,7 +165,7 @@ def test_an_eye_by_the_last_bit_outside_or_inside_a_sphere_knows_it_and_its_dept
 def test_an_eye_exactly_on_a_sphere_sees_nothing_of_it(make_spheres):
     assert found_depth((0.0, 3.0, -4.0), 5.0, 0.0, 0.75, make_spheres) == np.inf
     assert found_depth((0.0, 3.0, -4.0), np.nextafter(5.0, 6), 0.0, 0.75, make_spheres) == np.inf
-    # From 5's last place outside, 2⁻⁵⁰, the ray (0, 3/4, −1) goes straight to the centre.
+    # From 5's last place outside, 2⁻⁵⁰, the ray (0, 3/4, −1) goes straight to the center.
     just_outside = found_depth((0.0, 3.0, -4.0), np.nextafter(5.0, 4), 0.0, 0.75, make_spheres)
     assert just_outside == pytest.approx(2.0**-50 * 0.8, rel=8 * FLOAT64)
 
@@ -174,7 +174,7 @@ def test_an_eye_exactly_on_a_sphere_sees_nothing_of_it(make_spheres):
 @given(seed=SEEDS, digits=st.integers(0, 12))
 @example(seed=0, digits=12)
 def test_a_turned_ellipsoid_far_from_the_origin_is_as_exact_as_one_near_it(make_spheres, random_matrix, seed, digits):
-    """Eye, centre and matrix are exact float64 numbers; only their difference is small."""
+    """Eye, center and matrix are exact float64 numbers; only their difference is small."""
     rng = np.random.default_rng(seed)
     matrix = random_matrix(rng)
     center = rng.normal(size=3) * 10.0**digits

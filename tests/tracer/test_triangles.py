@@ -239,7 +239,7 @@ def seen(scene):
 
 
 def outline_of_the_mat(scene) -> np.ndarray:
-    """The picture on paper: 2 where the ray through a pixel's centre meets the mat's rectangle."""
+    """The picture on paper: 2 where the ray through a pixel's center meets the mat's rectangle."""
     rows, columns = np.mgrid[: scene.camera.height, : scene.camera.width]
     corners = scene.geometries["geometry 1"].vertices
     directions = scene.camera.ray_directions(columns, rows)

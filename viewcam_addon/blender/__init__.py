@@ -7,7 +7,7 @@ _command = None
 
 
 def _rooms() -> list[ModuleType]:
-    """Modules with CLASSES for Blender or more to tell it, in order: a panel needs its operators, an operator its properties."""
+    """Modules with CLASSES for Blender or more to tell it: in order, as a panel needs operators, an operator properties."""
     from . import animation, own_picture, preferences, properties, render_settings, resolution
     from .interface import (
         baking,

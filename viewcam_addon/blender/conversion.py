@@ -128,7 +128,7 @@ def takes_part(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
 
 
 def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
-    """The Pinhole as which Cycles renders this camera: its evaluated matrix with normalised columns, and its evaluated lens.
+    """The Pinhole as which Cycles renders this camera: its evaluated matrix with normalized columns, and its evaluated lens.
 
     The look-at point is any point on the view axis, up is v. The evaluated object of another depsgraph may be given as well.
 

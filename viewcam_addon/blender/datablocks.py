@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..terminal import plain
 from . import versions
 
-# Metres: what is shorter, Blender calls zero.
+# Meters: what is shorter, Blender calls zero.
 _SHORTEST_WORD = 1e-6
 _KINDS = {"ORTHO": "orthographic", "PANO": "panoramic", "CUSTOM": "a custom camera"}
 

@@ -4,9 +4,9 @@ Everything is float64 from Blender's float32 matrices on, each (4, 4) or (3, 3),
 
 **Rotations in float32.** Of the two Euler triples `rotation.euler` takes the one whose sum is at most 3π/2: two of its angles
 may lie above 2 and be rounded by 2⁻²³ each, and the third, below 1 then, by 2⁻²⁵. Rounding the matrix turns it by √3 · 2⁻²⁵ at
-most. That is 3.2e-7 rad. Quaternions, and axis and angle, are worse: Blender normalises them in float32, which costs as much as
+most. That is 3.2e-7 rad. Quaternions, and axis and angle, are worse: Blender normalizes them in float32, which costs as much as
 storing them, and up to 5.3e-7 rad were found. So `set_rotation` asks Blender which matrix the rounded numbers make, and where
-it is not right tries the neighbouring ones: 1.9e-7 rad at most in every mode. Rejected: to try all always, which took a third
+it is not right tries the neighboring ones: 1.9e-7 rad at most in every mode. Rejected: to try all always, which took a third
 of an edit's time and makes a tenth of difference, and Blender's float32 arithmetic done here once more (its rounding differs
 from one processor to another).
 """

@@ -25,7 +25,7 @@ _AXES = {
 
 @dataclass(frozen=True)
 class Defaults:
-    """The preferences as they are before anybody has changed them. Colours are sRGB, with opacity."""
+    """The preferences as they are before anybody has changed them. Colors are sRGB, with opacity."""
 
     default_up: str = "Z"
     default_level: str = "GEOMETRY"

@@ -29,7 +29,7 @@ CIRCLES_ARE_BLACK = bpy.app.version >= (5, 0)
 
 
 def node_tree(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree | None:
-    """The nodes that count in the render. Since 5.0 there is no switch between them and a plain colour."""
+    """The nodes that count in the render. Since 5.0 there is no switch between them and a plain color."""
     return block.node_tree if bpy.app.version >= (5, 0) or block.use_nodes else None
 
 
@@ -51,9 +51,9 @@ def shadow_terminator(block: bpy.types.Object) -> tuple[tuple[bpy.types.bpy_stru
 
 
 def without_first_sample(samples: int) -> dict[str, object]:
-    """Settings of Cycles for that many samples without the first, which goes through the pixel's centre whatever the filter.
+    """Settings of Cycles for that many samples without the first, which goes through the pixel's center whatever the filter.
 
-    It draws edges towards what stands at the centre, by 0.22/samples of their contrast. Measured: 4.2, 4.5, 5.0 and 5.2.
+    It draws edges towards what stands at the center, by 0.22/samples of their contrast. Measured: 4.2, 4.5, 5.0 and 5.2.
     """
     if bpy.app.version < (4, 4):
         return {"sample_offset": 1, "samples": samples}

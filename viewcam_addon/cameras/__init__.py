@@ -1,6 +1,6 @@
 """Cameras of other programs, in and out: nothing else in this project reads or writes one.
 
-    read(text or Path, options=Options(…))        → list of Camera, recognised by content
+    read(text or Path, options=Options(…))        → list of Camera, recognized by content
     write(cameras, "colmap", Options(…))          → text, or the files of a folder
     save(cameras, path, "colmap", Options(…))     → written there, each whole or not at all
     choose(cameras, name)                         → the one that is meant, or a sentence with all names
@@ -35,7 +35,7 @@ camera takes them if written again they are read as that camera. Where somebody 
 nobody who imports a file can mend this project. tests/fuzz sees what caused it, and calls it a fault. Names and sentences are
 one line each of characters that show, whatever stands in the file.
 
-Axes and scale are applied here, for all alike. The first format that recognises something reads it: the more certain ones
+Axes and scale are applied here, for all alike. The first format that recognizes something reads it: the more certain ones
 stand first, and what takes any text last.
 """
 
@@ -167,7 +167,7 @@ def writable() -> list[str]:
 def read(given: str | Path, *, format: str | None = None, options: Options | None = None) -> list[Camera]:
     """The cameras of a text, a file or a folder.
 
-    given : a text, or the Path of a file or folder. format : one of `readable()`; None to recognise it by its content.
+    given : a text, or the Path of a file or folder. format : one of `readable()`; None to recognize it by its content.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Recordings of phones: Polycam's and 3D Scanner App's JSON of each picture, and Record3D's metadata.
 
-All are ARKit's: world y up (against gravity), metres, camera x right, y up, z away from the view in the landscape picture.
+All are ARKit's: world y up (against gravity), meters, camera x right, y up, z away from the view in the landscape picture.
 Polycam lists the matrix as t_00 … t_23, row after row; of its two folders the corrected one is meant, and its pictures are in
 a folder beside it. 3D Scanner App has cameraPoseARFrame, row after row, and the picture beside it. Record3D has a pose as qx qy
 qz qw tx ty tz and K column after column.

@@ -88,7 +88,7 @@ def read(source: Source, options: Options) -> list[Camera]:
 
 @functools.lru_cache(maxsize=1)
 def _values(text: str) -> Mapping[str, Any]:
-    """The arrays, in rows, and the numbers of a text by their plain names. What is recognised is then read."""
+    """The arrays, in rows, and the numbers of a text by their plain names. What is recognized is then read."""
     text = texts.without(_COMMENT_OF_C, text) if _IN_C.search(text) else texts.without(_COMMENT, text)
     code = _Code(text.replace("−", "-"))
     values = code.values()

@@ -161,7 +161,7 @@ class Depths:
 
 
 def _between(depth: Array, places: Array) -> Array:
-    """The depth between four pixels' centres: of planes exact, since 1/depth is linear there; nan outside and across edges."""
+    """The depth between four pixels' centers: of planes exact, since 1/depth is linear there; nan outside and across edges."""
     height, width = depth.shape
     with np.errstate(all="ignore"):
         x, y = (np.where(np.isfinite(p), p, -9) - 0.5 for p in places.T)

@@ -6,8 +6,8 @@ that of `camera_to_world`. Computer vision's (OpenCV, COLMAP) has x to the right
 (`of_opencv`, `from_world_to_camera`), and `pinhole` makes the camera of it.
 
 **Pixels.** Rows count from the top here, from the bottom in `Pinhole`. The upper left corner of the picture is (0, 0) and the
-centre of its first pixel (0.5, 0.5), so the middle of a picture is (width/2, height/2). OpenCV's own functions put (0, 0) at
-the centre of that pixel: for them, subtract 0.5 from both numbers of the principal point.
+center of its first pixel (0.5, 0.5), so the middle of a picture is (width/2, height/2). OpenCV's own functions put (0, 0) at
+the center of that pixel: for them, subtract 0.5 from both numbers of the principal point.
 
 **World.** `moved` turns and scales it, for all formats alike; none does it by itself.
 

@@ -1,7 +1,7 @@
 """BOP's scene_camera.json: K for each image of a scene and, where the scene has a world, its pose.
 
-World to camera, x right, y down, z into the view, in **millimetres**, whose numbers stay unless a scale is chosen (0.001 makes
-metres). BOP's toolkit puts (0, 0) at the centre of the first pixel. The size is that of the pictures in rgb/ or gray/, of the
+World to camera, x right, y down, z into the view, in **millimeters**, whose numbers stay unless a scale is chosen (0.001 makes
+meters). BOP's toolkit puts (0, 0) at the center of the first pixel. The size is that of the pictures in rgb/ or gray/, of the
 data set's camera.json, or given. Without a pose the camera stands at the origin: BOP's objects are posed to the camera then.
 
 Source: bop_toolkit's docs/bop_datasets_format.md and bop_toolkit_lib/misc.py (depth_im_to_dist_im).

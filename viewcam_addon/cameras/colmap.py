@@ -3,7 +3,7 @@ known: labels/colmap.py knows some.
 
 **Cameras.** One for each set of intrinsics that the pictures have: SIMPLE_PINHOLE (f, cx, cy) where pixels are square, else
 PINHOLE (fx, fy, cx, cy); with a lens OPENCV or the first model that has its terms. The upper left corner of the picture is
-(0, 0), its first pixel's centre (0.5, 0.5).
+(0, 0), its first pixel's center (0.5, 0.5).
 
 **Images.** In text two lines each, the second one a list of image points, empty where there are none. The pose takes world
 space to the camera's x right, y down, z into the view, as a unit quaternion (w first, Hamilton's) and a translation. All
@@ -14,7 +14,7 @@ binary one counts, as for COLMAP.
 rigs and frames, new in COLMAP 3.12, are neither written nor read: without them each image is a frame of its own, as older
 readers take it, and with them the images repeat the poses that they compose.
 
-Sources: COLMAP's doc/format.rst, doc/database.rst (pixel centres), src/colmap/sensor/models.h (the lenses) and
+Sources: COLMAP's doc/format.rst, doc/database.rst (pixel centers), src/colmap/sensor/models.h (the lenses) and
 src/colmap/scene/reconstruction_io_text.cc and _binary.cc (what parts a line: a name ends at a space).
 """
 

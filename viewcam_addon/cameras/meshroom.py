@@ -1,7 +1,7 @@
 """Meshroom's and AliceVision's .sfm, .json or .abc's text sister: views, intrinsics and poses as JSON, all numbers as texts.
 
 A pose has the eye and the rotation from world to camera (x right, y down, z into the view), listed column by column. The focal
-length is in millimetres of the sensor's width; the principal point counts from the picture's middle since version 1.2.1, from
+length is in millimeters of the sensor's width; the principal point counts from the picture's middle since version 1.2.1, from
 its corner before. Pixels that are not square divided the other way before 1.2.11.
 
 Source: AliceVision's src/aliceVision/sfmDataIO/jsonIO.cpp and camera/IntrinsicScaleOffset.cpp.

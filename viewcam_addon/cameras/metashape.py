@@ -2,7 +2,7 @@
 
 A camera's transform is from its axes (x right, y down, z into the view) to its component, and that one's to the world. The
 chunk's own transform is that of its active component once more, or stands alone in files without components. The principal
-point is an offset from the picture's middle, whose first pixel's centre is (0.5, 0.5). b1 is what the distance across has more
+point is an offset from the picture's middle, whose first pixel's center is (0.5, 0.5). b1 is what the distance across has more
 than the other, b2 is skew, which is of the lens. P1 and P2 are OpenCV's p2 and p1.
 
 A camera of a rig that has no transform of its own has a master, whose axes are those of its sensor's rotation and location: the

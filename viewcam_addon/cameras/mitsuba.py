@@ -3,7 +3,7 @@
 **Pose.** `to_world` takes the camera's axes to the world: x to the **left** of the picture, y upwards, z into the view. In XML
 its transforms apply in the order in which they stand, in Python those of a product from the right.
 
-**Picture.** `fov` in degrees along `fov_axis` (x unless given), or `focal_length` in millimetres on the diagonal of 36 × 24, 50
+**Picture.** `fov` in degrees along `fov_axis` (x unless given), or `focal_length` in millimeters on the diagonal of 36 × 24, 50
 unless given; both count on the whole film, 768 × 576 unless given. `principal_point_offset_x` moves the picture's middle by
 that part of the width **from** the principal point, so the sign is against what the name suggests. `crop_…` keep a part.
 

@@ -5,7 +5,7 @@ that people give (K, camera_matrix, cameraMatrix, intrinsic_matrix …; R, rvec;
 file of a pose, so a file may hold K alone, which stands at the origin and looks along +z, as it would for `projectPoints`; a
 note says so. What is written has K, R, rvec, t, a distortion of zeros and the size, and NPZ is read only.
 
-**Pixels.** OpenCV puts (0, 0) at the centre of the first pixel (`remap`, `undistort`, calibration), so half a pixel lies
+**Pixels.** OpenCV puts (0, 0) at the center of the first pixel (`remap`, `undistort`, calibration), so half a pixel lies
 between its K and ours, and a note says that it was added; `pixel = "corner"` takes K as it stands, for files of tools that mean
 the corner.
 

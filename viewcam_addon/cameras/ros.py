@@ -2,7 +2,7 @@
 
 K is of the raw picture, P of the rectified one; without distortion and rectification they are one camera, and where P differs
 the raw picture's K counts, since its pixels are those that exist. It has no pose, which ROS keeps in tf: the camera stands at
-the origin and looks along z (the optical frame), and a note says so. Pixels count from the first one's centre, as OpenCV's.
+the origin and looks along z (the optical frame), and a note says so. Pixels count from the first one's center, as OpenCV's.
 K, P and the size are those of the whole sensor; `roi` and `binning_x`, `binning_y` say which of its pixels the pictures are.
 
 Source: sensor_msgs/CameraInfo.msg.

@@ -5,7 +5,7 @@ v, w and the eye. It counts in whatever the scene counts in. `applied_transform`
 world before; the cameras stay in the file's world unless `original_world` is chosen.
 
 **Picture.** `fl_x`, `fl_y` are the view-plane distance in pixel widths and heights, `cx`, `cy` the principal point from the
-left and the top edge, where the first pixel's centre is (0.5, 0.5), and `w`, `h` pixels. `camera_angle_x` = 2 atan(w / 2
+left and the top edge, where the first pixel's center is (0.5, 0.5), and `w`, `h` pixels. `camera_angle_x` = 2 atan(w / 2
 fl_x), for readers that know nothing else, is the field of view if the principal point is the middle, which they take for
 granted: it isn't `Pinhole.field_of_view` where the camera is shifted. The original NeRF shoots its rays through the pixels'
 corners (bmild/nerf #24), which no file can mend; its files have no size either, which is then that of the picture beside it.

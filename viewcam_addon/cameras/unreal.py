@@ -1,6 +1,6 @@
 """Camera poses as Unreal has them, one a line: out only.
 
-`name,tx,ty,tz,qx,qy,qz,qw,fov,width,height`: centimetres in a left-handed world, z up, x forward, y to the right; a quaternion
+`name,tx,ty,tz,qx,qy,qz,qw,fov,width,height`: centimeters in a left-handed world, z up, x forward, y to the right; a quaternion
 (x, y, z, w); `fov` the degrees of the width. The world's y is negated on the way. Columns and order of the pose are those of
 EasySynth's CameraPoses.csv. Rejected: rotators, whose signs differ between Unreal's own documents, and sensor offsets, whose
 sign no document says.

@@ -2,8 +2,8 @@
 the package index), in a process of its own (usd_stage.py).
 
 The camera's axes are x right, y up, z away from the view, whatever the stage's upAxis is; matrices are for row vectors. The
-world is brought to z up and to metres by what the stage says of its own, as Blender's importer does it: a stage that says
-nothing counts in centimetres and has y up. Lens,
+world is brought to z up and to meters by what the stage says of its own, as Blender's importer does it: a stage that says
+nothing counts in centimeters and has y up. Lens,
 apertures and their offsets count in tenths of a scene unit, of which only ratios decide the picture. A stage says no number of
 pixels; what is written here has it as userProperties of the camera, and else it is given. Where the apertures' aspect is not
 the picture's, the aperture grows to fit, which is UsdRender's rule. Written as text, so that writing needs no library; lens and

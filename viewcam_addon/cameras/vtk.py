@@ -1,7 +1,7 @@
 """VTK's and PyVista's camera as Python code: out; look_at.py reads it.
 
 `camera` is `renderer.GetActiveCamera()` in VTK and ParaView, and `plotter.camera` in PyVista. The view angle is the height's;
-the window's centre says the principal point, in halves of the picture. Pixels are square.
+the window's center says the principal point, in halves of the picture. Pixels are square.
 
 Source: VTK's documentation of vtkCamera, and its ComputeProjectionTransform.
 """

@@ -1,7 +1,7 @@
-"""The answer of a comparison, one of three: the same, the same but for what is not modelled, or different.
+"""The answer of a comparison, one of three: the same, the same but for what is not modeled, or different.
 
 Every place that tells it (shell, panel, report, contact sheet, JSON, JUnit, Python) has it from an `Answer`. Both sides leave
-out or replace alike what is not modelled, so that the rest can be compared: two pictures that are the same need not be the
+out or replace alike what is not modeled, so that the rest can be compared: two pictures that are the same need not be the
 artist's then. It counts as far as it is in the picture: by the pixels that show it, and by those where Cycles' picture with
 everything is another than the one with stand-ins, because it hides them, lights them or stands in their light.
 """
@@ -68,7 +68,7 @@ class Answer:
 
     @property
     def passed(self) -> bool:
-        """True if nothing differs of what is modelled."""
+        """True if nothing differs of what is modeled."""
         return self.answer != DIFFERENT
 
     @property
@@ -101,9 +101,9 @@ def exit_status(answer: str, strict: bool) -> int:
 
 
 def answered(same: bool, headline: str, text: str, not_modelled: NotModelled) -> Answer:
-    """The answer, whose headline names what is not modelled where the rest is the same.
+    """The answer, whose headline names what is not modeled where the rest is the same.
 
-    same : whether nothing differs. headline : without what is not modelled.
+    same : whether nothing differs. headline : without what is not modeled.
     """
     if not same:
         return Answer(DIFFERENT, headline, text, not_modelled)
@@ -115,7 +115,7 @@ def answered(same: bool, headline: str, text: str, not_modelled: NotModelled) ->
 def in_the_picture(
     names: Sequence[str], shown: Mapping[str, NDArray[np.bool_]], changed: NDArray[np.bool_] | None, is_lit: bool
 ) -> NotModelled:
-    """The part of a picture that is not modelled.
+    """The part of a picture that is not modeled.
 
     names : of the objects that are not. shown : name → (height, width), the pixels that show it, of those that are surfaces
     in the scene. changed : (height, width), those where the picture with everything is another than the one with stand-ins;

@@ -31,7 +31,7 @@ _SHIFT = 2.0 * FLOAT32
 class ConversionError:
     """Stated camera against camera read back, in pixels.
 
-    largest : the largest displacement over corners, edges and centre of the picture, at the depths seen.
+    largest : the largest displacement over corners, edges and center of the picture, at the depths seen.
     tolerance : what the float32 storage of matrix and lens allows at that place. share : the worst displacement / tolerance.
     """
 
@@ -100,7 +100,7 @@ def systematic_error(
     pixels : (n,) int, row after row. off_x, off_y : (n,) displacements there, pixels to the right and upwards.
     one_rounding : (n,) `position_shift`. A pixel weighs as much as it is certain, so that a few slender triangles do not hide
         what all the others share. The mean of the errors can't exceed their typical size. centre : pixels that the renderer's
-        rays are beside the pixels' centres by design.
+        rays are beside the pixels' centers by design.
     """
     row, column = np.divmod(pixels, pinhole.width)
     x, y = column + 0.5 - pinhole.principal_point[0], row + 0.5 - pinhole.principal_point[1]

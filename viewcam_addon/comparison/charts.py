@@ -1,4 +1,4 @@
-"""Drawings of the report as SVG: they scale, print, and take the page's colours in light and dark.
+"""Drawings of the report as SVG: they scale, print, and take the page's colors in light and dark.
 
 chart.html and marks.html draw them. Rejected: matplotlib, whose pictures know one background only and which Blender does not
 have.

@@ -30,7 +30,7 @@ _NOTHING = np.full((1, 3), 64, np.uint8)
 
 @np.errstate(all="ignore")
 def write(comparison: GeometryComparison | RadianceComparison, path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Write the PNG; returns its path, what its colours say, and the ends and unit of their scale, as plain JSON values.
+    """Write the PNG; returns its path, what its colors say, and the ends and unit of their scale, as plain JSON values.
 
     Raises
     ------

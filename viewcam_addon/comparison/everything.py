@@ -1,4 +1,4 @@
-"""The part of a picture that is not modelled, measured by Cycles' picture with everything in it beside the one with stand-ins.
+"""The part of a picture that is not modeled, measured by Cycles' picture with everything in it beside the one with stand-ins.
 
 Of geometry two such pictures of one scene hold the same bits wherever the ray of a pixel meets the same surface: what a
 stand-in changes is counted exactly. Of light both are noisy, with the same seed, and the tests of light ask of pixels and tiles
@@ -31,7 +31,7 @@ def not_modelled(
     everything: Image | None = None,
     pinhole: Pinhole | None = None,
 ) -> NotModelled:
-    """The part of a picture that is not modelled.
+    """The part of a picture that is not modeled.
 
     names : of the objects that are not. shown : name → (height, width), the pixels that show it, of those that are surfaces in
     the scene. reference, tests : what was compared. everything : Cycles' picture of the seed of the first test, with as many
@@ -52,7 +52,7 @@ def _changed_geometry(test: Image, everything: Image, surfaces: NDArray[np.bool_
     """(height, width): the pixels where some pass has other bits.
 
     test, everything : the pictures of geometry with stand-ins and without. surfaces : (height, width), the pixels that show an
-    object that is not modelled; of all others no normals count.
+    object that is not modeled; of all others no normals count.
     """
 
     def differs(name: str) -> NDArray[np.bool_]:

@@ -1,7 +1,7 @@
 """Compares the geometry passes of two pictures of the same camera.
 
 The reference is the tracer's, the test usually Cycles'. Position is judged in pixels: the test's positions are projected
-through the ideal camera, and must land on the centres of their pixels. That alone would not notice an object that is moved,
+through the ideal camera, and must land on the centers of their pixels. That alone would not notice an object that is moved,
 so depth, normal and UV are compared with the reference's, and indices and coverage must be the same. Combined is left alone
 at this level.
 """
@@ -39,7 +39,7 @@ from .verdict import GeometryComparison, allowed_unexplained
 
 # Which of the passes both pictures must have.
 _NEEDED = ("Depth", "Position", "Object Index")
-# Pixels whose centres are traced again, to see whether the reference shows the scene.
+# Pixels whose centers are traced again, to see whether the reference shows the scene.
 _ASKED_OF_THE_REFERENCE = 1000
 # Passes that only the reference has: what tolerances are evaluated with.
 _FOR_TOLERANCES = ("Magnitude", "Facing")

@@ -1,8 +1,8 @@
 """Hypothesis tests of noisy light: is a difference more than chance, in each pixel, each tile, along contours, in the whole?
 
-The noise that a difference is held against is the larger of what a pixel or tile shows itself and what its 3 × 3 neighbourhood
+The noise that a difference is held against is the larger of what a pixel or tile shows itself and what its 3 × 3 neighborhood
 shows in the mean. By itself, a place that rare light has missed so far looks both darker and quieter than it is, and an edge
-that crosses the corner of a pixel may have been missed by all of its samples. Where neighbours share their light, a tile shows
+that crosses the corner of a pixel may have been missed by all of its samples. Where neighbors share their light, a tile shows
 less noise than its sum has: then what the samples of its pixels tell counts as well.
 
 What is within rounding is no difference: a pixel's is taken beyond the largest tolerance, a tile's sum beyond that of the 99th
@@ -13,10 +13,10 @@ effect is the sum of the slopes, in which noise cancels.
 
 Contours: what blurs or sharpens a picture, as another filter does, takes as much from one side of each contour as it gives to
 the other, and no tile tells. So the differences are summed with the picture's bend as weights: the mean of a pixel's four
-neighbours less that of the eight a knight's move away, minus the Laplacian. All of these are squares of the other colour of a
+neighbors less that of the eight a knight's move away, minus the Laplacian. All of these are squares of the other color of a
 chessboard, so that a pixel's own noise is not in its weight, and given the black pixels the white ones' terms are independent.
-The two colours share noise among them: the mean of their standard errors is beyond a limit only where one of them is.
-Where neighbours share their light even that does not hold, and nothing is asked.
+The two colors share noise among them: the mean of their standard errors is beyond a limit only where one of them is.
+Where neighbors share their light even that does not hold, and nothing is asked.
 """
 
 from collections.abc import Iterator, Sequence

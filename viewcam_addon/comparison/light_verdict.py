@@ -135,7 +135,7 @@ class RadianceComparison:
 
     @property
     def passed(self) -> bool:
-        """True if nothing of what is modelled differs by more than chance and rounding."""
+        """True if nothing of what is modeled differs by more than chance and rounding."""
         return self.answer.passed
 
     @property

@@ -1,7 +1,7 @@
 """Pixels where the two pictures see another surface, and whether the tolerance explains it.
 
 On a silhouette, or on a crease between two faces, the smallest shift of a ray decides what it sees. Whether such a shift is
-within tolerance is proved by re-tracing: rays are sent around the pixel's centre on rings that grow up to the tolerance, and
+within tolerance is proved by re-tracing: rays are sent around the pixel's center on rings that grow up to the tolerance, and
 the pixel is explained by the first ring on which some ray sees what the test picture shows, in every pass.
 
 One thing no exact ray sees: the back of a silhouette. Where a renderer's ray slips through the edge of the front face it
@@ -12,7 +12,7 @@ Where several surfaces lie in one place, which of them a ray meets is rounding's
 object, material, normal and UV, all of the same one. In one place are those as far behind the nearest one as a ray may be off,
 here and there, times the slope of the depth: the lesser one of the two, since where they cross at an angle the rings find it.
 
-Rejected: accepting a pixel when a neighbour shows the test's object. Next to an edge that is so for any error below a pixel.
+Rejected: accepting a pixel when a neighbor shows the test's object. Next to an edge that is so for any error below a pixel.
 """
 
 from collections import Counter
@@ -47,7 +47,7 @@ _DIRECTIONS = 16
 # pixels from its silhouette.
 _RIM = 0.03
 _BATCH = 1_000
-# Pixels whose centres are traced again at a time.
+# Pixels whose centers are traced again at a time.
 _CENTRES = 50_000
 
 
@@ -104,7 +104,7 @@ class Mismatches:
 class SurfaceAgreement:
     """Judges whether the test picture shows the surface that a ray sees, within the tolerance of the last percentile.
 
-    across : (n,) pixels, how far each of the test's positions, projected, lies from the centre of its pixel.
+    across : (n,) pixels, how far each of the test's positions, projected, lies from the center of its pixel.
     slopes : pass name to (n,), how much Normal and UV change per pixel there (tolerances.slopes). renderer : the test's.
     """
 
@@ -215,7 +215,7 @@ def kinds_of(expected: Seen, seen: Seen, agreement: SurfaceAgreement) -> NDArray
 def reach_of(shift: Array) -> Array:
     """(height, width) pixels: how far a ray may be off, from tolerances.ray_shift of the reference (nan where nothing was hit).
 
-    At an edge the ray may belong to either surface, so the largest of the 3 × 3 neighbourhood counts; never the test's figures,
+    At an edge the ray may belong to either surface, so the largest of the 3 × 3 neighborhood counts; never the test's figures,
     which may be the fault that is looked for. Where nothing was hit around, the picture's median.
     """
     around = largest_around(np.nan_to_num(shift, nan=0.0))
@@ -225,7 +225,7 @@ def reach_of(shift: Array) -> Array:
 
 
 def largest_around(values: Array) -> Array:
-    """(height, width): the largest value of each pixel's 3 × 3 neighbourhood."""
+    """(height, width): the largest value of each pixel's 3 × 3 neighborhood."""
     height, width = values.shape
     padded = np.pad(values, 1, mode="edge")
     across = np.maximum(np.maximum(padded[:, :width], padded[:, 1 : width + 1]), padded[:, 2:])
@@ -233,7 +233,7 @@ def largest_around(values: Array) -> Array:
 
 
 def contrast(values: Array) -> Array:
-    """(height, width, channels): the largest difference within each pixel's 3 × 3 neighbourhood."""
+    """(height, width, channels): the largest difference within each pixel's 3 × 3 neighborhood."""
     channels = np.moveaxis(values, -1, 0)
     return np.stack([largest_around(channel) + largest_around(-channel) for channel in channels], axis=-1)
 

@@ -97,7 +97,7 @@ def tile_sums(values: Array, size: int) -> Array:
 
 
 def mean_around(values: Array) -> Array:
-    """(rows, columns, channels): the mean of each 3 × 3 neighbourhood, at the border of what there is of it."""
+    """(rows, columns, channels): the mean of each 3 × 3 neighborhood, at the border of what there is of it."""
     for axis in (0, 1):
         if values.shape[axis] == 1:
             continue

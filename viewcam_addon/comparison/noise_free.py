@@ -1,12 +1,12 @@
 """Light without noise: exact pictures, which may differ by what float32 rounds, and by what lies on the other side of an edge.
 
 A pixel on the edge of a shadow or a silhouette is one or the other, and the smallest shift of a ray decides. Such pixels are
-rare: an edge lies within δ of the centre of a pixel beside it with the probability δ. So as many of them may differ as a shift
+rare: an edge lies within δ of the center of a pixel beside it with the probability δ. So as many of them may differ as a shift
 by the 99th percentile's tolerance would turn. What they show instead is not asked: it need not be what is beside them, for a
 ray that slips through a silhouette meets the dark back of what it should have met. Rarer still are rays that slip through a
 closed surface, so that a pixel amid a shadow is lit.
 
-Rejected: accepting every pixel that shows what a neighbour shows; a picture shifted by a tenth of a pixel would pass.
+Rejected: accepting every pixel that shows what a neighbor shows; a picture shifted by a tenth of a pixel would pass.
 """
 
 import re
@@ -29,7 +29,7 @@ from .tolerances import Array
 # of which 64 pictures by Cycles of 57,600 pixels, each with one lamp, had one.
 _RARELY = 1e-3
 _LEAKS = 1e-6
-# An edge between a pixel and each of its neighbours to the left, right, top and bottom.
+# An edge between a pixel and each of its neighbors to the left, right, top and bottom.
 _SIDES_OF_A_PIXEL = 4
 # Roundings of what can't be rounded at all, such as black: beyond any limit, and a number still.
 _BEYOND_COUNTING = 1e6
@@ -98,7 +98,7 @@ class Rounding:
         if "Object Index" in reference.passes:
             self.belongs = reference["Object Index"][..., 0]
         # What the light on a surface would be if it came from straight above, as far as the picture tells: the largest
-        # Diffuse Direct anywhere, in the surface's colour.
+        # Diffuse Direct anywhere, in the surface's color.
         self._brightest: Array | float = 0.0
         self._tables = tolerances.ALBEDO_TABLES if "albedo tables" in reference.attributes else 0.0
         self._storage = tolerances.NORMAL_STORAGE if _blender_of(test) >= _SHORT_NORMALS else 0.0

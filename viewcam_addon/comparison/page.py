@@ -34,7 +34,7 @@ SWAP = "Point at the picture, tap it, or press the space bar to swap the two."
 
 @dataclass(frozen=True)
 class Legend:
-    """A colour scale below a picture.
+    """A color scale below a picture.
 
     strip : the scale, as a data: URI. figures : numbers along it, from end to end, each after its place, 0 to 1. limits : words
     for what is allowed, after their places. unit : of the numbers.
@@ -138,7 +138,7 @@ def _subject(test: Image) -> str:
 
 
 def logarithmic_legend(low: float, high: float, limits: Mapping[str, float], unit: str) -> Legend:
-    """The colour scale from low to high, whole decades, with a tick for each limit: words → value."""
+    """The color scale from low to high, whole decades, with a tick for each limit: words → value."""
     decades = round(math.log10(high / low))
     figures = tuple((i / decades, low * 10.0**i) for i in range(decades + 1))
     ticks = tuple((math.log10(limit / low) / decades, name) for name, limit in limits.items())
@@ -146,7 +146,7 @@ def logarithmic_legend(low: float, high: float, limits: Mapping[str, float], uni
 
 
 def signed_legend(limit: float, unit: str, allowed: float | None = None) -> Legend:
-    """The signed colour scale, with ticks at what is allowed on both sides."""
+    """The signed color scale, with ticks at what is allowed on both sides."""
     figures = tuple((i / 4, limit * (i - 2) / 2) for i in range(5))
     places = [] if allowed is None else [(1 + sign * allowed / limit) / 2 for sign in (-1, 1)]
     ticks = tuple((place, "allowed") for place in places if 0 <= place <= 1)

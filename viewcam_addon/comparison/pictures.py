@@ -1,10 +1,10 @@
-"""Pixels for the report: shaded passes, errors on a colour scale, PNG data.
+"""Pixels for the report: shaded passes, errors on a color scale, PNG data.
 
 Pictures here are (height, width, 3 or 4) uint8 with rows from the top, as PNG and screens have them, or (height, width)
-levels of the colour scale.
+levels of the color scale.
 
-The colour scale is computed in Oklab rather than copied as a table: lightness rises in even steps, so that equal steps
-of the error look equal, in print and to the colour-blind too.
+The color scale is computed in Oklab rather than copied as a table: lightness rises in even steps, so that equal steps
+of the error look equal, in print and to the color-blind too.
 """
 
 import base64
@@ -22,7 +22,7 @@ Picture = NDArray[np.uint8]
 _WIDEST = 1920
 
 LEVELS = 64
-"""Colours of the scale: steps too fine to see, and a third of the bytes of 256."""
+"""Colors of the scale: steps too fine to see, and a third of the bytes of 256."""
 
 # Oklab to linear sRGB (B. Ottosson, A perceptual color space for image processing, 2020).
 _OKLAB_TO_CONES = np.array(
@@ -85,7 +85,7 @@ def _exposed(colour: NDArray, bright: float) -> NDArray[np.float64]:
 
 
 def on_scale(errors: NDArray[np.float32], low: float, high: float) -> Picture:
-    """Errors as levels of the colour scale, logarithmic from `low` to `high`.
+    """Errors as levels of the color scale, logarithmic from `low` to `high`.
 
     errors : (height, width), rows from the bottom. Of pixels that are reduced to one the largest error shows.
 
@@ -111,7 +111,7 @@ def signed(values: NDArray[np.float32], limit: float) -> Picture:
 
 
 def stain(mismatches: Mismatches, size: tuple[int, int]) -> Picture:
-    """Every mismatch as a coloured pixel, for pictures that have more of them than marks can show: red where unexplained."""
+    """Every mismatch as a colored pixel, for pictures that have more of them than marks can show: red where unexplained."""
     step = _step(size[0])
     picture = np.zeros((-(-size[1] // step), -(-size[0] // step), 4), np.uint8)
     for chosen, colour in ((mismatches.explained, (20, 184, 200, 200)), (~mismatches.explained, (255, 59, 107, 170))):
@@ -155,7 +155,7 @@ def _step(width: int) -> int:
 
 
 def _tints(index: NDArray[np.float32]) -> NDArray[np.float64]:
-    """(height, width, 3) linear: a pale colour for each object index, neighbouring numbers far apart in hue."""
+    """(height, width, 3) linear: a pale color for each object index, neighboring numbers far apart in hue."""
     hue = 2.0 * np.pi * np.modf(index * 0.6180339887)[0] + 0.7
     return _in_gamut(np.full(index.shape, 0.86), np.full(index.shape, 0.055), hue)
 
@@ -182,7 +182,7 @@ def _blurred(values: NDArray[np.float64], radius: int) -> NDArray[np.float64]:
 
 
 def _in_gamut(lightness: NDArray, chroma: NDArray, hue: NDArray) -> NDArray[np.float64]:
-    """Oklch to linear sRGB; where a colour does not exist on screens, its chroma is reduced until it does."""
+    """Oklch to linear sRGB; where a color does not exist on screens, its chroma is reduced until it does."""
     for _ in range(12):
         lab = np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], axis=-1)
         linear = (lab @ _OKLAB_TO_CONES.T) ** 3 @ _CONES_TO_RGB.T

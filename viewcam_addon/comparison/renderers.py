@@ -2,7 +2,7 @@
 
 Cycles writes every pass. EEVEE has a half float for each number of a picture and a depth buffer behind it, and no index; but it
 draws any material in place of the scene's, and this one writes what is asked for in halves that add up to a float
-(blender/rendering/rasters.py). Workbench has no materials: its flat colour of objects holds their index, and its depth
+(blender/rendering/rasters.py). Workbench has no materials: its flat color of objects holds their index, and its depth
 buffer is all that tells where they are. docs/engines.md has what was measured.
 
 An EXR made elsewhere may have less: depth, distance and position each make up for the others where the camera is known. What is
@@ -23,7 +23,7 @@ from . import tolerances
 # EEVEE's passes, of four parts or two: so many steps of each but the last, which is the rest. A half has 11 bits, and each part
 # is less than 2048 of its steps: up to 65,504 units from the origin, to 2⁻²⁴ of a unit.
 PARTS = {"Position": (2.0**5, 2.0**-6, 2.0**-17), "Normal": (2.0**-10,), "Object Index": (2.0**5,)}
-# Workbench's colours: an index as three digits, in steps that half floats hold exactly.
+# Workbench's colors: an index as three digits, in steps that half floats hold exactly.
 DIGITS = 32
 
 NOTE = "Note"
@@ -35,7 +35,7 @@ MARK = "viewcam"
 class Renderer:
     """The deviations of a renderer by design, beside its roundings.
 
-    centre : pixels that its rays are beside the pixels' centres. edges : pixels that its edges are beside the scene's. normal :
+    centre : pixels that its rays are beside the pixels' centers. edges : pixels that its edges are beside the scene's. normal :
     radians that its storage turns a normal by. near : of the depth buffer that its depths come from, world units; or None.
     """
 
@@ -110,7 +110,7 @@ def _decoded(picture: Image, engine: str) -> Image:
 def completed(picture: Image, pinhole: Pinhole) -> Image:
     """The picture with Depth and Position, each made from what there is where it lacks one: from Depth, Distance or Position.
 
-    A Position that is made lies on the ray through its pixel's centre. Nothing was hit where the first of these that is there
+    A Position that is made lies on the ray through its pixel's center. Nothing was hit where the first of these that is there
     has 0 (a Position in all of its coordinates), BACKGROUND_DEPTH and more, or what is infinite; all passes hold there what the
     tracer's do.
     """

@@ -6,7 +6,7 @@ reference brings the variance of its Combined pass along. Of the other passes on
 has none where its Combined has none and is one pass's light alone. A sum of several may never change while they do: where rays
 go on to glass that shines as brightly as the world, light that is direct once is indirect another time.
 
-Cycles divides Diffuse Direct and Diffuse Indirect by the surface's colour, each a mean over the pixel: a quotient of means,
+Cycles divides Diffuse Direct and Diffuse Indirect by the surface's color, each a mean over the pixel: a quotient of means,
 which on edges depends on the number of samples. So their products with Diffuse Color are compared, the light itself.
 """
 
@@ -38,7 +38,7 @@ class Sides:
 
     spread : variance of `test`, which is a mean, from the test pictures' differences; inf where there is one picture only.
     variance : variance of `reference`; inf where it is not known. broken : (height, width) bool, no number on one side or both;
-    there both are 0. shared : variance of `reference` that its pixels may have shared with their neighbours, or 0.
+    there both are 0. shared : variance of `reference` that its pixels may have shared with their neighbors, or 0.
     """
 
     name: str
@@ -86,7 +86,7 @@ def all_sides(reference: Image, tests: Sequence[Image]) -> Iterator[Sides]:
                 f"{reference.size[0]} × {reference.size[1]}: compare pictures of the same size"
             )
     variance = _variance(reference)
-    # Where there are as many samples as a wanted error takes, neighbours' noise is not independent, but adds up to what it was.
+    # Where there are as many samples as a wanted error takes, neighbors' noise is not independent, but adds up to what it was.
     shared = np.where(np.isfinite(variance), variance, 0.0) if "Sample Count" in reference.passes else 0.0
     combined = replace(_sides("Combined", reference, tests, variance), shared=shared)
     yield combined

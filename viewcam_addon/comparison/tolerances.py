@@ -33,7 +33,7 @@ Seen = dict[str, NDArray]
 
 PERCENTILES = (50.0, 90.0, 99.0, 99.9, 100.0)
 
-# Pixels that Cycles' rays are beside the pixels' centres in any case, upwards to the right: its filter table of 512 entries
+# Pixels that Cycles' rays are beside the pixels' centers in any case, upwards to the right: its filter table of 512 entries
 # answers the middle of a pixel with 3.505e-4 of the filter's width to either side, which is 0.01. Small where a picture has
 # hundreds of pixels, and more than all roundings where it has a few.
 FILTER_BIAS = 3.505e-6 * 2**0.5
@@ -47,7 +47,7 @@ ROUNDINGS = (0.7, 1.4, 3.0, 5.0, 20.0)
 
 FLOAT32 = 2.0**-24
 
-# A radiance is the product and quotient of some fourteen rounded figures (strength, colour, 1/π, the square of a distance, a
+# A radiance is the product and quotient of some fourteen rounded figures (strength, color, 1/π, the square of a distance, a
 # normal's length, a cosine, the exposure, the division by the number of samples): as many roundings at most, and about half of
 # them where their signs differ. Counted in units of ROUNDINGS, whose median is below one.
 RADIANCE_ROUNDINGS = 8.0
@@ -186,7 +186,7 @@ def slopes(values: NDArray, belongs: NDArray) -> Array:
 
 
 def at_borders(belongs: NDArray) -> NDArray[np.bool_]:
-    """(height, width): pixels of an object one of whose four neighbours shows another, or nothing, or is beyond the picture.
+    """(height, width): pixels of an object one of whose four neighbors shows another, or nothing, or is beyond the picture.
 
     On that side `slopes` knows nothing, and near its silhouette a round surface turns the faster the nearer it comes.
     """

@@ -98,7 +98,7 @@ class GeometryComparison:
 
     @property
     def passed(self) -> bool:
-        """True if nothing differs of what is modelled. False, too, where there was nothing to compare."""
+        """True if nothing differs of what is modeled. False, too, where there was nothing to compare."""
         return self.answer.passed
 
     @property

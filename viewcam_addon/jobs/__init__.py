@@ -1,7 +1,7 @@
 """Work on one .blend: what is to be rendered and checked, and all that carries it out, with nothing lost on the way.
 
 What is to be done
-    job                   one picture, to be rendered, labelled or checked, and how: the one record of work, to JSON and back
+    job                   one picture, to be rendered, labeled or checked, and how: the one record of work, to JSON and back
     lists                 CSV, JSON and JSON Lines (docs/batch.md) → jobs, by documents, table, rows, problems
     makers                jobs by rule: an orbit, frames, cameras
     names                 what a shot, a job of several, may be called: its name is that of its files
@@ -10,7 +10,7 @@ What is to be done
 
 Doing it, many shots of one file, each with a sidecar
     folder                what stands where, and whether a shot is there already
-    one                   one shot, rendered, labelled, checked and written; what a renderer is
+    one                   one shot, rendered, labeled, checked and written; what a renderer is
     run                   all of them: claimed, rendered, counted, through failures, full disks, signals and other batches
     locks, interruption   shared work; the first signal and the second
     summary, sheet        what it came to, as JSON and as a page of thumbnails

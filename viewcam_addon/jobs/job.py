@@ -51,7 +51,7 @@ def _option(words: str, default: Any = None, **how: Any) -> Any:
 
 @dataclass(frozen=True)
 class Job:
-    """One picture, to be rendered, labelled or checked; immutable and validated.
+    """One picture, to be rendered, labeled or checked; immutable and validated.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Job:
     device : one of DEVICES, what Cycles renders on.
     clay : whether one matte material covers everything, on both sides.
     recenter : whether both sides see the scene with its origin at the eye.
-    strict : whether anything that is not modelled is an error; of a check, anything in the picture.
+    strict : whether anything that is not modeled is an error; of a check, anything in the picture.
     scene : the path of the scene file that the engine must show, in place of what the .blend holds.
 
     None stands for what the .blend or the command line says.

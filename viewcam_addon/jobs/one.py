@@ -1,4 +1,4 @@
-"""One shot: rendered, labelled or checked, and written with its sidecar. And the shots of a batch one after another."""
+"""One shot: rendered, labeled or checked, and written with its sidecar. And the shots of a batch one after another."""
 
 import contextlib
 import time
@@ -90,7 +90,7 @@ def render_one(shot: Job, folder: Folder, renderer: Renderer, settings: str, out
     Raises
     ------
     InputError
-        if the shot can't be rendered, labelled or checked, or the files not be written; FullDiskError if the disk is full.
+        if the shot can't be rendered, labeled or checked, or the files not be written; FullDiskError if the disk is full.
     """
     started = time.monotonic()
     image, preview, sidecar = folder.image(shot.name), folder.preview(shot.name), folder.sidecar(shot.name)

@@ -16,7 +16,7 @@ def shard(items: Sequence[Item], text: str) -> list[Item]:
     """The items of shard "I/N": every N-th from the I-th on, in their order. All N together have each exactly once, and no two
     differ by more than one in number.
 
-    Neighbours go to different shards, since neighbours cost alike. A shard may be empty.
+    Neighbors go to different shards, since neighbors cost alike. A shard may be empty.
 
     Raises
     ------

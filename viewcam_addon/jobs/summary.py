@@ -73,7 +73,7 @@ class Summary:
     @property
     def counts(self) -> dict[str, int]:
         """The numbers of shots: all, done, failed, left, those that were checked, those whose check failed, and those of which
-        it says that not all in the picture is modelled."""
+        it says that not all in the picture is modeled."""
         states = Counter(shot["state"] for shot in self.shots)
         answers = Counter(shot["answer"] for shot in self.shots if "answer" in shot)
         return {

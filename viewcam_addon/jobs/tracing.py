@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from ..tracer.scene import LedgerEntry, Scene
 
 _MOST_SCENES = 4
-"""Kept: a frame, its neighbours, and the one that comes next."""
+"""Kept: a frame, its neighbors, and the one that comes next."""
 
 PAGE = "index.html"
 SIDES = {"test": "test.png", "reference": "reference.png", "everything": "everything.png", "difference": "difference.png"}
-"""The pictures that `Written.sides` has beside the report; one of everything where not all of it is modelled."""
+"""The pictures that `Written.sides` has beside the report; one of everything where not all of it is modeled."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Tracing(child_process.ServerOnDemand):
             made from, in place of the scene's.
         ledger : what is told of the scene.
         written : files beside.
-        everything : Cycles' picture with all that is not modelled, where there is any.
+        everything : Cycles' picture with all that is not modeled, where there is any.
         may_be_empty : whether pictures that show no object are different, and no error.
 
         Returns `passed`, `answer`, `sentence` and `not_modelled` as comparison/answer.py has them; `lines` for a terminal;

@@ -1,10 +1,10 @@
-"""Ground truth of a scene's picture, from exact hits at the pixels' centres.
+"""Ground truth of a scene's picture, from exact hits at the pixels' centers.
 
 surfaces.py: which instance, primitive and point each pixel shows, and what follows from that; motion.py: where those points
 are in another frame; masks.py: run lengths and boxes; coverage.py: shares of pixels; scene_labels.py: all labels of one frame;
 files.py: how they are written; coco.py, bop.py, colmap.py, kitti.py: those of many pictures as a dataset.
 
-A label is what lies at the centre of its pixel: nothing but coverage is averaged over a pixel, and two labels of one pixel are
+A label is what lies at the center of its pixel: nothing but coverage is averaged over a pixel, and two labels of one pixel are
 of the same point. Rejected: labels made of the passes that a renderer writes (float32, indices shared by instances, no
 occlusion).
 """
@@ -27,7 +27,7 @@ PASSES = {
 KINDS = tuple(PASSES)
 
 DEPTH_STEPS = 1000.0
-"""The steps of a 16-bit depth in a scene unit: millimetres, where the unit is a metre."""
+"""The steps of a 16-bit depth in a scene unit: millimeters, where the unit is a meter."""
 
 FILES = {
     "depth.png": "Depth",

@@ -1,12 +1,12 @@
 """A scene of BOP's: cameras, objects' poses, what of them is seen, depth and masks, of many pictures.
 
-    scene_camera.json     K, the pose (cameras/bop.py) and depth_scale, PNG to millimetres
+    scene_camera.json     K, the pose (cameras/bop.py) and depth_scale, PNG to millimeters
     scene_gt.json         of each instance its object's number, R and t from the model to the camera; our instance_id beside
     scene_gt_info.json    its boxes and counts of pixels
     objects.json          what BOP has no place for: which object each number is, and the matrix that makes the model of it
     depth/ mask/ mask_visib/ rgb/
 
-Lengths are millimetres, of a scene whose unit is a metre; (0, 0) is the centre of the first pixel; boxes are [x, y, w, h] with
+Lengths are millimeters, of a scene whose unit is a meter; (0, 0) is the center of the first pixel; boxes are [x, y, w, h] with
 w = greatest − least column, one less than COCO's; all as BOP's toolkit has it. A picture shows no more of a whole object than
 lies within: px_count_all, bbox_obj and visib_fract end there, too.
 
@@ -35,7 +35,7 @@ from . import files, masks
 from .coco import Document, category, found, with_mask
 
 _MILLIMETRES = 1000.0
-"""In a metre."""
+"""In a meter."""
 
 _SAME = 1e-6
 """The tolerance of one object's figures from picture to picture: float32's rounding of a matrix, and a little more."""

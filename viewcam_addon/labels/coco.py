@@ -1,4 +1,4 @@
-"""The labels of many pictures as one file of COCO's: instances (boxes and masks) or panoptic (segments of colour pictures).
+"""The labels of many pictures as one file of COCO's: instances (boxes and masks) or panoptic (segments of color pictures).
 
 Both are plain JSON of what `labels.json` files tell, so that nothing is traced again and a dataset may grow. A category is an
 object's name without Blender's number behind it (Chair of Chair.001).
@@ -105,5 +105,5 @@ def _categories(categories: dict[str, int]) -> list[Document]:
 
 
 def _colour(number: int) -> list[int]:
-    """The color of a category: neighbours far apart, by steps around each channel that share no divisor with 256."""
+    """The color of a category: neighbors far apart, by steps around each channel that share no divisor with 256."""
     return [number * step % 256 for step in (67, 149, 211)]

@@ -1,8 +1,8 @@
 """A COLMAP model with points and their tracks, sampled from the surfaces that many pictures' labels show.
 
-A point is that of a pixel's centre: the eye, and along the ray as far as the label Depth says. Its places in pictures are its
+A point is that of a pixel's center: the eye, and along the ray as far as the label Depth says. Its places in pictures are its
 projections in double precision; what is not exact is whether another picture sees it, since labels know that picture at its
-pixels' centres only. There the point counts as seen if
+pixels' centers only. There the point counts as seen if
 
 - the 4 × 4 pixels around its place show its instance, which stands there as it did where the point comes from: what moves or
   changes its box from picture to picture is no part of one rigid scene, and outlines are left out;
@@ -146,7 +146,7 @@ def _shown(
 ) -> tuple[NDArray[np.intp], Array]:
     """The points that a picture shows, and their places: (n, 2), x to the right and y **down** from the picture's corner."""
     column, row, z = camera.project(sampled.positions)
-    x, y = column - 0.5, camera.height - row - 0.5  # 0 at the first pixel's centre
+    x, y = column - 0.5, camera.height - row - 0.5  # 0 at the first pixel's center
     with np.errstate(invalid="ignore"):
         inside = (x >= 1) & (x < camera.width - 2) & (y >= 1) & (y < camera.height - 2)
     which = np.flatnonzero(inside & (sampled.source != number))

@@ -2,7 +2,7 @@
 
 depth/ is in steps of 1/256 m, 0 where nothing is, beyond 255.99 m, or nearer than half a step. flow_occ/ has 64 u + 2¹⁵,
 64 v + 2¹⁵ and 1 in red, green and blue, pixels to the right and down to the next frame; where nothing is known, or it is beyond
-±512 pixels, all three are 0. flow_noc/ has the same without what is hidden in the next frame. A scene unit is a metre.
+±512 pixels, all three are 0. flow_noc/ has the same without what is hidden in the next frame. A scene unit is a meter.
 
 Source: the devkits' readme.txt of KITTI's stereo, flow and depth benchmarks. Rejected: their numbers as names (000000_10.png),
 since which picture is the next one no label tells.
@@ -20,7 +20,7 @@ from . import files
 from .coco import found
 
 DEPTH_STEPS = 256.0
-"""In a metre."""
+"""In a meter."""
 
 _FLOW_STEPS, _NO_FLOW = 64.0, 2.0**15
 

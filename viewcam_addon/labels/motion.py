@@ -1,7 +1,7 @@
 """The motion of what the pixels show to another frame: optical flow, scene flow, and what is hidden there.
 
 The point is the same of the same primitive: of a triangle by its barycentric coordinates, of a sphere by its direction from the
-centre. So rigid bodies, deforming meshes and moving cameras are one formula, and no flow is interpolated or searched for.
+center. So rigid bodies, deforming meshes and moving cameras are one formula, and no flow is interpolated or searched for.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _SLACK = 1e-9
 class Motion:
     """The motion of each pixel's point from one frame to another; nan where nothing is known. Rows from the bottom.
 
-    flow : (height, width, 2), pixels to the right and **down**: where the point appears there, less the pixel's centre here.
+    flow : (height, width, 2), pixels to the right and **down**: where the point appears there, less the pixel's center here.
     displacement : (height, width, 3), world space. hidden : (height, width), whether the other frame's camera does not see the
     point: something is before it, or it lies beside the picture or beyond the clip. lost : names of objects that are not in the
     other frame, or have another topology there.

@@ -27,7 +27,7 @@ _EDGES = np.array([(corner, corner | side) for corner in range(8) for side in (1
 """The edges of a box, whose corners differ in x by 4, in y by 2, in z by 1: their two ends."""
 
 _MOST_IDS = 2**24 - 1
-"""The largest number that float32 counts to, and three bytes of a colour hold."""
+"""The largest number that float32 counts to, and three bytes of a color hold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class Keepers:
 
 
 class Surfaces:
-    """A scene's surfaces at the pixels' centres, which are traced when they are asked for; rows from the bottom.
+    """A scene's surfaces at the pixels' centers, which are traced when they are asked for; rows from the bottom.
 
     depth : (height, width) planar depth z = −w·(P − e), inf where nothing is. instance, primitive : (height, width), −1 there:
     indices into `instances` and of the geometry's triangles or spheres. passes : those of level `geometry` that were named
@@ -142,7 +142,7 @@ class Surfaces:
         return self._tracer.hits(self._names)
 
     def instances_at(self, place: tuple[float, float]) -> NDArray[np.int64]:
-        """As `instance`, at another place in the pixels than their centres."""
+        """As `instance`, at another place in the pixels than their centers."""
         return self._tracer.hits(place=place)[1]
 
     @property
@@ -277,7 +277,7 @@ class Silhouettes:
         places = np.stack(camera.project(np.concatenate([corners, cut], axis=1))[:2], axis=-1)
         is_seen = np.concatenate([is_beyond, is_cut], axis=1)
         is_known = (np.isfinite(places).all(axis=-1) | ~is_seen).all(axis=1)[:, None]
-        # Half a pixel and more beyond the centres that lie within, for rounding.
+        # Half a pixel and more beyond the centers that lie within, for rounding.
         size = np.array([camera.width, camera.height])
         least = np.where(is_seen[..., None], places, np.inf).min(axis=1)
         most = np.where(is_seen[..., None], places, -np.inf).max(axis=1)

@@ -384,7 +384,7 @@ class CoreScene:
     def silhouette(
         self, camera: Pinhole, clip: tuple[float, float], eye: NDArray, axes: NDArray, window: tuple[int, int, int, int]
     ) -> NDArray[np.bool_]:
-        """True where anything is seen through the pixels' centres of a part of a picture: (height, width), rows from the
+        """True where anything is seen through the pixels' centers of a part of a picture: (height, width), rows from the
         bottom.
 
         eye, axes : (3,) and (3, 3), where the camera's eye and its right, up and forward are in the scene's world, as they may
@@ -451,7 +451,7 @@ class CoreScene:
         self._light = scene
 
     def _add_textures(self, scene: Scene, colours: Iterable[Colour], images: dict[str, int]) -> None:
-        """Add the images that colours show and that are not there yet. images : the numbers of those that are."""
+        """Add the images that colors show and that are not there yet. images : the numbers of those that are."""
         for name in (colour.image for colour in colours):
             if name is None or name in images:
                 continue
@@ -473,7 +473,7 @@ class CoreScene:
         nodes[node] = len(nodes)
 
     def render_geometry(self, passes: Passes, rows: range, stop: Any = None) -> None:
-        """Write the surfaces at the centres of some rows' pixels into those of GEOMETRY_PASSES that are asked for.
+        """Write the surfaces at the centers of some rows' pixels into those of GEOMETRY_PASSES that are asked for.
 
         passes : name → (height, width, channels) float32, of planes: each channel in one piece of memory.
         """
@@ -564,7 +564,7 @@ class CoreScene:
         return found[:, :3], found[:, 3:6], found[:, 6], found[:, 7:10], found[:, 10]
 
     def values(self, rows: NDArray) -> tuple[NDArray, NDArray]:
-        """The values that the last node makes on a floor, z up: n colours or vectors (n, 3), and the numbers (n,) that they
+        """The values that the last node makes on a floor, z up: n colors or vectors (n, 3), and the numbers (n,) that they
         are.
 
         rows : (n, 6), the unit way that a path came along, u, v, and whether the floor is met from behind.
@@ -779,7 +779,7 @@ def _origin(scene: Scene) -> NDArray[np.float64]:
 
 
 def _box(geometry: Mesh | Spheres) -> tuple[NDArray, NDArray]:
-    """Centre and half sides of a box round a geometry, object space."""
+    """Center and half sides of a box round a geometry, object space."""
     if isinstance(geometry, Mesh):
         points, reach = geometry.vertices, 0.0
     else:

@@ -1,6 +1,6 @@
 """Pictures of a scene, at level `geometry` and at the levels of light: what to compute, in tiles over threads.
 
-At level `geometry` a pixel is one ray. At the others it is many paths, and one ray more that tells what is at its centre. The
+At level `geometry` a pixel is one ray. At the others it is many paths, and one ray more that tells what is at its center. The
 core (native.py) computes every pixel alone and sums its samples in order, so that the result is the same, bit for bit, for any
 number of threads.
 """
@@ -29,7 +29,7 @@ BAND = 16
 # The sampler tells no more of them apart (core/samplers/sobol.h).
 MOST_SAMPLES = 2**24
 CENTRES = ("Depth", "Object Index")
-"""The passes that tell what is at the pixels' centres, at the levels of light."""
+"""The passes that tell what is at the pixels' centers, at the levels of light."""
 SLOPES = ("UV Slope", "Normal Slope")
 """The passes that `Tracer.surfaces_at` has beside the passes of level `geometry`."""
 WITHIN = 1e-3
@@ -68,7 +68,7 @@ class Tracer:
         return former
 
     def render(self, watcher: Watcher | None = None, names: Collection[str] = tuple(PASSES)) -> Passes:
-        """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
+        """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centers."""
         passes = self._blank(lambda shape: unwritten(shape, names))
 
         def trace(rows: range, stop: int) -> None:
@@ -161,7 +161,7 @@ class Tracer:
         return depth, objects.view(np.int32).astype(np.int64), primitives.view(np.int32).astype(np.int64), passes
 
     def pixels_of(self, names: Collection[str]) -> dict[str, NDArray[np.bool_]]:
-        """For each of these names that objects have, (height, width): the pixels whose centres show one of them."""
+        """For each of these names that objects have, (height, width): the pixels whose centers show one of them."""
         objects = self._scene.objects
         owners = np.repeat([placed.name for placed in objects], [len(placed.matrices) for placed in objects])
         there = [name for name in names if name in owners]
@@ -271,7 +271,7 @@ def render(
 ) -> Passes:
     """Trace the scene: pass name → (height, width, channels) float32, rows from the bottom.
 
-    level : one of film.LEVELS. samples : of each pixel, at the levels of light; the only one is at its centre.
+    level : one of film.LEVELS. samples : of each pixel, at the levels of light; the only one is at its center.
     seed : another for other noise. error : the standard error that each pixel's Combined may have, scene-linear: the root of
     the mean of its channels' variances. Then pixels get as few samples as that takes, `samples` at most; Sample Count tells.
     keeper : of what this scene may share with others that it has traced, or will.

@@ -677,7 +677,7 @@ def region_of(area):
 
 def test_the_view_of_the_viewport_on_paper(area, scene):
     found = viewport.pinhole_of(area, LIKE, scene)
-    # sqrt(½) in float32, and the quaternion is normalised in float32 again.
+    # sqrt(½) in float32, and the quaternion is normalized in float32 again.
     np.testing.assert_allclose(found.eye, (0, -5, 2), atol=8 * 4 * 2**-24)
     assert found.look_at == (0, 3, 2) and found.up == (0, 0, 1)
     assert (found.width, found.height, found.principal_point) == (1920, 1080, (960, 540))

@@ -57,7 +57,7 @@ class Hand:
         )
 
     def event(self, type, value="PRESS", at=(0, 0)):
-        # Half a pixel of the screen is where the mouse's pixel has its centre.
+        # Half a pixel of the screen is where the mouse's pixel has its center.
         x, y = at[0] / ZOOM + LEFT - 0.5, at[1] / ZOOM + BOTTOM - 0.5
         event = SimpleNamespace(type=type, value=value, mouse_region_x=x, mouse_region_y=y, shift=False, ctrl=False)
         return photo_matching.VIEWCAM_OT_match_photo.modal(self.operator, self.context, event)

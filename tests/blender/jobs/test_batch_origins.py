@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def picture(fresh_blender):
-    """A function that writes a small PNG of one grey."""
+    """A function that writes a small PNG of one gray."""
 
     def write(path, grey):
         image = bpy.data.images.new("grey", 2, 2)

@@ -27,7 +27,7 @@ BALLS = {
     (1, 1, 0): (-0.3, -0.6, 1.2),
     (0, 1, 1): (-0.6, 0.3, -1.1),
 }
-"""Colour → centre. The places are symmetric in nothing, and no ball hides another in any of the views."""
+"""Color → center. The places are symmetric in nothing, and no ball hides another in any of the views."""
 
 SHOTS = [
     {"name": "front", "eye": [0.5, -6, 1], "look_at": [0, 0, 0], "up": [0, 0, 1], "d": 190},
@@ -38,7 +38,7 @@ SHOTS = [
 ]
 CLOSE = 0.1
 """Pixels. A ball of 2 pixels' radius has some 13 pixels on its rim, whose coverage 64 samples tell to 0.06. That moves its
-centre of weight by 2 · √13 · 0.06 / (π 2²) = 0.04 pixels, and twice as much, rounded up, is allowed."""
+center of weight by 2 · √13 · 0.06 / (π 2²) = 0.04 pixels, and twice as much, rounded up, is allowed."""
 
 
 @pytest.fixture
@@ -166,7 +166,7 @@ def look(path):
 
 
 def found(picture):
-    """(n, 2) centres of weight of the balls, in the order of BALLS: column and row, pixel centres at + 0.5."""
+    """(n, 2) centers of weight of the balls, in the order of BALLS: column and row, pixel centers at + 0.5."""
     height, width, _ = picture.shape
     columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     light = picture.max(axis=-1)
@@ -180,7 +180,7 @@ def found(picture):
 
 
 def beside(camera):
-    """(n,) pixels from the image of each ball's centre to the centre of its outline.
+    """(n,) pixels from the image of each ball's center to the center of its outline.
 
     Under the angle θ to the axis a ball of the angular radius α spans tan(θ − α) to tan(θ + α), so that the middle is at
     sin 2θ / (cos 2θ + cos 2α).

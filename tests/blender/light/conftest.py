@@ -25,7 +25,7 @@ class Sides:
 
 @pytest.fixture
 def stage(fresh_blender, scene, camera, add, mesh_from, make_material, set_world):
-    """Suzanne, flat, over a floor, both of random Lambert materials; stage(rng) moves and colours them anew."""
+    """Suzanne, flat, over a floor, both of random Lambert materials; stage(rng) moves and colors them anew."""
     scene.render.resolution_x, scene.render.resolution_y = 64, 48
     camera.data.lens = 35
     set_world((0, 0, 0), 0.0)

@@ -260,7 +260,7 @@ def tables():
 
 @pytest.mark.parametrize("name", ["GGX", "FRESNEL"])
 def test_a_table_that_is_looked_up_a_quarter_of_a_step_beside_is_found(patches, monkeypatch, tmp_path, name):
-    """In a copy of the core, whose table has what lies a quarter of a step further on, as if pixels' centres were its nodes."""
+    """In a copy of the core, whose table has what lies a quarter of a step further on, as if pixels' centers were its nodes."""
     library = Path(native._library()._name)
     right = tables()[name]
     rows = right.reshape(-1, 32 if name == "GGX" else 16)

@@ -136,7 +136,7 @@ def test_emission_is_the_exact_colour(pictures, make_material, scene, exposure):
     for each in pictures(arrange):
         for name in ("Combined", "Emission"):
             ours, theirs = each.traced[name][..., :3], each.cycles[0][name][..., :3]
-            # Cycles' product of colour and strength is rounded once more than ours, that with the exposure too.
+            # Cycles' product of color and strength is rounded once more than ours, that with the exposure too.
             assert np.allclose(ours, theirs, rtol=2.0**-23, atol=0), np.abs(ours - theirs).max()
         assert (each.traced["Emission"] > 0).sum() > 300
 

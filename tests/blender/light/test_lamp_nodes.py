@@ -58,7 +58,7 @@ def ies(lamp, across=(0, 90), up=(0, 20, 45, 60, 90), by=None, path=None):
 
 
 def image(lamp, by=None, times=(1.0, 1.0, 1.0)):
-    """A picture of random colours, smooth."""
+    """A picture of random colors, smooth."""
     tree, emission = emission_of(lamp)
     picture = bpy.data.images.new("Gobo", 8, 8, float_buffer=True)
     picture.colorspace_settings.name = "Non-Color"

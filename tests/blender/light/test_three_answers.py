@@ -1,4 +1,4 @@
-"""A check of files that hold what is not modelled: amber where it is in the picture or lights it, green where it is not."""
+"""A check of files that hold what is not modeled: amber where it is in the picture or lights it, green where it is not."""
 
 import math
 

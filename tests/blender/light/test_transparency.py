@@ -15,7 +15,7 @@ from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
 
-FLOAT32 = 1e-6  # of the light: colours are multiplied in float32, as often as there are panes, and cosines rounded
+FLOAT32 = 1e-6  # of the light: colors are multiplied in float32, as often as there are panes, and cosines rounded
 MOST = 4.0  # standard errors
 PANES = 4
 TINT = (0.9, 0.8, 0.6, 1)
@@ -104,7 +104,7 @@ def test_shadows_of_what_is_transparent(stage, both, scene, is_seen_through):
 
 @pytest.mark.parametrize("below", [DIFFUSE, "ShaderNodeBsdfGlossy"])
 def test_a_pane_is_told_of_the_ray_what_cycles_tells_it(stage, both, scene, below):
-    """Its colour is made of all that Light Path says: of the eye's rays, of those to the sun, and of those from a mirror."""
+    """Its color is made of all that Light Path says: of the eye's rays, of those to the sun, and of those from a mirror."""
     pane = stage(below)
     tree = pane.node_tree
     said = tree.nodes.new("ShaderNodeLightPath")

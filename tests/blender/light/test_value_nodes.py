@@ -20,7 +20,7 @@ from viewcam_addon.tracer import native, render
 from viewcam_addon.tracer.scene.shader_nodes import KINDS
 
 MOST, TYPICAL = 2e-5, 2e-6  # calibrated: float32 of UV up to 2, at images of 4 pixels, and 4.2 has another luminance by 1e-5
-BYTES = 10 if bpy.app.version >= (5, 2) else 1  # calibrated: from 5.1 on Cycles has corners' colours of bytes in half floats
+BYTES = 10 if bpy.app.version >= (5, 2) else 1  # calibrated: from 5.1 on Cycles has corners' colors of bytes in half floats
 GLOW = 25 if bpy.app.version >= (5, 2) else 1  # calibrated: Cycles' red of 5.2 is another by up to 1e-4 than that of 4.2 to 5.0
 JUMPS = 0.04  # of the pixels
 PARTS = 3  # in which the nodes are shown, so that each has pixels enough
@@ -67,7 +67,7 @@ OBJECT = N("TexCoord", output="Object")
 
 
 def two_colours():
-    """Colours that vary over the mesh, one of them beyond 1."""
+    """Colors that vary over the mesh, one of them beyond 1."""
     less = N("Math", {"Value": V, "Value_001": 0.7}, operation="MULTIPLY")
     return tuple(N("CombineColor", {"Red": r, "Green": g, "Blue": b}) for r, g, b in ((U, V, 0.3), (0.4, U, less)))
 
@@ -344,7 +344,7 @@ def check(found):
 
 @pytest.fixture
 def images(fresh_blender):
-    """An image of many colours, and one with an alpha that colours are multiplied by."""
+    """An image of many colors, and one with an alpha that colors are multiplied by."""
     rng = np.random.default_rng(zlib.crc32(b"images"))
     made = []
     for name in ("many", "straight"):

@@ -27,7 +27,7 @@ SAMPLES, SEED = 3, 5
 
 @pytest.fixture
 def lit(scene, monkey, add):
-    """Suzanne above a red floor, under a sun, an area lamp and a grey sky, 64 × 48 pixels, to be rendered by the engine."""
+    """Suzanne above a red floor, under a sun, an area lamp and a gray sky, 64 × 48 pixels, to be rendered by the engine."""
     bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 0, -1))
     for kind, energy in (("SUN", 2.0), ("AREA", 300.0)):
         lamp = bpy.data.lights.new(kind, kind)

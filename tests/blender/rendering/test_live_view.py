@@ -31,7 +31,7 @@ def live(fresh_blender):
 
 @pytest.fixture
 def lit(posed_camera, scene, monkey):
-    """Suzanne under a grey sky, as a viewport of 48 × 32 sees it."""
+    """Suzanne under a gray sky, as a viewport of 48 × 32 sees it."""
     scene.world = bpy.data.worlds.new("Sky")
     scene.render.resolution_x, scene.render.resolution_y = 48, 32
     bpy.context.view_layer.update()

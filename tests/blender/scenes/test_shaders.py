@@ -251,7 +251,7 @@ def test_the_stand_in_of_a_shader_is_read_as_that_shader(diffuse, image, surface
 
 
 def rounded(colour):
-    """A colour, to what float32 holds."""
+    """A color, to what float32 holds."""
     return (
         replace(colour, rgb=tuple(float(np.float32(value)) for value in colour.rgb)) if isinstance(colour, Colour) else colour
     )

@@ -1,4 +1,4 @@
-"""Worlds that are not modelled as they are: the image that another Blender renders of them, and their suns."""
+"""Worlds that are not modeled as they are: the image that another Blender renders of them, and their suns."""
 
 import math
 import subprocess
@@ -48,7 +48,7 @@ def other_blender_fails(request, monkeypatch):
 
 @pytest.fixture
 def tree(set_world):
-    """The nodes of a world, and add(kind, **properties) that adds one; colour(socket) makes that its colour."""
+    """The nodes of a world, and add(kind, **properties) that adds one; colour(socket) makes that its color."""
     nodes = set_world().node_tree
 
     class Tree:
@@ -70,7 +70,7 @@ def tree(set_world):
 
 
 def shifted_direction(tree, coordinate="Generated"):
-    """(x + 2, y + 2, z + 2) of a direction as a colour."""
+    """(x + 2, y + 2, z + 2) of a direction as a color."""
     shift = tree.add("ShaderNodeVectorMath", operation="ADD")
     shift.inputs[1].default_value = (2, 2, 2)
     tree.link(tree.add("ShaderNodeTexCoord").outputs[coordinate], shift.inputs[0])
@@ -137,7 +137,7 @@ def test_the_light_of_a_sun_goes_with_what_is_done_to_the_sky(tree, export):
     tree.background.inputs["Strength"].default_value = 0.25
     sky.sun_size *= 2  # as much light, from a larger disc
     (weaker,) = export()[0].lamps
-    assert np.allclose(weaker.irradiance, np.multiply(sun.irradiance, 0.25), rtol=2e-3)  # colours vary over the disc
+    assert np.allclose(weaker.irradiance, np.multiply(sun.irradiance, 0.25), rtol=2e-3)  # colors vary over the disc
 
 
 def test_links_that_go_in_a_circle_are_none(tree, export):

@@ -64,7 +64,7 @@ def test_a_rectangle_anywhere_gives_what_lambert_says(make_lighting, polygon_irr
 
 @pytest.mark.parametrize(("a", "b", "c"), [(1, 1, 1), (3, 0.5, 0.2), (0.1, 0.2, 5)])
 def test_a_rectangle_over_a_parallel_and_a_perpendicular_surface(make_lighting, off_by, a, b, c):
-    """The form factors of a rectangle a × b from below one of its corners, at the distance c (Howell's catalogue, B-3, B-4)."""
+    """The form factors of a rectangle a × b from below one of its corners, at the distance c (Howell's catalog, B-3, B-4)."""
     x, y = a / c, b / c
     rx, ry = np.hypot(1, x), np.hypot(1, y)
     parallel = (x / rx * np.arctan(y / rx) + y / ry * np.arctan(x / ry)) / 2
@@ -78,7 +78,7 @@ def test_a_rectangle_over_a_parallel_and_a_perpendicular_surface(make_lighting, 
 @pytest.mark.parametrize("radius", [0.02, 0.3, 1.0, 5.0])
 @pytest.mark.parametrize("aside", [0.0, 0.5, 3.0])
 def test_a_disc_over_a_parallel_and_a_perpendicular_surface(make_lighting, off_by, radius, aside):
-    """The form factors of a disc, at the height 1, `aside` from its axis (Howell's catalogue, B-12, B-13)."""
+    """The form factors of a disc, at the height 1, `aside` from its axis (Howell's catalog, B-12, B-13)."""
     lighting = make_lighting(down(1, size=(2 * radius, 2 * radius), ellipse=True))
     z = 1 + aside**2 + radius**2
     root = np.sqrt(z * z - 4 * aside**2 * radius**2)

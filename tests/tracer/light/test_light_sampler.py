@@ -17,7 +17,7 @@ from viewcam_addon.tracer.scene.shader_nodes import node
 
 pytestmark = pytest.mark.slow
 
-# Looks at a square metre of floor, so far off that its pixels are alike; lamps stand beside its view.
+# Looks at a square meter of floor, so far off that its pixels are alike; lamps stand beside its view.
 CAMERA = Pinhole((0, 0, 100), (0, 0, 0), (0, 1, 0), 6400, 64, 64)
 WHITE, MIRROR = Material(diffuse=Colour((1.0, 1.0, 1.0))), Material(mirror=Colour((1.0, 1.0, 1.0)))
 

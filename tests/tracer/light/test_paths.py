@@ -132,11 +132,11 @@ def test_a_smooth_ball_in_a_white_world_loses_what_its_normals_send_into_it(ball
     flat = ball(12)
     flat = render(make_lit(camera, (type(flat)(flat.vertices, flat.triangles, flat.materials), lambert(1))))["Normal"]
     lost = (1 - (seen["Normal"] * flat).sum(axis=-1)) / 2
-    inside = (passes["Diffuse Color"] == 1).all(axis=-1)  # no pixels of the outline; normals there are those of their centres
+    inside = (passes["Diffuse Color"] == 1).all(axis=-1)  # no pixels of the outline; normals there are those of their centers
     off = passes["Combined"][inside][:, 0] - 1 + lost[inside]
     error = np.sqrt(passes["Variance"][inside][:, 0].sum()) / inside.sum()
     assert lost[inside].mean() > 10 * error, "there is something to lose"
-    # The mean of N_s·N_g over a pixel differs from that at its centre by its curvature, here by less than the noise.
+    # The mean of N_s·N_g over a pixel differs from that at its center by its curvature, here by less than the noise.
     assert abs(off.mean()) <= 3 * error, f"{off.mean():.1e}, {off.mean() / error:+.1f} standard errors"
 
 
@@ -200,7 +200,7 @@ def lit_from_above(make_mesh, make_lit, lamp=None, thing=None, samples=64, seed=
 
 
 def facing_rectangle(half_x, half_y, height):
-    """Form factor from a point to a parallel rectangle centred above it: four times that of a quarter, with a corner there
+    """Form factor from a point to a parallel rectangle centered above it: four times that of a quarter, with a corner there
     (Howell, A Catalog of Radiation Configuration Factors, B-3)."""
     x, y = half_x / height, half_y / height
     a, b = np.hypot(1, x), np.hypot(1, y)

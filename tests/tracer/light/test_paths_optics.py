@@ -79,7 +79,7 @@ def test_glass_shares_light_out_by_fresnel(make_mesh, make_lit):
     off = passes["Combined"][..., 0] - (1 + 4 * reflectance)
     error = np.sqrt(passes["Variance"][..., 0].sum()) / off.size
     assert error <= 0.01 * 4 * reflectance.mean(), "the picture tells F"
-    # A sample is not at its pixel's centre, of which the angle is; over the picture that cancels but for F's curvature.
+    # A sample is not at its pixel's center, of which the angle is; over the picture that cancels but for F's curvature.
     assert abs(off.mean()) <= 3 * error, f"{off.mean() / error:+.1f} standard errors"
     assert abs(off.mean() + 4 * reflectance.mean() - 4 * ((1.33 - 1) / (1.33 + 1)) ** 2) > 30 * error, "not F of a steep ray"
 

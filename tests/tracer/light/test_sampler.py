@@ -98,7 +98,7 @@ def test_pixels_are_independent_of_their_neighbours_and_dimensions_of_one_anothe
 
 
 def test_the_error_of_one_pixel_says_nothing_about_that_of_its_neighbours():
-    """Means of 16 samples of a function of the film, over 65,536 pixels: neighbours in a row of 256, and in a column."""
+    """Means of 16 samples of a function of the film, over 65,536 pixels: neighbors in a row of 256, and in a column."""
     x, y = sets(Sampler(8, 16), np.arange(65536), 16, 0, 2)
     errors = (x * 0.7 + y * 0.4 < 0.53).mean(axis=1).reshape(256, 256)
     errors = (errors - errors.mean()) / errors.std()

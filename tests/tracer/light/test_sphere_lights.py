@@ -101,7 +101,7 @@ def test_a_sphere_above_the_horizon_gives_as_much_as_a_point(make_lighting, off_
 
 @pytest.mark.parametrize("angle", [1.2, 1.5, 1.7, 1.9])
 def test_a_sphere_that_is_partly_set_gives_what_is_above_the_horizon(make_lighting, off_by, angle):
-    """The form factor of a sphere that the horizon cuts (Naraghi; Howell's catalogue B-44), ratio 0.6 of radius to distance."""
+    """The form factor of a sphere that the horizon cuts (Naraghi; Howell's catalog B-44), ratio 0.6 of radius to distance."""
     ratio = 1 / 0.6
     root = np.sqrt(ratio**2 - 1)
     cotangent = np.cos(angle) / np.sin(angle)

@@ -58,7 +58,7 @@ def test_a_ramp_of_four_pixels_is_straight_between_their_centres_and_falls_back_
     picture = grey([[0.0, 1.0, 2.0, 3.0]])
     u = np.array([1, 2, 3, 4, 5, 6, 7]) / 8
     np.testing.assert_allclose(looked_up(picture, at(u, 0 * u), False)[1], [0, 0.5, 1, 1.5, 2, 2.5, 3], atol=BLENDED)
-    # From the last centre, 7/8, to the first of the next repetition, 9/8, it falls from 3 to 0.
+    # From the last center, 7/8, to the first of the next repetition, 9/8, it falls from 3 to 0.
     np.testing.assert_allclose(looked_up(picture, at([15 / 16, 1.0, -15 / 16], 0.5), False)[1], [2.25, 1.5, 0.75], atol=BLENDED)
 
 
@@ -123,7 +123,7 @@ def test_each_byte_pair_of_bytes_and_half_float_is_the_number_that_it_stands_for
 
 @given(st.integers(0, 2**24 - 1), st.integers(0, 187))
 def test_whatever_radiances_files_can_say_is_kept_in_four_bytes_and_shown_to_the_bit(colours, exponent):
-    """187: colours up to the most that light can have."""
+    """187: colors up to the most that light can have."""
     written = Picture(np.full((1, 1, 1), colours | exponent << 24, RGBE))
     kept = Picture.compact(np.concatenate([written.values, np.full((1, 1, 3), 2.0**-100, np.float32)]))
     assert kept.pixels.dtype == RGBE
@@ -217,7 +217,7 @@ def test_colours_that_are_not_finite_nowhere_come_from_uv_that_is_not():
 
 
 def shown(*materials, pass_name="Diffuse Color", images=None, uv=None, vertex_colours=None):
-    """(3,) of each material, None being none: what a pass shows at a triangle of it, with one UV and one colour all over."""
+    """(3,) of each material, None being none: what a pass shows at a triangle of it, with one UV and one color all over."""
     triangle = Mesh(
         np.array([[-9.0, -9, 0], [9, -9, 0], [0, 9, 0]]),
         np.array([[0, 1, 2]], np.int32),
@@ -261,7 +261,7 @@ COEFFICIENTS = (0.35875, 0.48829, 0.14128, 0.01168)
 
 
 def density(x):
-    """The Blackman-Harris filter at x, in widths from the centre, −1 to 1; 1 at the centre."""
+    """The Blackman-Harris filter at x, in widths from the center, −1 to 1; 1 at the center."""
     a, b, c, d = COEFFICIENTS
     theta = np.pi * (x + 1.0)
     return a - b * np.cos(theta) + c * np.cos(2 * theta) - d * np.cos(3 * theta)

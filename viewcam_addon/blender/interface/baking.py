@@ -56,7 +56,7 @@ class _Flight:
 class BakedAgreement:
     """A baked camera against the live one.
 
-    at_keys, between : the largest displacement over corners, edges and centre of the picture, at the look-at point's distance,
+    at_keys, between : the largest displacement over corners, edges and center of the picture, at the look-at point's distance,
         in pixels: at the keyframes, and midway between two, at `frame` (nan for a single keyframe).
     ok : whether what is off at the keyframes is no more than the rounding of both cameras.
     """

@@ -48,7 +48,7 @@ class Outcome:
 
     what : of what it was: camera, frame and level. camera : the camera's name. seen : the camera then, None if it was none.
     answer : one of comparison/answer.py's, None where there is none. verdict : one sentence. headline : a few words of it.
-    rows : (label, text) of the figures. lacking : (object, sentence) of what is not modelled as it is.
+    rows : (label, text) of the figures. lacking : (object, sentence) of what is not modeled as it is.
     folder : that of the report. colours : what those of the difference say. scale : their ends, as difference.write has them.
     temporary : what `discard` removes.
     """
@@ -74,7 +74,7 @@ class Outcome:
     def pictures(self) -> dict[str, Path]:
         """The PNGs of Cycles, the tracer and what differs, by these names; empty where one is missing.
 
-        And of everything, where not all of it is modelled: the artist's own picture, of which the others show stand-ins.
+        And of everything, where not all of it is modeled: the artist's own picture, of which the others show stand-ins.
         """
         found = {name: self._there(file) for name, file in _PICTURES.items()}
         everything = self._there(SIDES["everything"])
@@ -273,7 +273,7 @@ def _agreement(result: dict[str, Any]) -> str:
 
 
 def lacking(ledger: Sequence[dict[str, str]]) -> list[tuple[str, str]]:
-    """(object, sentence) of each entry of a ledger that is not modelled as it is."""
+    """(object, sentence) of each entry of a ledger that is not modeled as it is."""
     return [(entry["object"], f"{entry['status']}: {entry['reason']}") for entry in ledger if entry["status"] != "exported"]
 
 

@@ -3,7 +3,7 @@
 It is drawn in Blender's own drawing of the viewport and asks for none itself: whatever moves a camera redraws the viewport as
 it is. Lines are sent to the graphics card once for each camera and each pose (`_batches`), relative to the eye. A viewport that
 looks through the camera shows a small mark at its look-at point instead, and one whose overlays are off shows nothing. Lines
-and letters have a dark halo, with which the same colours read on light and on dark.
+and letters have a dark halo, with which the same colors read on light and on dark.
 
 Rejected: a custom gizmo (gizmos are drawn whole even where a surface hides them, and not with overlays), and mesh or empty
 objects in the scene (they would be in the file, the outliner and the render).
@@ -31,7 +31,7 @@ _LETTER_SIZE = 16  # points
 _LETTER_AT = 1.1  # of the axis, beyond its tip
 _BESIDE = 1.2  # of a letter's size, from the eye or the look-at point to its letter
 _FAINT = 0.35  # of a line's opacity, for the grid
-HALO, _HALO_WIDTH = (0.0, 0.0, 0.0, 0.45), 2.5  # its colour, and by how many pixels it is wider than its line
+HALO, _HALO_WIDTH = (0.0, 0.0, 0.0, 0.45), 2.5  # its color, and by how many pixels it is wider than its line
 _OUTLINE = 6  # what blf.shadow calls so
 _MARK = (4.0, 9.0)  # pixels from the look-at point at which each of the mark's four strokes begins and ends
 

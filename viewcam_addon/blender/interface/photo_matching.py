@@ -123,7 +123,7 @@ class Drawing:
 
 
 def told(match: photo_match.Match, lens: float) -> list[str]:
-    """The lines of the viewport about a match. lens : millimetres."""
+    """The lines of the viewport about a match. lens : millimeters."""
     low, high = match.distance_between
     d = match.pinhole.distance[0]
     share = (high - low) / 2 / d

@@ -1,10 +1,10 @@
 """The image of a comparison, and the Image Editor that shows it: Cycles, the tracer and what differs, side by side or swiped.
 
-Where not all that is in the picture is modelled, both sides show stand-ins and say so, and the artist's own picture is beside
+Where not all that is in the picture is modeled, both sides show stand-ins and say so, and the artist's own picture is beside
 them. Light is as the scene's view transform displays it (rendering/displayed.py), and geometry shaded from its passes.
 
 It is one datablock of its own, packed: a file that is saved while an editor shows it keeps it, and names no folder that ends
-with Blender. Names and the legend of the colours are drawn over it, in the editor's own pixels, and are no part of it.
+with Blender. Names and the legend of the colors are drawn over it, in the editor's own pixels, and are no part of it.
 Rejected: turning an area of the artist's layout into an Image Editor, and `render.view_show`, which makes a Render Result.
 """
 
@@ -62,7 +62,7 @@ def _shown_in(view: str, sides: Collection[str]) -> list[str]:
         return [name for name in _SIDES if name in sides]
     if view == "SWIPE":
         return ["cycles", "tracer"]
-    return [view.lower() if view.lower() in sides else "cycles"]  # where all is modelled, Cycles' picture has everything
+    return [view.lower() if view.lower() in sides else "cycles"]  # where all is modeled, Cycles' picture has everything
 
 
 def labels(view: str, sides: Collection[str]) -> list[str]:
@@ -213,7 +213,7 @@ def _draw_labels() -> None:
 
 
 def _draw_legend(x: float, y: float, scale: float) -> None:
-    """The strip of the difference's colours, with the ends of its scale below."""
+    """The strip of the difference's colors, with the ends of its scale below."""
     told = _shown.scale
     if not told:
         return

@@ -1,8 +1,8 @@
 """The panels of the render engine "Virtual Pinhole Reference", and those of Blender that it shares.
 
-Blender shows a panel to the engines that its class names in COMPAT_ENGINES. Generic panels (output, colour management, camera,
+Blender shows a panel to the engines that its class names in COMPAT_ENGINES. Generic panels (output, color management, camera,
 physics, ...) name BLENDER_RENDER and are shared, as other engines' add-ons do, and so are EEVEE's for the nodes of materials
-and worlds. Where one shows what is not modelled (EEVEE's lamps) or would stand above ours (Simplify), ours takes its place.
+and worlds. Where one shows what is not modeled (EEVEE's lamps) or would stand above ours (Simplify), ours takes its place.
 Rejected: sharing Cycles' own panels, which ask their common base class for its engines and can be had only all together.
 """
 

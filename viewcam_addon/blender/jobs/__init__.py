@@ -2,7 +2,7 @@
 
 renderer.py    opens, overrides settings, renders, checks, labels and exports job after job, and restores everything
 job_settings.py     what of the file's settings a job changes for its time, and why each
-stage.py       a scene as one job's two sides want it: clay, level, recentred, numbered, with its ledger
+stage.py       a scene as one job's two sides want it: clay, level, recentered, numbered, with its ledger
 persistent_data.py     what Blender keeps from job to job, and where it must not
 pictures.py    a render as files: EXR and preview, the same bytes each time
 origins.py     what the pictures are made from: hashes of the .blend and all it links

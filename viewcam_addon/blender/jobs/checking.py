@@ -159,7 +159,7 @@ class Checker:
     def both_sides(self, stage: Stage, job: Job, paths: Sequence[Path], everything: Path | None = None) -> Scene:
         """The scene for the tracer, and the engine's pictures at these paths, from one state of the file.
 
-        everything : as of Stage.render, written where there is any such thing. A recentred scene has none of it.
+        everything : as of Stage.render, written where there is any such thing. A recentered scene has none of it.
         """
 
         def rendering(number: int) -> None:

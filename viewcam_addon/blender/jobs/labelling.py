@@ -20,7 +20,7 @@ from .scene_files import SceneFiles
 from .stage import staged
 
 _FRAMES = 4
-"""Scenes kept: the frame, its neighbours, and the one that comes next."""
+"""Scenes kept: the frame, its neighbors, and the one that comes next."""
 
 
 class ShotLabels:

@@ -1,4 +1,4 @@
-"""The origins of a batch's pictures: the .blend, every file that it links and the colours' configuration, by content, and
+"""The origins of a batch's pictures: the .blend, every file that it links and the colors' configuration, by content, and
 the versions that render it.
 
 Times and places of files say nothing: a farm copies them about. But which file is which counts, so they are in the order of
@@ -46,7 +46,7 @@ _POINT_CACHE = re.compile(r"(.*)_\d+_(\d+)\.bphys")
 
 
 def made_from() -> dict[str, Any]:
-    """Hashes of the open .blend, of what it links and of the colours' configuration, and the versions, as JSON has them.
+    """Hashes of the open .blend, of what it links and of the colors' configuration, and the versions, as JSON has them.
 
     `unknown` is there where something can't be known: a sentence for each (see `unknown`).
 
@@ -293,7 +293,7 @@ def _usd_layers(path: Path) -> list[Path] | None:
 
 
 def _colours() -> tuple[list[Path], Path]:
-    """The files of the colours' configuration that Blender takes, and their folder."""
+    """The files of the colors' configuration that Blender takes, and their folder."""
     chosen = os.environ.get("OCIO")
     config = Path(chosen) if chosen else _own_colours()
     try:

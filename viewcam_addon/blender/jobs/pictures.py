@@ -23,7 +23,7 @@ _PROBE = bytes(2**20)
 
 
 def override_formats(overrides: Overrides, scene: bpy.types.Scene) -> None:
-    """Let `write` choose formats until the overrides end. Both follow the scene's colour management."""
+    """Let `write` choose formats until the overrides end. Both follow the scene's color management."""
     override_whole(overrides, scene.render.image_settings)
     scene.render.image_settings.color_management = "FOLLOW_SCENE"
 

@@ -31,9 +31,9 @@ class Stage:
     ----------
     camera : the one that is seen through.
     is_chosen : whether Blender is told so; else it chooses its own once more, and one that it is not is a difference.
-    level : what is modelled, never "auto".
+    level : what is modeled, never "auto".
     ledger : of what is on this stage.
-    origin, names, told : of the file that a recentred stage stands for, see recentering.py; told is the file's ledger.
+    origin, names, told : of the file that a recentered stage stands for, see recentering.py; told is the file's ledger.
     """
 
     scene: bpy.types.Scene

@@ -1,4 +1,4 @@
-"""Cycles' side of a comparison, in 32 bits: the passes of geometry through each pixel's centre, or those of light.
+"""Cycles' side of a comparison, in 32 bits: the passes of geometry through each pixel's center, or those of light.
 
 The settings are those under which Cycles follows a pinhole best. Its first sample stands in the middle of the pixel but for a
 bias of the filter table, 3e-6 px at the narrowest Blackman-Harris filter; adaptive sampling, denoising and light thresholds
@@ -66,7 +66,7 @@ _LIGHT_OF_SURFACES = {"volume_bounces": 0, "caustics_reflective": True, "caustic
 
 @dataclass(frozen=True)
 class LightSettings:
-    """A picture of light. samples : a pixel, in all; one is the pixel's centre."""
+    """A picture of light. samples : a pixel, in all; one is the pixel's center."""
 
     film: Film
     bounces: Bounces

@@ -48,7 +48,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
     # For a batch: whether the scene, once it is read, serves all pictures until Blender tells of a change. An artist may change
     # what Blender does not tell of.
     keeps_scene = False
-    # Of the last picture: the level at which it was traced, and what is not modelled as it is, one sentence each.
+    # Of the last picture: the level at which it was traced, and what is not modeled as it is, one sentence each.
     level = _GEOMETRY
     warnings: tuple[str, ...] = ()
     _keeper = None
@@ -175,7 +175,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         return scene
 
     def _bands(self, depsgraph: bpy.types.Depsgraph, scene: Scene, level: str) -> Iterator[tuple[Passes, range]]:
-        """Trace the scene: the passes of some rows, and which they are. What is where is that at the pixels' centres."""
+        """Trace the scene: the passes of some rows, and which they are. What is where is that at the pixels' centers."""
 
         def traced(level: str) -> Iterator[tuple[Passes, range]]:
             return tracing.bands(scene, level, settings.samples, settings.seed, threads, self.test_break, self._keeper)

@@ -1,8 +1,8 @@
-"""EEVEE's and Workbench's side of a comparison of geometry: one sample at each pixel's centre, to be read by
+"""EEVEE's and Workbench's side of a comparison of geometry: one sample at each pixel's center, to be read by
 comparison/renderers.py, which says what these engines lack.
 
 EEVEE draws a material of ours in place of all others, which writes position, normal and object index into outputs of its own
-(AOVs). Workbench draws objects flat in their colours, which are their indices, and its depth. Everything is overridden and
+(AOVs). Workbench draws objects flat in their colors, which are their indices, and its depth. Everything is overridden and
 restored. Both need a graphics driver, llvmpipe in software for one.
 """
 
@@ -20,7 +20,7 @@ from . import cycles, graphics
 
 _RENDER = {
     "film_transparent": True,
-    # Of the filter nothing is left, and with one sample no jitter: EEVEE's rays go through the pixels' centres.
+    # Of the filter nothing is left, and with one sample no jitter: EEVEE's rays go through the pixels' centers.
     "filter_size": 0.0,
     "use_high_quality_normals": True,
 }

@@ -44,7 +44,7 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colours: bool = False, at
     """The triangles of an evaluated mesh, object space; of one that `is_split`, once it has been.
 
     slot_count : the object's material slots, which material indices are clamped to. has_colours : whether to bring along the
-    colour attribute that is active for rendering, black where there is none. attributes : those to bring along by name, as in
+    color attribute that is active for rendering, black where there is none. attributes : those to bring along by name, as in
     `Mesh`; of those that the mesh has not, nothing comes.
     """
     mesh.calc_loop_triangles()
@@ -169,7 +169,7 @@ def _corner_uvs(mesh: bpy.types.Mesh, corners: Array) -> Array | None:
 
 
 def _corner_colours(mesh: bpy.types.Mesh, triangles: Array, corners: Array, faces: Array) -> Array:
-    """(triangles, 3, 3) float32, linear: the colours that are active for rendering; black, as in Cycles, where none are."""
+    """(triangles, 3, 3) float32, linear: the colors that are active for rendering; black, as in Cycles, where none are."""
     colours = _corner_values(mesh, cycles_attributes.VERTEX_COLOR, triangles, corners, faces)
     return np.zeros((*corners.shape, 3), np.float32) if colours is None else np.ascontiguousarray(colours[:, :, :3])
 

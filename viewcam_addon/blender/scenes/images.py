@@ -58,7 +58,7 @@ def alpha_obstacle(image: bpy.types.Image) -> str | None:
 
 
 def is_multiplied(image: bpy.types.Image) -> bool:
-    """True if Cycles multiplies an image's colours by its alpha, in bytes."""
+    """True if Cycles multiplies an image's colors by its alpha, in bytes."""
     plain = image.is_float or image.colorspace_settings.is_data
     return image.channels == 4 and image.alpha_mode == "STRAIGHT" and not plain
 
@@ -110,7 +110,7 @@ def _made(overrides: Overrides, picture: Picture, name: str, packed: bool) -> bp
 
 
 def mean(image: bpy.types.Image) -> tuple[float, float, float]:
-    """The mean colour, linear, of an image without an obstacle that is wrapped around the world (equirectangular)."""
+    """The mean color, linear, of an image without an obstacle that is wrapped around the world (equirectangular)."""
     picture = picture_of(image)
     pixels = picture.values.astype(np.float64)
     if picture.srgb:
@@ -128,7 +128,7 @@ def _pixels(image: bpy.types.Image) -> np.ndarray:
 
 
 def _multiplied(pixels: np.ndarray, dtype: type[np.unsignedinteger]) -> np.ndarray:
-    """Colours times their alpha as Cycles does it, in whole numbers. By rows: there may be gigabytes."""
+    """Colors times their alpha as Cycles does it, in whole numbers. By rows: there may be gigabytes."""
     most = np.uint32(np.iinfo(dtype).max)
     multiplied = np.empty((*pixels.shape[:2], 3), dtype)
     for row, to in zip(pixels, multiplied, strict=True):

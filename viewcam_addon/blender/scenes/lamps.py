@@ -1,7 +1,7 @@
 """Blender's lights as the tracer's lamps: a class each.
 
 What the settings mean is Cycles' (light.cpp of intern/cycles/blender and of intern/cycles/scene): a light of the strength s, in
-watts for all but suns, has the radiance s/(π A) if it is normalised, else s/π; a sun the irradiance s, else the radiance s.
+watts for all but suns, has the radiance s/(π A) if it is normalized, else s/π; a sun the irradiance s, else the radiance s.
 The position and the angles are the matrix's, the radius is not scaled with it.
 """
 
@@ -48,7 +48,7 @@ class _Kind:
     def exported(
         self, name: str, light: bpy.types.Light, matrix: np.ndarray, strength: RGB, common: dict[str, Any], ledger: Ledger
     ) -> Lamp | None:
-        """The lamp, or None where there is no light. strength : in watts, or, where it is not normalised, by area."""
+        """The lamp, or None where there is no light. strength : in watts, or, where it is not normalized, by area."""
         if not getattr(light, "normalize", True):
             strength = _times(strength, self.area(light, matrix))
         return self.lamp(name, **self.values(light, matrix, strength), **common)
@@ -63,7 +63,7 @@ class _Kind:
         return tuple(self.settings.values())
 
     def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
-        """The node that makes its UV; None where that is not modelled. inverse : (4, 4), the world's space to the light's."""
+        """The node that makes its UV; None where that is not modeled. inverse : (4, 4), the world's space to the light's."""
         raise NotImplementedError
 
 
@@ -215,7 +215,7 @@ def lamps_in(
 
 
 def _strength(name: str, light: bpy.types.Light, emission: RGB, ledger: Ledger) -> RGB | None:
-    """Energy, colour, exposure and what nodes make of them everywhere, or None where light can have no such."""
+    """Energy, color, exposure and what nodes make of them everywhere, or None where light can have no such."""
     factor = light.energy * 2.0 ** getattr(light, "exposure", 0.0)
     strength = _times(tuple(light.color), factor)
     if getattr(light, "use_temperature", False):

@@ -2,7 +2,7 @@
 
 Level geometry models no material. Most leave the passes of geometry alone; some do not: displacement moves the surface, bump
 and normal maps turn the Normal pass, and where a surface is transparent Cycles writes what lies behind. For the time of a
-comparison such a material gets a second output for Cycles, a diffuse surface of its viewport colour; its own nodes stay as
+comparison such a material gets a second output for Cycles, a diffuse surface of its viewport color; its own nodes stay as
 they are. At the levels of light the same is done to every material that the tracer only approximates, with the components that
 shaders.py has found.
 """
@@ -78,7 +78,7 @@ def make_transparent(overrides: Overrides, material: bpy.types.Material) -> None
 
 
 def make_plain(overrides: Overrides, material: bpy.types.Material) -> None:
-    """Let Cycles see a diffuse surface of the viewport colour until the overrides end."""
+    """Let Cycles see a diffuse surface of the viewport color until the overrides end."""
     stand_in(overrides, material, shaders.in_the_viewport(material))
 
 
@@ -190,7 +190,7 @@ def _want_as_before(node: bpy.types.Node, name: str, value: object, before: floa
 def _colour(
     adder: nodes.Adder, socket: bpy.types.NodeSocket, colour: Colour | Node | tuple[float, ...], reading: shaders.Reading
 ) -> None:
-    """The color of an input: a value, or the product that a colour is."""
+    """The color of an input: a value, or the product that a color is."""
     if isinstance(colour, Node):
         adder.link(_value(adder, colour, reading), socket)
         return

@@ -2,7 +2,7 @@
 
 An input is followed to the node that feeds it: reroutes, muted nodes and node groups are looked through. What nothing feeds
 has a value of its own, and so has what a link feeds that counts for nothing: those that Blender marks as invalid, as where
-links go in a circle or from a shader to a colour, and those from nodes that only EEVEE has.
+links go in a circle or from a shader to a color, and those from nodes that only EEVEE has.
 """
 
 from collections.abc import Iterator

@@ -1,6 +1,6 @@
 """A scene whose origin is a camera's eye, for as long as it is needed: what float32 can't tell apart far from the origin.
 
-At 6.4e6 m, where geocentric coordinates lie, two neighbouring float32 numbers are half a metre apart. Blender keeps matrices
+At 6.4e6 m, where geocentric coordinates lie, two neighboring float32 numbers are half a meter apart. Blender keeps matrices
 and vertices so, and that can't be mended; but Cycles multiplies and subtracts them in float32 too, and loses pixels with it. So
 everything that a render would show is placed anew, in a scene of its own: evaluated geometry is copied, once for each that
 Cycles shares, and the difference to the eye is taken in float64.
@@ -17,7 +17,7 @@ Everything is then verified against the file: each matrix and each vertex that B
 
 Rejected: an Empty at −s as the parent of all that has none. Whatever is computed in world space does not follow it (Child Of
 and Limit constraints, baked particles, rigid bodies, drivers, noise in geometry nodes), maps keep their vertices, and children
-and instances, which the file has rounded to half a metre, come out elsewhere than in the file.
+and instances, which the file has rounded to half a meter, come out elsewhere than in the file.
 """
 
 import contextlib

@@ -5,7 +5,7 @@ change. What makes an input that does not count is not followed. Measured in 4.2
 of 0, or an IOR of 1, a Principled BSDF gives the Diffuse BSDF's pixels to the last bit, whatever its roughness, anisotropy and
 tint, unless a weight or the thin film is not 0.
 
-What is not modelled is left out, and where nothing is left becomes a Lambert surface of its base colour. Then Cycles is shown
+What is not modeled is left out, and where nothing is left becomes a Lambert surface of its base color. Then Cycles is shown
 the same for the time of a comparison (materials.stand_in): an approximation is never a difference between the two sides.
 """
 
@@ -67,7 +67,7 @@ class Shader:
     """A type of the tracer's shader nodes as Blender has it.
 
     kind : the node's type. inputs : ours → theirs. words : ours → the property that has the word.
-    neutral : of inputs that are not modelled, the value without which a shader is only approximated.
+    neutral : of inputs that are not modeled, the value without which a shader is only approximated.
     """
 
     kind: str
@@ -80,7 +80,7 @@ class Shader:
         return "ShaderNode" + self.kind.title().replace("_", "")
 
 
-# Blender's names are ours in its spelling, but for these; and what it has that is not modelled.
+# Blender's names are ours in its spelling, but for these; and what it has that is not modeled.
 _TYPES = {"emission": "EMISSION", "mix": "MIX_SHADER", "add": "ADD_SHADER"}
 _NAMES: dict[str, dict[str, str | int]] = {
     "metallic": {"color": "Base Color"},
@@ -192,14 +192,14 @@ def is_only_bumped(material: bpy.types.Material) -> bool:
 
 
 def in_the_viewport(material: bpy.types.Material) -> Reading:
-    """A Lambert surface of the colour that the material has in Blender's viewport."""
+    """A Lambert surface of the color that the material has in Blender's viewport."""
     return Reading(Material(diffuse=Colour(possible(material.diffuse_color[:3]) or PLAIN.diffuse.rgb)))
 
 
 class Tree:
     """Follows the nodes to a tree of shader nodes, and gathers what they ask for.
 
-    viewport : what stands in for a colour that is not modelled. shines : whether it gives off light.
+    viewport : what stands in for a color that is not modeled. shines : whether it gives off light.
     """
 
     def __init__(self, viewport: Colour, shines: bool = False) -> None:
@@ -249,7 +249,7 @@ class Tree:
         return Node(ours, tuple((given | self._words(source, ours)).items()))
 
     def _shown(self, of: Input) -> Colour | Node:
-        """The emission of a surface whose shader is a colour or a number."""
+        """The emission of a surface whose shader is a color or a number."""
         made = self._value_input(of, None)
         return made if isinstance(made, Colour | Node) else Colour(made) if made and possible(made) else self.viewport
 
@@ -284,7 +284,7 @@ class Tree:
         return Colour(rgb, textured.image, textured.closest, first.vertex or second.vertex)
 
     def _image(self, output: Output) -> Colour:
-        """An image that is a colour alone: laid out by UV, repeated."""
+        """An image that is a color alone: laid out by UV, repeated."""
         node = output.node
         if node.extension != "REPEAT":
             self._reason(output, f"does not repeat ({node.extension.lower()})")
@@ -333,7 +333,7 @@ class Tree:
             self.reading.reasons.append(reason)
 
     def height(self, of: Input) -> Node | None:
-        """The height of a displacement along the normal, or None where it is the same everywhere or not modelled."""
+        """The height of a displacement along the normal, or None where it is the same everywhere or not modeled."""
         source = nodes.source(of)
         if not isinstance(source, Output):
             return None
@@ -379,7 +379,7 @@ class Tree:
         return _node("vector_transform", vector=offset, **{"from": "object", "to": "world"})
 
     def _normal(self, output: Output, name: str, theirs: str) -> dict[str, Node]:
-        """The node that makes a normal, where one does and is modelled."""
+        """The node that makes a normal, where one does and is modeled."""
         of = output.input(theirs)
         source = of and nodes.source(of)
         if isinstance(source, Output) and source.node.type == "BUMP" and _constant(source.input("Height")) is not None:
@@ -399,7 +399,7 @@ class Tree:
         return result
 
     def _input(self, output: Output, name: str | int, otherwise: float | None) -> Colour | Node:
-        """The value of an input. otherwise : the number where that is not modelled, or None of a colour."""
+        """The value of an input. otherwise : the number where that is not modeled, or None of a color."""
         value = None if otherwise is None else constant_number(output, name)
         if value is None:
             source = nodes.source(output.input(name))
@@ -424,7 +424,7 @@ class Tree:
         return Colour((min(max(value, 0.0), most),) * 3)
 
     def _value(self, output: Output) -> Colour | Node | None:
-        """The nodes that make a value; None where a reason says that it is not modelled."""
+        """The nodes that make a value; None where a reason says that it is not modeled."""
         if self._deep == _MOST_DEEP:
             self._reason(output, f"feeds {_MOST_DEEP} others in a row")
             return None
@@ -619,7 +619,7 @@ def _is_zero(output: Output, name: str) -> bool:
 
 
 def _is_vertex_colour(output: Output) -> bool:
-    """True if an output is the mesh's colour that is active for rendering, as `Colour.vertex` is; others are attributes."""
+    """True if an output is the mesh's color that is active for rendering, as `Colour.vertex` is; others are attributes."""
     return output.node.type == "VERTEX_COLOR" and output.socket.name == "Color" and not output.node.layer_name
 
 
@@ -667,7 +667,7 @@ def maps_plainly(node: bpy.types.Node) -> bool:
 
 
 def _rgb(value: object) -> RGB:
-    """A socket's value as a colour."""
+    """A socket's value as a color."""
     return (float(value),) * 3 if isinstance(value, int | float) else tuple(map(float, value[:3]))
 
 
@@ -710,5 +710,5 @@ def _constant(of: Input) -> object:
 
 
 def possible(rgb: RGB) -> RGB | None:
-    """The colour, or None where light can't have it: it is negative, too large or not finite."""
+    """The color, or None where light can't have it: it is negative, too large or not finite."""
     return tuple(rgb) if all(math.isfinite(value) and 0.0 <= value <= LARGEST_RADIANCE for value in rgb) else None

@@ -68,6 +68,6 @@ class Shading:
         return any(self.reading(material).material.shines for material in filter(None, slots))
 
     def asks_for_colours(self, slots: tuple[bpy.types.Material | None, ...]) -> bool:
-        """True if a mesh of these materials is coloured by its colour attribute that is active for rendering."""
+        """True if a mesh of these materials is colored by its color attribute that is active for rendering."""
         materials = [self.reading(material).material for material in filter(None, slots)]
         return any(colour.vertex for material in materials for _, colour in material.inputs)

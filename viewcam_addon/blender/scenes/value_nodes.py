@@ -306,7 +306,7 @@ def word_of(ours: str, word: str) -> str:
 
 
 def value_of(output: Output) -> tuple[str, Value] | None:
-    """Our name and value of an output's node, or None where that is not modelled."""
+    """Our name and value of an output's node, or None where that is not modeled."""
     for ours, value in VALUES:
         is_it = value.kind == output.node.type and output.socket.identifier in value.outputs
         if is_it and all(getattr(output.node, name) == wanted for name, wanted in value.fixed.items()):
@@ -315,7 +315,7 @@ def value_of(output: Output) -> tuple[str, Value] | None:
 
 
 def given_words(output: Output, ours: str, value: Value) -> dict[str, object] | str:
-    """The words and flags of a node; or, where one is not modelled, that clause."""
+    """The words and flags of a node; or, where one is not modeled, that clause."""
     found: dict[str, object] = {name: bool(getattr(output.node, theirs)) for name, theirs in value.flags.items()}
     found |= {name: getattr(output.node, theirs) or value.unnamed for name, theirs in value.names.items()}
     found |= {name: (float(getattr(output.node, theirs)),) * 3 for name, theirs in value.numbers.items()}

@@ -1,4 +1,4 @@
-"""Blender's world as the tracer's: one colour, an equirectangular image, or what stands in for what is not modelled."""
+"""Blender's world as the tracer's: one color, an equirectangular image, or what stands in for what is not modeled."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -32,7 +32,7 @@ def world_of(
     """The tracer's world, and suns that are part of it. What it approximates, Cycles is shown likewise.
 
     scene : evaluated. pictures : receives its images. render : whether it may take the seconds in which another Blender renders
-    what is not modelled; without, what is returned stands for that.
+    what is not modeled; without, what is returned stands for that.
     """
     if world is None:
         return World(), ()
@@ -73,7 +73,7 @@ def world_of(
 def _rendered(
     scene: bpy.types.Scene, world: bpy.types.World, reasons: list[str], ledger: Ledger, render: bool
 ) -> world_image.Rendered | None:
-    """The image that stands in for a world that is not modelled, or None where a constant one must."""
+    """The image that stands in for a world that is not modeled, or None where a constant one must."""
     obstacle = world_image.obstacle(world)
     result = None
     if obstacle is None:

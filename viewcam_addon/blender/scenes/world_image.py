@@ -1,4 +1,4 @@
-"""A world that is not modelled as it is, as an image that Cycles itself makes of it, and its suns as lamps.
+"""A world that is not modeled as it is, as an image that Cycles itself makes of it, and its suns as lamps.
 
 Another Blender renders it (panorama.py), so that nothing here changes, whatever is going on: an export runs while Blender
 renders. Both sides of a comparison are then shown the image and the lamps.

@@ -186,7 +186,7 @@ class Scene:
     camera : the camera to trace. For a scene from Blender, as read back from Blender's float32 matrix and lens.
     stated_camera : the camera as the four values state it, or None where nobody stated one.
     clip : nearest and farthest planar depth z = −w·(P − e) that is visible.
-    origin : the point of the world from which all coordinates of the scene are counted: (0, 0, 0), or that of a recentred
+    origin : the point of the world from which all coordinates of the scene are counted: (0, 0, 0), or that of a recentered
         export.
     images : what `Colour.image` names.
     cycles : the version of Blender whose Cycles' materials are meant.

@@ -1,6 +1,6 @@
-"""Colours and images, as data: what the inputs of materials are given.
+"""Colors and images, as data: what the inputs of materials are given.
 
-Colours are linear, in the scene's own primaries; nobody here knows which.
+Colors are linear, in the scene's own primaries; nobody here knows which.
 """
 
 from dataclasses import dataclass
@@ -33,12 +33,12 @@ _ROWS = 1 << 20  # numbers that are looked at together: larger arrays would not 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """An image that colours surfaces, laid out over UV (0, 0) to (1, 1) and repeated beyond.
+    """An image that colors surfaces, laid out over UV (0, 0) to (1, 1) and repeated beyond.
 
     pixels : (height, width, 3), or 4 with an alpha, rows from the bottom; floats, half floats, or whole numbers of one byte or
         two, which are shares of 255 or 65535; anything else becomes float32. Encoded as sRGB where `srgb` is true, else linear.
         Or (height, width, 1) of `RGBE`, as Radiance's files have it: from the lowest a byte of red, green, blue and exponent;
-        a colour is its byte times 2^(exponent − 136).
+        a color is its byte times 2^(exponent − 136).
         Between pixels the encoded values are interpolated, as Cycles does; with an alpha, after they are multiplied by it.
         Linear ones are not multiplied. The tracer reads them where they are: don't write to them.
     """
@@ -129,7 +129,7 @@ def _ends(pixels: NDArray) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Colour:
-    """A colour, the same everywhere or times what an image or the mesh's own colours say.
+    """A color, the same everywhere or times what an image or the mesh's own colors say.
 
     rgb : factors, not negative. image : key in `Scene.images`, looked up at the mesh's UV, or None. closest : the nearest pixel
     of the image instead of a linear interpolation between four. vertex : times the mesh's `corner_colours`.

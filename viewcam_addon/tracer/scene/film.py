@@ -9,7 +9,7 @@ from . import values
 FILTERS = ("BOX", "BLACKMAN_HARRIS", "GAUSSIAN")
 
 LEVELS = ("geometry", "direct", "path")
-"""How much is modelled, the least first."""
+"""How much is modeled, the least first."""
 
 SAMPLES = 64
 """Samples a pixel, at the levels of light, where nobody says how many."""
@@ -24,7 +24,7 @@ def seeds(level: str, samples: int) -> int:
     """In how many pictures of Cycles its samples are shared out, each with another seed, so that they tell their noise.
 
     Eight have a spread that tells it within a third or so, and cost little beside their samples. A picture of a single sample
-    would be that of the pixels' centres, as that of geometry is.
+    would be that of the pixels' centers, as that of geometry is.
     """
     return 1 if level == LEVELS[0] else max(min(_SEEDS, samples // 2), 1)
 

@@ -1,6 +1,6 @@
 """Lamps and the world, as data. What they do to a surface stands in core/lights/lamps.h.
 
-All quantities are what Cycles makes of Blender's settings, colour, strength, exposure and temperature multiplied out: for each
+All quantities are what Cycles makes of Blender's settings, color, strength, exposure and temperature multiplied out: for each
 of red, green and blue the irradiance of a sun on what faces it, and the power P of any other lamp. One with the area A has the
 radiance P/(π A), to one side if it is flat, and a sphere's area is 4π R²; one of no size has the irradiance P/(4π r²). Scaling
 the object scales an area lamp, shapes the cone of a spot, and does not change a radius.

@@ -190,7 +190,7 @@ def _node_input(field: Field, default: object, of_value: bool, deep: int) -> Any
 
 
 def _colour(field: Field) -> Colour:
-    """Three numbers, or an object where an image or the mesh's own colours come in."""
+    """Three numbers, or an object where an image or the mesh's own colors come in."""
     is_varied = isinstance(field.value, dict)
     keys = field.fields((), ("rgb", "image", "closest", "vertex")) if is_varied else {"rgb": field}
     try:

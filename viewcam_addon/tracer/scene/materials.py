@@ -1,7 +1,7 @@
 """The materials of surfaces, as data.
 
 A material is either a tree of shader nodes (shader_nodes.py) or, for what a hand writes most, a sum of components without any
-roughness, each with a colour: Lambert's diffuse reflection, emission, a perfect mirror, clear glass and clear refraction.
+roughness, each with a color: Lambert's diffuse reflection, emission, a perfect mirror, clear glass and clear refraction.
 """
 
 from collections.abc import Iterator
@@ -23,8 +23,8 @@ class Material:
     """The components that a surface's light is the sum of; None is no such component. Or `surface`, and no component.
 
     diffuse : albedo of a Lambert surface, both of its sides. emission : radiance, of both sides. mirror : reflectance of a
-    perfect mirror. glass : colour of what is reflected and refracted by a clear dielectric, shared out by Fresnel's equations.
-    refraction : colour of what is refracted, nothing being reflected. ior : of glass and refraction, inside over outside.
+    perfect mirror. glass : color of what is reflected and refracted by a clear dielectric, shared out by Fresnel's equations.
+    refraction : color of what is refracted, nothing being reflected. ior : of glass and refraction, inside over outside.
     surface : the shader that is in their place. transparent_shadow : whether shadow rays go through it where it is transparent.
     displacement : a node that makes a height, world units, whose slope turns the normals; nothing moves.
     """
@@ -54,7 +54,7 @@ class Material:
 
     @property
     def colours(self) -> dict[str, Colour]:
-        """Component → its colour, without those that are None or black."""
+        """Component → its color, without those that are None or black."""
         found = {field.name: getattr(self, field.name) for field in fields(self) if field.type in (Colour, Colour | None)}
         return {name: colour for name, colour in found.items() if colour is not None and not colour.is_black}
 
@@ -79,7 +79,7 @@ class Material:
 
     @property
     def inputs(self) -> tuple[tuple[str, Colour], ...]:
-        """The inputs of all colours and numbers, each with its name in sentences."""
+        """The inputs of all colors and numbers, each with its name in sentences."""
         found = [("displacement", colour) for colour in self.displacement.colours] if self.displacement else []
         if self.surface is None:
             return (*self.colours.items(), *found)

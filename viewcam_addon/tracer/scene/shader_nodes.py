@@ -1,4 +1,4 @@
-"""Shader nodes, as data: a tree of closures, mixed and added, whose inputs are numbers, colours, images or value nodes.
+"""Shader nodes, as data: a tree of closures, mixed and added, whose inputs are numbers, colors, images or value nodes.
 
 The names and defaults are those of Blender's nodes, in small letters; what they compute is Cycles', in the version that the
 scene names (`Scene.cycles`), and stands in core/closures. A tree, since a shader that feeds two others is simply there twice.
@@ -26,7 +26,7 @@ DISTRIBUTIONS = ("multiscatter_ggx", "ggx", "beckmann")
 class Kind:
     """The inputs of a type of node.
 
-    inputs : name → its default; a number, a colour, words to choose from (the first is the default), or None for a shader; of a
+    inputs : name → its default; a number, a color, words to choose from (the first is the default), or None for a shader; of a
     node that makes values also what value_nodes.py says.
     is_value : whether it makes a value, and is no shader.
     scatters : the kinds of bounces (film.Bounces) that its light is counted as.
@@ -120,7 +120,7 @@ class Node:
 
     type : one of `KINDS`. inputs : (name, value) of those that are not what they are by default. Of a shader a `Colour`, a
     word, or a `Node`: a shader where one belongs, else one that makes values. Of that also whether something holds, and in
-    place of constant colours three numbers, which may be negative.
+    place of constant colors three numbers, which may be negative.
     """
 
     type: str
@@ -187,7 +187,7 @@ class Node:
 
     @property
     def colours(self) -> Iterator[Colour]:
-        """All images and colours of the mesh that a value is made from."""
+        """All images and colors of the mesh that a value is made from."""
         for _, value in self.inputs:
             if isinstance(value, Colour):
                 yield value

@@ -1,7 +1,7 @@
-"""Nodes that make the numbers, colours and vectors that shaders' inputs are given, as data.
+"""Nodes that make the numbers, colors and vectors that shaders' inputs are given, as data.
 
 The names and defaults are those of Blender's nodes, in small letters; what they compute stands in core/nodes. An input that
-takes a number takes a colour's luminance, and a vector's mean.
+takes a number takes a color's luminance, and a vector's mean.
 """
 
 from collections.abc import Callable, Iterator, Mapping

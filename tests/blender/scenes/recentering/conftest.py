@@ -18,7 +18,7 @@ from viewcam_addon.tracer.scene import Mesh
 
 @pytest.fixture
 def look(scene, camera_object):
-    """A function that states the camera some metres beside a place, in float64, looking at it."""
+    """A function that states the camera some meters beside a place, in float64, looking at it."""
     scene.render.resolution_x, scene.render.resolution_y = 160, 120
 
     def state(place, **options):
@@ -123,7 +123,7 @@ def check_moved():
 
 @pytest.fixture
 def check(both_sides):
-    """A function that fails unless both sides, recentred, are one picture of the file's scene; it returns them."""
+    """A function that fails unless both sides, recentered, are one picture of the file's scene; it returns them."""
 
     def compare(**request):
         plain = jobs.export(Job(**request))

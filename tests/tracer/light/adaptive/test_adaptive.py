@@ -143,7 +143,7 @@ def assert_nothing_slips(scene, seeds=3):
 @pytest.mark.exhaustive
 @pytest.mark.parametrize("thickness", [0.03, 0.01, 0.003])
 def test_a_wire_far_thinner_than_a_pixel(with_things, make_mesh, thickness):
-    """A pixel is 0.08 wide there: the thinnest wire covers a 27th of it, and no ray through a centre need meet it."""
+    """A pixel is 0.08 wide there: the thinnest wire covers a 27th of it, and no ray through a center need meet it."""
     passes = assert_nothing_slips(with_things(wire(make_mesh, (-2.03, 0, 0.61), (2.02, 0.4, 1.17), thickness)))
     assert (passes["Sample Count"].max(axis=0)[10:-10] > 1).all(), "the wire crosses these columns"
 
