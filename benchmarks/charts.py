@@ -145,7 +145,7 @@ def _stated(record: Chart | Curve, fields: Sequence[dataclasses.Field[Any]]) -> 
 
 
 def _plain(value: Any) -> Any:
-    """As JSON has it; None where a number is not finite."""
+    """The value as JSON has it; None where a number is not finite."""
     if isinstance(value, str | bool | None) or value is dataclasses.MISSING:
         return value
     if isinstance(value, Iterable):

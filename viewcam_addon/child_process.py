@@ -121,7 +121,7 @@ class ProcessGroup:
         return self._first.poll()
 
     def wait(self, seconds: float | None = None) -> None:
-        """Until the first process has ended, or so many seconds."""
+        """Wait until the first process has ended, or so many seconds."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._first.wait(seconds)
 

@@ -29,7 +29,7 @@ class Events(Protocol):
 
 
 class Sentences:
-    """On standard error, what goes wrong, a sentence each; nothing else."""
+    """Sentences on standard error: one for all that goes wrong; nothing else."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -89,7 +89,7 @@ class Bar(Sentences):
 
 
 class JsonLines:
-    """On standard output, each event as an object on a line of its own: `event`, `time` (UTC), its fields. Errors as ever."""
+    """Events on standard output, each an object on a line of its own: `event`, `time` (UTC), its fields. Errors as ever."""
 
     def __init__(self, stream: TextIO, errors: Sentences) -> None:
         self._stream, self._errors = stream, errors

@@ -110,7 +110,7 @@ class _Runner:
         return (reports / (name if self._runs == 1 else f"{name}-{self._runs}")).absolute()
 
     def _record(self, report: Option, check: "Check") -> None:
-        """As pytest's record_property does. Of several checks in one test the second and later ones are numbered."""
+        """Record a check as pytest's record_property does. In a test of several the second and later ones are numbered."""
         from . import junit
 
         prefix = "viewcam" if self._runs == 1 else f"viewcam-{self._runs}"

@@ -83,6 +83,6 @@ def _screen(colour: Array) -> Array:
 
 
 def without_the_tracers_own(picture: Image) -> Image:
-    """As another renderer's file has it."""
+    """The picture as another renderer's file has it."""
     own = ("Magnitude", "Facing", "Variance")
     return replace(picture, passes={name: values for name, values in picture.passes.items() if name not in own})

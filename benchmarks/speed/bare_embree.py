@@ -11,7 +11,7 @@ from ..guard import Yardstick
 
 
 def prepare(scene_path: Path, samples: int) -> dict[str, race.Runner]:
-    """Through the pixels' centers; or, of so many samples a pixel, the eye's rays and those to the first lamp, a sun."""
+    """Runners: through the pixels' centers; or, of so many samples a pixel, the eye's and those to the first lamp, a sun."""
     scene = scene_file.read(scene_path)
     yardstick = Yardstick(scene)
     if not samples:

@@ -78,7 +78,7 @@ def prepare(scene_path: Path, folder: Path, variant: str, threads: int) -> dict[
 
 
 def fresh(folder: Path, variant: str, threads: int) -> race.Runner:
-    """From a fresh process to the EXR."""
+    """A runner from a fresh process to the EXR."""
 
     def runner(sampling: str, parameter: float, seed: int, path: Path) -> float:
         theirs = path.with_name("mitsuba.exr")

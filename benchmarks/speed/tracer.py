@@ -41,7 +41,7 @@ def prepare(scene_path: Path, level: str, threads: int) -> dict[str, race.Runner
 
 
 def fresh(scene_path: Path, level: str, threads: int) -> race.Runner:
-    """From a fresh process to the EXR, as the shell does it. The first one leaves bytecode, which an installed package has."""
+    """A runner from a fresh process to the EXR, as in a shell. The first leaves bytecode, which an installed package has."""
     bytecode = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(scene_path.with_name("bytecode"))}
     modules = {"PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, sys.path)])}
 

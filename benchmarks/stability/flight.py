@@ -123,7 +123,7 @@ def _largest_turns(misses: Array, within: float | None) -> list[float]:
 
 
 def _turns(u: Array, v: Array, w: Array) -> Array:
-    """By how much each picture is turned about the view from the one before, radians; all (n, 3), (n − 1,) is returned."""
+    """The turn of each picture about the view from the one before, radians; all (n, 3), (n − 1,) is returned."""
     middle = w[:-1] + w[1:]
     across = 2 * np.einsum("ij,ij->i", middle, u[:-1]) / np.einsum("ij,ij->i", middle, middle)
     carried = u[:-1] - across[:, None] * middle

@@ -72,7 +72,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
 
 
 def _poses(angles: Array, trials: int, up: Array | None) -> list[tuple[Array, Array, Array, list]]:
-    """For each angle e, l and up, (n, 3), and the true axes of each pose, in many digits. up : any direction if None."""
+    """Poses of each angle: e, l and up, (n, 3), and the true axes of each, in many digits. up : any direction if None."""
     random = np.random.default_rng(1)
     poses = []
     for angle in angles:

@@ -204,7 +204,7 @@ def _is_uniform(scale: Array) -> bool:
 
 
 def ancestors(block: bpy.types.Object) -> Iterator[bpy.types.Object]:
-    """Its parent, the parent's parent, and so on."""
+    """The ancestors of an object: its parent, the parent's parent, and so on."""
     while block := block.parent:
         yield block
 

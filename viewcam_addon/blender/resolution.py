@@ -29,7 +29,7 @@ is_paused = False
 
 @contextlib.contextmanager
 def lens_kept(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[None]:
-    """For a picture of another size within the block: no camera follows it, and this one's values go with its lens."""
+    """Allow a picture of another size within the block: no camera follows it, and this one's values go with its lens."""
     global is_paused
     values, was_paused = storage.load(camera_object), is_paused
     is_paused = True

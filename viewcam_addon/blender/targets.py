@@ -250,7 +250,7 @@ def _loop(camera_object: bpy.types.Object, point: str) -> list[bpy.types.Object]
 
 
 def _chain(target: bpy.types.Object, camera_object: bpy.types.Object, is_shape: bool = False) -> list[bpy.types.Object]:
-    """From the target to the camera, each moved, or the first deformed, by the next; empty where the camera has no part in it.
+    """Objects from the target to the camera, each moved, or the first deformed, by the next; empty without the camera in it.
 
     Originals.
     """

@@ -125,7 +125,7 @@ class Lens:
         return np.stack([moved_x + self.skew * moved_y, moved_y], axis=-1)
 
     def _inverse_polynomial(self, points: np.ndarray) -> np.ndarray:
-        """By Newton's method, from the points themselves; NaN where it finds none, or one beyond where the lens folds."""
+        """The inverse by Newton's method, from the points themselves; NaN without one, or with one beyond the lens's fold."""
         found, size = points.copy(), 1 + np.abs(points).max(axis=-1)
         for _ in range(_STEPS):
             off = self._polynomial(found) - points

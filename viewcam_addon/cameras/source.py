@@ -55,7 +55,7 @@ class Source:
 
     @property
     def name(self) -> str:
-        """As a sentence calls it."""
+        """The name that a sentence calls it by."""
         return str(self.path) if self.path else "the text"
 
     @cached_property

@@ -73,7 +73,7 @@ class Systematic:
 
 
 def conversion_error(stated: Pinhole, read_back: Pinhole, depths: Array) -> ConversionError:
-    """By how much the read-back camera shows what the stated camera sees elsewhere.
+    """The distance at which the read-back camera shows what the stated camera sees elsewhere.
 
     depths : the planar depths to look at, world units; the nearest shows a displaced eye most.
     """

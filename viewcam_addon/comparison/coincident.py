@@ -114,7 +114,7 @@ class TakenOut:
         return tuple(dict.fromkeys((*self.in_one_place, *self.seen_otherwise)))
 
     def to_json(self) -> dict:
-        """As InOnePlace of geometry, and the names of what not all kinds of rays see."""
+        """The figures of InOnePlace of geometry, and the names of what not all kinds of rays see."""
         return {
             "pixels": self.count,
             "share": float(self.pixels.mean()),

@@ -137,7 +137,7 @@ def over_pixels(tiles: NDArray, shape: tuple[int, int], size: int) -> NDArray:
 
 
 def _statistics(sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: float) -> Iterator[tuple[int, Array, Array]]:
-    """For each size: (size, errors, what is allowed)."""
+    """Tests by size: (size, errors, what is allowed)."""
     difference = sides.difference
     errors, both = _pixel_errors(sides, allowed.most[..., None] + _FILTER_CONTRAST * contrast(sides.reference), freedom)
     yield PIXELS, errors, noise.student_critical(both, noise.sidak(level, errors.size))

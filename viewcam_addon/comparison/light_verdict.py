@@ -187,7 +187,7 @@ def _without(comparison: RadianceComparison) -> str:
 
 
 def samples_text(comparison: RadianceComparison) -> str:
-    """At how many samples: 1,024 samples; or 1,024 and 512 samples."""
+    """The numbers of samples: 1,024 samples; or 1,024 and 512 samples."""
     reference, test = comparison.samples
     if reference is None or test is None:
         return "unknown samples"
@@ -215,7 +215,7 @@ def change_text(reference: float, test: float) -> str:
 
 
 def differs_text(test: HypothesisTest) -> str:
-    """By how much, at the worst place: 4.1 % darker; or softer, along contours."""
+    """The difference at the worst place: 4.1 % darker; or softer, along contours."""
     if test.size == CONTOURS:
         return "sharper" if test.worst.errors > 0.0 else "softer"
     return change_text(test.worst.reference, test.worst.test)

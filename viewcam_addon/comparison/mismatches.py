@@ -77,7 +77,7 @@ class Mismatches:
         return int((~self.explained).sum())
 
     def counts(self) -> dict[str, tuple[int, int]]:
-        """For each kind: (how many, how many of them explained)."""
+        """Each kind → (number, number of them that are explained)."""
         return {
             kind: (int((self.kinds == i).sum()), int((self.explained & (self.kinds == i)).sum()))
             for i, kind in enumerate(KINDS)

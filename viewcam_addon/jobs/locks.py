@@ -111,6 +111,6 @@ class Claims:
 
 
 def _byte(shot: str) -> int:
-    """Its place in the file, which may lie far behind the file's end."""
+    """The place of a shot's lock in the file, which may lie far behind the file's end."""
     digest = hashlib.sha256(names.one_file(shot).encode("utf-8")).digest()
     return _FIRST_SHOT + int.from_bytes(digest[:7], "big")  # below 2⁶³, where the kernel counts to

@@ -95,7 +95,7 @@ class Summary:
         return 1 if counts["checks_failed"] else 0
 
     def to_json(self) -> dict[str, Any]:
-        """As summary.json has it. All that differs between a run and one that was interrupted and continued is `timing`."""
+        """The content of summary.json. Only `timing` differs between a run and one that was interrupted and continued."""
         return {
             "exit_status": self.exit_status,
             "counts": self.counts,

@@ -76,12 +76,12 @@ def render(scene: dict[str, Any], folder: str, shot: dict[str, Any], settings: s
 
 
 def dask_setup(_worker: object) -> None:
-    """As a worker of ours starts (it is preloaded): Ctrl-C, which the terminal sends to all, is answered by the batch alone."""
+    """Start a worker of ours (it is preloaded): Ctrl-C, which the terminal sends to all, is answered by the batch alone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def dask_teardown(_worker: object) -> None:
-    """As a worker of ours ends."""
+    """End a worker of ours."""
     _blender.close()
 
 

@@ -16,7 +16,7 @@ Document = dict[str, Any]
 
 
 def instances(folder: Path, amodal: bool = False) -> Document:
-    """As instances_train2017.json is made. amodal : masks and boxes of whole objects in place of what is visible of them.
+    """COCO's instances, as in instances_train2017.json. amodal : masks and boxes of whole objects, not of what is visible.
 
     folder : of label files; `file_name` is the picture's that they belong to. Raises InputError as `found` does.
     """
@@ -39,7 +39,7 @@ def instances(folder: Path, amodal: bool = False) -> Document:
 
 
 def panoptic(folder: Path) -> Document:
-    """As panoptic_train2017.json is made, of the instances.png beside each label file. Raises InputError as `found` does."""
+    """COCO's panoptic segments, of the instances.png beside each label file. Raises InputError as `found` does."""
     pictures, categories = found(folder)
     annotations = []
     for number, (path, told) in enumerate(pictures, start=1):

@@ -45,7 +45,7 @@ _EVENLY = 0.7548776662466927, 0.5698402909980532
 
 
 class _Sampled(NamedTuple):
-    """Points, each array with as many rows. source : which picture they come from. depth : there. state : of `_States`."""
+    """Points, each array with as many rows. source : which picture they come from. depth : there. state : as of `_planes`."""
 
     positions: Array
     source: NDArray[np.intp]

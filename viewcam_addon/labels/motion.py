@@ -35,7 +35,7 @@ class Motion:
 
 
 def motion(here: Surfaces, there: Surfaces) -> Motion:
-    """From one frame to another, of the same size.
+    """The motion from one frame to another, of the same size.
 
     Raises
     ------

@@ -142,7 +142,7 @@ class Surfaces:
         return self._tracer.hits(self._names)
 
     def instances_at(self, place: tuple[float, float]) -> NDArray[np.int64]:
-        """As `instance`, at another place in the pixels than their centers."""
+        """The instances seen through another place in the pixels than their centers."""
         return self._tracer.hits(place=place)[1]
 
     @property

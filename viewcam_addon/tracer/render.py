@@ -161,7 +161,7 @@ class Tracer:
         return depth, objects.view(np.int32).astype(np.int64), primitives.view(np.int32).astype(np.int64), passes
 
     def pixels_of(self, names: Collection[str]) -> dict[str, NDArray[np.bool_]]:
-        """For each of these names that objects have, (height, width): the pixels whose centers show one of them."""
+        """Each of these names that objects have → (height, width), the pixels whose centers show one of them."""
         objects = self._scene.objects
         owners = np.repeat([placed.name for placed in objects], [len(placed.matrices) for placed in objects])
         there = [name for name in names if name in owners]

@@ -1,6 +1,6 @@
 """Datasets end to end: small shining balls are found in a batch's pictures where its transforms.json and COLMAP text say.
 
-The readers here are written from those formats' own pages and share nothing with viewcam_addon.datasets.
+The readers here are written from those formats' own pages and share nothing with viewcam_addon.cameras.
 """
 
 import json

@@ -83,7 +83,7 @@ class Background:
             self._forget()
 
     def cancel(self) -> None:
-        """By a button."""
+        """End it, as a button does."""
         self.end(forget=False)
         self._looked(None)
 

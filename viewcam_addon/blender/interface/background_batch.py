@@ -84,11 +84,11 @@ class BackgroundBatch:
         return min(len(list(self.folder.glob(self._files))), self.count)
 
     def wait(self) -> None:
-        """Until it has ended."""
+        """Wait until it has ended."""
         self._process.wait()
 
     def ended(self) -> tuple[int, str] | None:
-        """With which status, and what to say of one that is not 0; None while it runs."""
+        """The status with which it ended, and a sentence if that is not 0; None while it runs."""
         status = self._process.status()
         if status is None:
             return None

@@ -163,7 +163,7 @@ class RunningComparison:
         return time.monotonic() - self._started
 
     def wait(self) -> None:
-        """Until there is something to poll."""
+        """Wait until there is something to poll."""
         self._process.wait()
 
     def poll(self) -> Outcome | None:

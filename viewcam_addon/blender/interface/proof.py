@@ -129,7 +129,7 @@ class VIEWCAM_OT_compare_with_cycles(StartsForCamera, bpy.types.Operator):
         self._leave(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """For scripts: wait for it."""
+        """Compare and wait for the answer, as scripts want it."""
         if not self._begins(context):
             return {"CANCELLED"}
         return self._tells(background.wait(), context)

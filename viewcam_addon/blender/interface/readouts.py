@@ -69,7 +69,7 @@ def certain_up(stated: Pinhole) -> Triple:
 
 
 def vector(numbers: Triple) -> str:
-    """As one writes it: (1, 0, 0), (0.70711, -0.70711, 0)."""
+    """A vector as one writes it: (1, 0, 0), (0.70711, -0.70711, 0)."""
     return f"({', '.join(f'{round(number, 5) + 0.0:g}' for number in numbers)})"
 
 

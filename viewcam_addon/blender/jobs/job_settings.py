@@ -104,7 +104,7 @@ class JobSettings:
         self._set_threads(shot.threads)
 
     def _set_threads(self, threads: int | None) -> None:
-        """As many as a job asks for, those of the file where None. Of automatic ones the file's number reads as another."""
+        """Set as many as a job asks for, the file's where None. Of automatic ones the file's number reads as another."""
         render = self._scene.render
         if threads is None:
             render.threads_mode = self._threads_mode_of_file

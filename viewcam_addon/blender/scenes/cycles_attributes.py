@@ -28,7 +28,7 @@ def hashed(*words: ArrayLike) -> NDArray[np.uint32]:
 
 
 def unit_number(bits: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """From 0 to 1, as Cycles makes it of 32 bits."""
+    """Numbers from 0 to 1, as Cycles makes them of 32 bits."""
     return bits.astype(np.float32) * np.float32(2.0**-32)
 
 

@@ -34,7 +34,7 @@ class Shading:
 
     @property
     def materials(self) -> dict[str, Material]:
-        """As in `Scene`, all that were asked for."""
+        """The materials that were asked for, as in `Scene`."""
         return {name: reading.material for name, reading in self._readings.items()}
 
     def pictures(self) -> dict[str, Picture]:

@@ -225,7 +225,7 @@ def _wrapped(source: Output | Input) -> _Wrapped | None:
 
 
 def _rotation(vector: Output | Input) -> tuple[float, float, float] | None:
-    """By what angles directions are turned, or None where more is done to them."""
+    """The angles by which directions are turned, or None where more is done to them."""
     if not isinstance(vector, Output):
         return 0.0, 0.0, 0.0
     if vector.node.type == "TEX_COORD":

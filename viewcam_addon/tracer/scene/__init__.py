@@ -2,7 +2,7 @@
 light.
 
 A geometry is stored once, in its object's space, and placed by any number of objects. Nothing here knows files (scene_file.py)
-or rays (visibility.py, surface.py); the classes hold arrays and check their shapes. Materials, images, lamps, world, film and
+or rays (native.py, core); the classes hold arrays and check their shapes. Materials, images, lamps, world, film and
 bounces matter from level `direct` on; a scene of level `geometry` leaves them out.
 """
 

@@ -109,7 +109,7 @@ def _mirrored(angles: NDArray, values: NDArray, about: float) -> tuple[NDArray, 
 
 
 def _around(angles: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
-    """From −90° or 0° to 90°, as from 0° to 180°."""
+    """Angles from −90° or 0° to 90°, as from 0° to 180°."""
     if abs(angles[0]) < _CLOSE:
         angles, values = np.concatenate([-angles[:0:-1], angles]), np.concatenate([values[:0:-1], values])
     return angles + 90.0, values

@@ -130,7 +130,7 @@ class Lamp:
 
     @property
     def strength(self) -> tuple[float, float, float]:
-        """Its power, or a sun's irradiance."""
+        """The power, or a sun's irradiance."""
         return list(self._own.values())[1]
 
     @property
@@ -262,7 +262,7 @@ class World:
 
     @property
     def images(self) -> tuple[str, ...]:
-        """Its image, and that of its backdrop, where they have one."""
+        """The image, and that of its backdrop, where they have one."""
         return tuple(each.image for each in (self, self.backdrop) if each and each.image is not None)
 
     @property

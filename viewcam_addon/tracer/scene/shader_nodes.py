@@ -196,7 +196,7 @@ class Node:
 
     @property
     def all(self) -> Iterator["Node"]:
-        """It, and all that feed it."""
+        """The node, and all that feed it."""
         yield self
         for name in KINDS[self.type].inputs:
             if isinstance(value := self[name], Node):
