@@ -106,7 +106,14 @@ def test_what_is_not_modelled_is_named_with_its_share_and_fails_under_strict(tmp
         told = json.loads((tmp_path / "a.json").read_text())
         assert (told["exit_status"], told["answer"], told["passed"]) == (status, "same_but", True)
         seen = (image.read(picture)["Object Index"] == 3).mean()
-        assert told["not_modelled"] == {"count": 1, "names": ["Ball"], "share": seen, "shown": seen}
+        assert told["not_modelled"] == {
+            "count": 1,
+            "names": ["Ball"],
+            "in_one_place": [],
+            "seen_otherwise": [],
+            "share": seen,
+            "shown": seen,
+        }
         assert f"but for 1 object that is not modelled (Ball; {100 * seen:.2g} % of the picture)" in capfd.readouterr().out
         page = (tmp_path / "report" / "index.html").read_text(encoding="utf-8")
         assert 'class="same_but"' in page and "but for 1 object that is not modelled" in page

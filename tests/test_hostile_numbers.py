@@ -196,7 +196,7 @@ def what_a_camera_says(source):
     answer(camera.cropped, source.number(), source.number(), source.choice(WHOLES), 48)
 
 
-@attacks("pinhole.Pinhole.of_poses")
+@attacks("pinhole.Pinhole.of_poses", "pinhole.make_views")
 def many_poses(source):
     """Refused where one of them is, and else what they are one by one; but that in an array True is 1, as for NumPy."""
     plane, draw = some_camera(source).plane, source.choice((source.number, source.finite))
@@ -205,6 +205,9 @@ def many_poses(source):
     made = answer(Pinhole.of_poses, *zip(*poses, strict=True), [plane, plane])
     alone = [answer(Pinhole, *pose, plane.distance, plane.width, plane.height, plane.principal_point) for pose in poses]
     assert (made is REFUSED) if REFUSED in alone else (made == alone), (made, alone)
+    if all(isinstance(x, float) for x in numbers):
+        valid = pinhole.make_views(*np.array(poses).swapaxes(0, 1))
+        assert valid.tolist() == [camera is not REFUSED for camera in alone], poses
 
 
 @attacks("pinhole.Pinhole.ray_directions", "pinhole.Pinhole.view_plane", "pinhole.Pinhole.project", "pinhole.basis")

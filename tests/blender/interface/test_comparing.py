@@ -193,7 +193,8 @@ def test_light_is_compared_with_as_many_samples_as_said(seen, add_lamp):
     assert outcome.what == "Camera, frame 1, direct" and "Light, to Tracer's" in dict(outcome.rows)
     assert "Orange where Cycles is brighter" in outcome.colours
     assert set(outcome.pictures) == {"cycles", "tracer", "difference"}, "all of it is modelled"
-    assert "--samples 4 --clay" in outcome.report.read_text()
+    page = outcome.report.read_text(encoding="utf-8")
+    assert "--samples 4" in page and "--clay" in page
     assert len(list(outcome.folder.glob("cycles-*.exr"))) == 2
 
 
