@@ -423,7 +423,8 @@ def test_a_farm_by_tls_as_the_page_says(stand_in, blend, tmp_path, processes):
         )
         assert processes.until(lambda: re.search(r"Scheduler at:\s+(tls://\S+)", said.read_text())), said.read_text()
         address = re.search(r"Scheduler at:\s+(tls://\S+)", said.read_text())[1]
-        start("worker.txt", "worker", address, "--nthreads", "1", "--no-dashboard")
+        worker = start("worker.txt", "worker", address, "--nthreads", "1", "--no-dashboard")
+        assert processes.until(lambda: "Registered to:" in worker.read_text()), worker.read_text()
         own = dask.config.merge(dask.config.config, yaml.safe_load(settings))
         with dask.config.set(own), cluster.opened(address, None) as machines:
             assert run_on(machines, blend, tmp_path / "out", shots("a", "b")).exit_status == 0
