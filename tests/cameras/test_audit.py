@@ -483,7 +483,7 @@ def test_what_is_wrong_with_a_lens_is_named_and_nothing_where_it_is_right(true):
 
 @pytest.mark.parametrize("k1", [-0.25, -0.05, 0.15])
 def test_a_lens_that_was_left_out_is_named_with_its_coefficient(k1):
-    """Of a positive one the pictures were undistorted twice, or have a pincushion's lens."""
+    """A positive one says that pictures were undistorted twice, or have a pincushion's lens."""
     named = 0
     for seed in range(20):
         random = np.random.default_rng(seed)

@@ -108,7 +108,7 @@ def test_a_check_of_the_studio_has_linux_verdict(viewcam, blender, level, tmp_pa
 
 @pytest.mark.parametrize("blender", BLENDERS)
 def test_the_studio_s_reference_labels_and_datasets_have_linux_bytes(viewcam, blender, tmp_path):
-    """Of one scene: Blender for Windows itself computes some coordinates and normals with other last bits."""
+    """Both read one scene file: Blender for Windows itself computes some coordinates and normals with other last bits."""
     scene = tmp_path / "scene.json"
     viewcam("windows", blender, "export", STUDIO, scene)
     for system in ("linux", "windows"):
@@ -123,7 +123,7 @@ def test_the_studio_s_reference_labels_and_datasets_have_linux_bytes(viewcam, bl
 
 
 def test_none_of_fifty_processes_crashes_in_two_to_eight_threads(run_emulated, sample_scenes, hashes_here):
-    """What a loader places amiss for threads, it places amiss in some processes only."""
+    """A loader places a thread's storage amiss in some processes only."""
     (cornell,) = (path for path in sample_scenes if path.stem == "cornell")
     expected = {name: value for name, value in hashes_here.items() if name.startswith(("cornell ", "function "))}
     for run in range(50):
@@ -149,7 +149,7 @@ print("KILLED", batch.wait())
 def test_a_batch_that_was_killed_and_is_finished_by_two_workers_has_linux_pictures_labels_and_datasets(
     run_emulated, viewcam, blender, tmp_path
 ):
-    """Of the Cornell box, whose geometry Blender computes nothing of."""
+    """The Cornell box is taken, since Blender computes nothing of its geometry."""
     reference = ["--engine", "VIEWCAM", "--level", "path", "--samples", "4", "--labels", "all", "--transforms", "exr"]
     batch = ["batch", CORNELL, "--orbit", "6", "--size", "96x54", *reference, "--check", "--out"]
     linux, windows = tmp_path / "linux", tmp_path / "windows"

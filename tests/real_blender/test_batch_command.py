@@ -128,7 +128,7 @@ def channels(path):
 @pytest.mark.parametrize("engine", ["CYCLES", "VIEWCAM"])
 @pytest.mark.parametrize("name", ["flight", "studio"])
 def test_frames_of_a_batch_are_those_of_f(real_blender, tmp_path, name, engine):
-    """Of a camera that moves by its keyed values (flight), and of one that stands (studio)."""
+    """One camera moves by its keyed values (flight), one stands (studio)."""
     blend, frames = tmp_path / "small.blend", (3, 40)
     script = SMALL.format(engine=engine, blend=str(blend))
     check(real_blender.run("-b", f"{SCENES}/{name}.blend", "--python-exit-code", "9", "--python-expr", script))

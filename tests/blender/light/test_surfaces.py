@@ -240,7 +240,7 @@ ODD_TREES = {
 
 @pytest.mark.parametrize("odd", ODD_TREES)
 def test_what_cycles_makes_of_odd_nodes(pictures, floor, odd):
-    """Of what it can't use, nothing; of a color in place of a shader, light."""
+    """Nothing of what it can't use; light of a color in place of a shader."""
     how, kind, output = ODD_TREES[odd]
     tree, shader = floor.node_tree, floor.node_tree.nodes["Shader"]
     node = tree.nodes.new(kind)

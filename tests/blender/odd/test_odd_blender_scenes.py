@@ -776,7 +776,7 @@ def test_a_camera_that_is_copied_or_appended_brings_its_target_along(aimed_camer
 
 @pytest.mark.parametrize("names", [("Camera", "Target"), ("Camera",)], ids=str)
 def test_a_linked_camera_follows_its_linked_target(aimed_camera, carried_over, odd, names):
-    """Of which Blender links the datablock too where only the camera is asked for, and shows it in no scene."""
+    """Blender links the target's datablock too where only the camera is asked for, and shows it in no scene."""
     odd.check(carried_over("link", *names))
 
 
@@ -1043,7 +1043,7 @@ def test_an_override_of_the_object_alone_loses_its_lens_when_the_file_is_opened_
 
 @pytest.mark.parametrize("system", [False, True])
 def test_an_override_of_object_and_data_sticks(library, odd, system):
-    """Whether the override may be edited in the window (system: it may not)."""
+    """An override that may be edited in the window, and one of the system, which may not."""
     camera_object = show(library("objects")).override_create(remap_local_usages=True)
     camera_object.data.override_create(remap_local_usages=True)
     camera_object.override_library.is_system_override = camera_object.data.override_library.is_system_override = system
