@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
@@ -60,7 +60,7 @@ class Summary:
     """A batch at its end.
 
     rendered : how many shots this run rendered; kept : were there already; elsewhere : another batch did meanwhile.
-    seconds : it took. signal : the number of the one that ended it.
+    seconds : it took. signal : the number of the one that ended it. finished : the time of its end.
     """
 
     shots: tuple[Mapping[str, Any], ...]
@@ -69,6 +69,7 @@ class Summary:
     elsewhere: int
     seconds: float
     signal: int | None = None
+    finished: datetime = field(default_factory=lambda: datetime.now(UTC))
 
     @property
     def counts(self) -> dict[str, int]:
@@ -101,7 +102,7 @@ class Summary:
             "counts": self.counts,
             "timing": {
                 "seconds": round(self.seconds, 3),
-                "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+                "finished": self.finished.isoformat(timespec="seconds"),
                 "rendered": self.rendered,
                 "kept": self.kept,
                 "elsewhere": self.elsewhere,
