@@ -28,6 +28,8 @@ SCENE = {
     "objects": [{"name": "Ball", "geometry": "ball", "object_index": 3}],
 }
 
+posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such pipes, devices, limits and closed streams")
+
 
 def fails(capfd, *arguments, status=2):
     """Run viewcam; it must fail with one line on stderr, which is returned."""
@@ -256,6 +258,7 @@ def viewcam(*words, **options):
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, **options)
 
 
+@posix
 def test_a_picture_that_can_not_grow_leaves_nothing_behind(tmp_path):
     """As on a full disk, where nobody may mount one: the tracer's and, where Blender is there, Cycles'."""
     jobs = [("render", write_scene(tmp_path))]
@@ -281,6 +284,7 @@ def test_lines_that_nobody_reads_change_no_status_and_the_picture_is_there(tmp_p
 
 
 @pytest.mark.parametrize("closed", [(1,), (2,), (0, 1, 2)], ids=["output", "errors", "all"])
+@posix
 def test_a_command_whose_standard_streams_are_closed_does_the_same(tmp_path, closed):
     done = viewcam("render", write_scene(tmp_path), tmp_path / "picture.exr", preexec_fn=lambda: [os.close(n) for n in closed])
     assert (done.returncode, done.stderr) == (0, "")
@@ -290,6 +294,7 @@ def test_a_command_whose_standard_streams_are_closed_does_the_same(tmp_path, clo
     )
 
 
+@posix
 def test_ctrl_c_while_modules_are_imported_ends_the_process_without_a_traceback(tmp_path):
     (tmp_path / "numpy.py").write_text("import signal, time\nsignal.raise_signal(signal.SIGINT)\ntime.sleep(60)")
     paths = os.pathsep.join([str(tmp_path), str(Path(__file__).parent.parent)])
@@ -314,6 +319,7 @@ RENDER_AND_LIST = '"$1" -m viewcam_addon render "$2" "$3/picture.exr"; status=$?
 @pytest.mark.parametrize(
     ("options", "reason"), [("size=8k", "space"), ("ro", "Read-only")], ids=["a full disk", "a read-only folder"]
 )
+@posix
 def test_where_nothing_can_be_written_one_line_says_so_and_nothing_is_left(tmp_path, options, reason):
     scene, disk = write_scene(tmp_path), tmp_path / "disk"
     disk.mkdir()
@@ -373,6 +379,7 @@ def test_an_empty_name_is_not_taken_for_the_current_folder(tmp_path, capfd, monk
     assert not list(tmp_path.iterdir())
 
 
+@posix
 def test_the_result_goes_to_standard_output_by_its_name_and_devices_stay(tmp_path):
     """As root, --json /dev/null once left a file in its place."""
     scene = write_scene(tmp_path)
@@ -399,6 +406,7 @@ def test_the_result_goes_to_standard_output_by_its_name_and_devices_stay(tmp_pat
     ],
 )
 @pytest.mark.timeout(120)
+@posix
 def test_a_pipe_in_place_of_a_file_is_refused_and_not_waited_for(tmp_path, monkeypatch, capfd, words):
     """A pipe that nobody writes to kept its reader for ever."""
     monkeypatch.chdir(tmp_path)
@@ -412,6 +420,7 @@ def test_a_pipe_in_place_of_a_file_is_refused_and_not_waited_for(tmp_path, monke
     assert len(errors.splitlines()) == 1
 
 
+@posix
 def test_a_pipe_in_place_of_a_sidecar_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "shot.json")
     assert Folder(tmp_path).finished("shot", "hash") is None

@@ -105,7 +105,7 @@ def test_ctrl_c_ends_both_with_its_own_status(run, tmp_path):
     assert child.communicate()[1] == "" and child.returncode == 130
 
 
-@pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["kill", "terminal"])
+@pytest.mark.parametrize("send", [os.kill, getattr(os, "killpg", None)], ids=["kill", "terminal"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_to_a_batch_counts_once_whether_one_process_has_it_or_both(run, tmp_path, send, number):
     child = run(WAIT, "batch", "file.blend", "--orbit", "2", "--out", "out", "--log-json")
