@@ -87,7 +87,7 @@ SCENES = {
     "flight": "240x135",
     "cornell": "180x180",
 }
-"""What each is compared at: a quarter of its width and height."""
+"""The size that each is compared at: a quarter of its width and height."""
 LARGEST_FILE = 300_000  # bytes
 FLOAT32 = 2.0**-24  # relative rounding of what Blender stores
 
