@@ -90,10 +90,11 @@ class TileSampler {
         return places;
     }
 
-    // Takes samples begin … end of some pixels, in groups that fill a block with a few samples of each.
+    // Takes samples begin … end of some pixels, in groups that fill a block with some samples of each: the closer together the rays of a
+    // block lie, the fewer boxes and triangles it meets. With 16 of a pixel and not 4 a picture takes 0.8 to 0.9 of the time.
     void sample(Tile& tile, const std::vector<uint16_t>& places, uint32_t begin, uint32_t end, uint32_t batch,
                 const volatile int* stop) const {
-        size_t size = PathIntegrator::MOST / std::min(end - begin, 4u);
+        size_t size = PathIntegrator::MOST / std::min(end - begin, 16u);
         for (size_t i = 0; i < places.size(); i += size)
             sample_group(tile, &places[i], uint32_t(std::min(size, places.size() - i)), begin, end, batch, stop);
     }
@@ -120,7 +121,7 @@ class TileSampler {
             }
             camera_.rays(columns, rows, count, samples.rays);
             integrator_.trace(samples, count, light);
-            for (int i = 0; i < count; i++) tile.pixels[group[uint32_t(i) / (last - first)]].add(light[i], film_, batch);
+            for (uint32_t k = 0; k < size; k++) tile.pixels[group[k]].add(light + k * (last - first), last - first, film_, batch);
         }
     }
 
