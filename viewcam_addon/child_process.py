@@ -14,8 +14,8 @@ which a process that is stopped or stuck does not give.
 Rejected: ending a child alone (`viewcam check` has children itself, which would trace on for minutes after it; and a signal
 that the child could answer by ending them Blender does not let Python hear while it renders); standard input and output for
 requests, into which Blender and libraries print; a socket with a name and a key, which waits for ever for a process that dies
-before it calls; pickle, which runs what it is sent; files that appear, watched; on Windows, taskkill, which misses whoever has lost
-its parent.
+before it calls; pickle, which runs what it is sent; files that appear, watched; on Windows, taskkill, which misses whoever has
+lost its parent.
 """
 
 import contextlib
