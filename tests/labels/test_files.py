@@ -22,6 +22,7 @@ ENDINGS = [
     "labels.exr",
     "depth.png",
     "instances.png",
+    "mask.png",
     "forward.flo",
     "forward_hidden.png",
     "backward.flo",

@@ -1,6 +1,7 @@
 """`viewcam labels`: the labels of many pictures as a dataset: one file, or a folder."""
 
 import argparse
+import functools
 import json
 
 from .. import argument_types as types
@@ -19,6 +20,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     added.add_argument("--to", choices=["coco", "panoptic", "colmap", "bop", "kitti"], default="coco", help=words)
     added.add_argument("--amodal", action="store_true", help="whole objects, in place of what is visible of them")
     words = "for COLMAP: points that are sampled in each picture (default: 1000)"
+    added.add_argument("--overwrite", action="store_true", help="replace a folder of the same format, and nothing else")
     added.add_argument("--points", type=types.positive, metavar="N", help=words)
 
 
@@ -28,11 +30,12 @@ def run(options: argparse.Namespace) -> Result:
     if options.points and options.to != "colmap":
         raise InputError("--points are those of a COLMAP model: add --to colmap, or leave it out")
     if options.to == "colmap":
-        counts = colmap.write(options.folder, options.output, options.points or colmap.POINTS)
+        counts = colmap.write(options.folder, options.output, options.points or colmap.POINTS, options.overwrite)
     elif options.to == "bop":
-        counts = bop.write(options.folder, options.output, lambda share: options.events.tell("progress", share=share))
+        progress = functools.partial(options.events.tell, "progress")
+        counts = bop.write(options.folder, options.output, lambda share: progress(share=share), options.overwrite)
     elif options.to == "kitti":
-        counts = kitti.write(options.folder, options.output)
+        counts = kitti.write(options.folder, options.output, options.overwrite)
     else:
         document = coco.panoptic(options.folder) if options.to == "panoptic" else coco.instances(options.folder, options.amodal)
         with written_whole(options.output) as temporary:

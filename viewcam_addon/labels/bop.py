@@ -36,6 +36,9 @@ from ..png import encoded
 from . import files, masks
 from .coco import Document, category, found, with_mask
 
+_SCENE = ("scene_camera", "scene_gt", "scene_gt_info")
+_FILES = ("depth", "mask", "mask_visib", "objects.json", *(f"{name}.json" for name in _SCENE))
+
 _MILLIMETRES = 1000.0
 """In a meter."""
 
@@ -43,11 +46,14 @@ _SAME = 1e-6
 """The tolerance of one object's figures from picture to picture: float32's rounding of a matrix, and a little more."""
 
 
-def write(folder: Path, output: Path, progress: Callable[[float], None] = lambda share: None) -> dict[str, int]:
+def write(
+    folder: Path, output: Path, progress: Callable[[float], None] = lambda share: None, overwrite: bool = False
+) -> dict[str, int]:
     """Write a new folder of all pictures' labels, whole or not at all.
 
     folder : of label files that have depth, masks and amodal masks, and pictures as PNG or JPEG beside them, if there are any.
     output : must not be there yet, or be empty. progress : is told the share of the pictures that are written.
+    overwrite : whether `output` may be a scene that was written so.
 
     Returns how many images, instances and objects there are, and how many of the images have a picture in rgb.
 
@@ -59,8 +65,12 @@ def write(folder: Path, output: Path, progress: Callable[[float], None] = lambda
     progress(0.0)
     pictures, _ = found(folder)
     objects = _Objects(pictures)
-    scene: dict[str, dict[str, Any]] = {"scene_camera": {}, "scene_gt": {}, "scene_gt_info": {}}
-    with folder_written_whole(output) as temporary, ThreadPoolExecutor(machine.cores()) as threads:
+    scene: dict[str, dict[str, Any]] = {name: {} for name in _SCENE}
+
+    def may_replace(there: Path) -> bool:
+        return overwrite and files.holds(there, _FILES, (*_FILES, "rgb"))
+
+    with folder_written_whole(output, may_replace) as temporary, ThreadPoolExecutor(machine.cores()) as threads:
         for kind in ("depth", "mask", "mask_visib"):
             (temporary / kind).mkdir()
         for number, (path, told) in enumerate(pictures):
