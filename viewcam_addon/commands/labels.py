@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> Result:
     if options.to == "colmap":
         counts = colmap.write(options.folder, options.output, options.points or colmap.POINTS, options.overwrite)
     elif options.to == "bop":
-        progress = functools.partial(options.events.tell, "progress")
+        progress = functools.partial(options.events.tell, "progress", work="written")
         counts = bop.write(options.folder, options.output, lambda share: progress(share=share), options.overwrite)
     elif options.to == "kitti":
         counts = kitti.write(options.folder, options.output, options.overwrite)
