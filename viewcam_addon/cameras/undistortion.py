@@ -133,8 +133,9 @@ def straight(cameras: Sequence[Camera], blank: float) -> list[Camera]:
         pinhole = camera.pinhole
         if camera.lens is not None:
             cut = undistorted(camera.lens, pinhole.plane, blank)
-            sizes = {"distance": cut.distance, "principal_point": cut.principal_point, "width": cut.width, "height": cut.height}
-            pinhole = dataclasses.replace(pinhole, **sizes)
+            pinhole = dataclasses.replace(
+                pinhole, distance=cut.distance, principal_point=cut.principal_point, width=cut.width, height=cut.height
+            )
         result.append(dataclasses.replace(camera, pinhole=pinhole, lens=None))
     return result
 
