@@ -58,7 +58,7 @@ inline Lamp lamp_of(const ViewcamLamp& given, Vec3 color, Vec3 origin) {
 inline void add_lamp(Scene& scene, const ViewcamLamp& given, const ViewcamColor& emission) {
     Vec3 color = vector(given.color);
     Color factor = color_of(emission, scene.illumination.nodes);
-    if (!factor.varies()) color *= Vec3{larger(factor.rgb.x, 0), larger(factor.rgb.y, 0), larger(factor.rgb.z, 0)};
+    if (!factor.varies()) color *= max(factor.rgb, 0);
     if (is_black(color)) return;
     scene.illumination.lamps.push_back(lamp_of(given, color, scene.origin));
     scene.illumination.lamps.back().emission = factor;
@@ -88,10 +88,6 @@ inline TileSampler* create_light(const Scene& scene, const ViewcamLightSettings&
     Bounces bounces{given.bounces[0], given.bounces[1], given.bounces[2], given.bounces[3], given.bounces[4]};
     return new TileSampler(scene, bounces, given.seed, given.samples, given.error, given.coincident);
 }
-inline void trace_light(const TileSampler& sampler, uint32_t row, uint32_t column, const ViewcamLightPasses& passes, const volatile int* stop) {
-    sampler.trace(row, column, passes, stop);
-}
-
 // Probes: the formulas one by one, for tests. All arrays are rows of so many numbers.
 namespace probe {
 
