@@ -53,9 +53,8 @@ class Pixel {
 
     // Adds samples, one after the other; a few at a time, so that sums stay in registers. batch_size: a power of two.
     void add(const PathLight* samples, uint32_t count, const FilmSettings& film, uint32_t batch_size) {
-        constexpr uint32_t FEW = 4;
-        for (; count > FEW; samples += FEW, count -= FEW) add_few(samples, FEW, film, batch_size);
-        add_few(samples, count, film, batch_size);
+        for (; count >= FEW; samples += FEW, count -= FEW) add_few(samples, FEW, film, batch_size);
+        if (count > 0) add_few(samples, count, film, batch_size);
     }
 
     // The sum of all samples' differences from the first one, and the variance of one sample; without exposure.
@@ -93,10 +92,10 @@ class Pixel {
     }
 
    private:
-    static constexpr uint32_t BATCHES = 16;
+    static constexpr uint32_t BATCHES = 16, FEW = 4;
 
     [[gnu::always_inline]] void add_few(const PathLight* samples, uint32_t count, const FilmSettings& film, uint32_t batch_size) {
-        double4 shown[4] = {};
+        double4 shown[FEW] = {};
         unsigned brought = 0;
         for (uint32_t i = 0; i < count; i++) brought |= samples[i].brought;
         while (brought) {
