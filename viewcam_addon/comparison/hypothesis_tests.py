@@ -19,6 +19,7 @@ The two colors share noise among them: the mean of their standard errors is beyo
 Where neighbors share their light even that does not hold, and nothing is asked.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
@@ -105,8 +106,9 @@ class HypothesisTest:
 
     @property
     def typical_findable(self) -> float:
-        """The bias that is found in half of the tiles, or more, in the channel that tells most."""
-        return float(np.median(self.findable.min(axis=-1)))
+        """The bias that is found in half of the tiles that show any, in the channel that tells most; inf where none does."""
+        of_tiles = self.findable.min(axis=-1)
+        return float(np.median(of_tiles[np.isfinite(of_tiles)])) if np.isfinite(of_tiles).any() else math.inf
 
     @property
     def is_everywhere(self) -> bool:
@@ -120,7 +122,7 @@ class HypothesisTest:
             "count": self.errors.size,
             "failing": int(self.failing.sum()),
             "allowed": self.limit,
-            "findable": self.typical_findable if np.isfinite(self.typical_findable) else None,
+            "findable": self.typical_findable if math.isfinite(self.typical_findable) else None,
             "worst": asdict(self.worst),
             "ok": self.ok,
         }

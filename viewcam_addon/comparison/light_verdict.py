@@ -86,7 +86,7 @@ class Search:
 
     find : the bias, a share of the light. least : that which would be found in 99 of 100 cases so far, if it is everywhere;
     least_in_blocks : if it is in a typical block of 32 × 32 pixels alone; both 0 without noise.
-    samples : so far, of each side. rounds : so far. is_decided : whether that was the last. expected : samples in the end.
+    samples : so far, of each side. rounds : so far. is_decided : whether that was the last. expected : samples that it takes.
     """
 
     find: float
@@ -95,11 +95,16 @@ class Search:
     samples: int
     rounds: int
     is_decided: bool
-    expected: int
+    expected: float
+
+    @property
+    def reached(self) -> bool:
+        """True if the bias that was asked for would have been found."""
+        return self.least <= self.find
 
     def to_json(self) -> dict:
         least = {"least": self.least, "least_in_blocks": self.least_in_blocks}
-        return {"wanted": self.find, **least, "samples": self.samples, "rounds": self.rounds}
+        return {"wanted": self.find, "reached": self.reached, **least, "samples": self.samples, "rounds": self.rounds}
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +323,7 @@ def _hint(row: LightRow) -> str:
     return f" (all of it is a factor of {row.factor:.5g}{error}{f', which is {known}' if known else ''})"
 
 
-def _mean_text(row: LightRow, search: Search | None) -> str:
+def _mean_text(row: LightRow, search: Search | None = None) -> str:
     if not row.reference:
         return "both are black in the mean"
     error = 100.0 * row.ratio_error
@@ -332,11 +337,22 @@ def _mean_text(row: LightRow, search: Search | None) -> str:
     would = f"and a difference of {plain(100.0 * row.visible)} % would have been found"
     if search:
         everywhere, in_blocks = (plain(100.0 * least) for least in (search.least, search.least_in_blocks))
-        would = (
-            f"and a difference of {everywhere} % would have been found in 99 of 100 cases, in a typical block of 32 × 32 pixels "
-            f"alone one of {in_blocks} %"
+        alone = (
+            f", in a typical block of 32 × 32 pixels alone one of {in_blocks} %"
+            if math.isfinite(search.least_in_blocks)
+            else ""
         )
+        would = f"and a difference of {everywhere} % would have been found in 99 of 100 cases{alone}"
+        if not search.reached:
+            would += f"; to find the {plain(100.0 * search.find)} % asked for takes too many samples"
+            would += f", some {_rounded(search.expected):,} a pixel" if math.isfinite(search.expected) else ""
     return f"the mean {differs} ± {plain(error)} %, {would}"
+
+
+def _rounded(number: float) -> int:
+    """To one digit, as a forecast is worth."""
+    power = 10 ** math.floor(math.log10(number))
+    return math.ceil(number / power) * power
 
 
 def _few(names: Iterable[str]) -> str:

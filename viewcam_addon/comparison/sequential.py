@@ -2,9 +2,10 @@
 
 Each round doubles the samples on both sides: 16, 32, 64, … 65,536 a pixel, each with seeds of its own, and its pictures are
 added to those of the rounds before, so that nothing is thrown away. After each, all hypothesis tests are made. Pictures that
-differ are different from then on. The others are the same as soon as some test of Combined would have found a picture that is
-off by the wanted share everywhere, with the probability hypothesis_tests.POWER. Nearly always that is the test of the whole
-picture, in which most noise cancels; so there are some samples at least, for what is wrong in a few pixels alone.
+differ end it. The others are the same as soon as the test of all of Combined would have found a picture that is off by
+the wanted share everywhere, with the probability hypothesis_tests.POWER. In the whole most noise cancels; so there are some
+samples at least, for what is wrong in a few pixels alone. Where so few pixels have light that their sum tells nothing, the tile
+or pixel that tells most decides.
 
 Who looks thirteen times has thirteen chances of a false alarm. The false alarms that are promised are spent over the looks
 (Lan and DeMets, Discrete sequential boundaries for clinical trials, Biometrika 70, 1983), a thirteenth on each. That their sum
@@ -24,12 +25,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
 from ..image import Image
 from ..tracer.scene.film import SAMPLES
-from .hypothesis_tests import BLOCKS
+from .hypothesis_tests import BLOCKS, WHOLE
 from .light_verdict import FALSE_ALARMS, RadianceComparison, Search
-from .statistics import plain
 
 TOTALS = tuple(16 * 2**doubled for doubled in range(13))
 """Samples of a pixel after each round, of each side."""
@@ -73,33 +72,25 @@ class Rounds:
 
 
 def search(comparison: RadianceComparison, find: float, rounds: Rounds) -> Search:
-    """How far a search for a bias of this size is.
-
-    Raises
-    ------
-    InputError
-        if it would take more samples than the last round has.
-    """
+    """How far a search for a bias of this size is. It ends where it would take more samples than there are rounds for."""
     least, in_blocks = _least(comparison)
     fewest = max(SAMPLES, _FEWEST / find if comparison.is_noisy else 0)
     expected = max(rounds.samples * (least / find) ** 2, fewest)
-    is_decided = not comparison.passed or (least <= find and rounds.samples >= fewest)
-    if not is_decided and rounds.samples >= SAMPLES and (expected > TOTALS[-1] or rounds.samples == TOTALS[-1]):
-        words = f"some {_rounded(expected):,} samples" if math.isfinite(expected) else "more samples than can be told"
-        raise InputError(
-            f"a bias of {plain(100 * find)} % takes {words} a pixel, and {TOTALS[-1]:,} are the most: at {rounds.samples:,} "
-            f"one of {plain(100 * least)} % would be found, with no difference so far; give --find more"
-        )
-    after = next((total for total in TOTALS if total >= expected), TOTALS[-1])
-    return Search(find, least, in_blocks, rounds.samples, rounds.count, is_decided, rounds.samples if is_decided else after)
+    after = next((total for total in TOTALS if total >= expected), None)
+    is_decided = rounds.samples >= SAMPLES and (after is None or after <= rounds.samples)
+    is_last = is_decided or not comparison.passed or rounds.samples == TOTALS[-1]
+    return Search(find, least, in_blocks, rounds.samples, rounds.count, is_last, expected if after is None else after)
 
 
 def _least(comparison: RadianceComparison) -> tuple[float, float]:
     """The least bias that would be found if it is everywhere, and in a typical block alone; 0 without noise."""
     if not comparison.is_noisy:
         return 0.0, 0.0
-    findable = {test.size: test.typical_findable for test in comparison.rows[0].hypothesis_tests}
-    return min(findable.values()), findable[BLOCKS]
+    tests = {test.size: test for test in comparison.rows[0].hypothesis_tests}
+    everywhere = tests[WHOLE].typical_findable
+    if not math.isfinite(everywhere):
+        everywhere = min(float(test.findable.min()) for test in tests.values())
+    return everywhere, tests[BLOCKS].typical_findable
 
 
 def _pooled(before: Image, now: Image, share: float) -> Image:
@@ -127,9 +118,3 @@ def _pooled(before: Image, now: Image, share: float) -> Image:
 
 def _mixed(before: NDArray, now: NDArray, share: float) -> NDArray[np.float32]:
     return (before + share * np.subtract(now, before, dtype=float)).astype(np.float32)
-
-
-def _rounded(number: float) -> int:
-    """To one digit, as a forecast is worth."""
-    power = 10 ** math.floor(math.log10(number))
-    return math.ceil(number / power) * power

@@ -98,9 +98,9 @@ class Outcome:
 class RunningComparison:
     """One comparison on its way, from the moment it is made.
 
-    scene : the one of the window. level : one of film.LEVELS, or "auto". find : for light, the bias that is to be found, as
-    of Job. clay : whether one matte material covers everything. keep_in : a folder that gets one for each report, named by file, camera, frame and time; by
-    default the report is gone with Blender.
+    scene : the one of the window. level : one of film.LEVELS, or "auto". find : for light, the bias that is to be found, as of
+    Job. clay : whether one matte material covers everything. keep_in : a folder that gets one for each report, named by file,
+    camera, frame and time; by default the report is gone with Blender.
 
     Raises
     ------
