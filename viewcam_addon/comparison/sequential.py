@@ -26,7 +26,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..image import Image
-from ..tracer.scene.film import SAMPLES
 from .hypothesis_tests import BLOCKS, WHOLE
 from .light_verdict import FALSE_ALARMS, RadianceComparison, Search
 
@@ -36,6 +35,8 @@ TOTALS = tuple(16 * 2**doubled for doubled in range(13))
 FALSE_ALARMS_OF_EACH = FALSE_ALARMS / len(TOTALS)
 """The probability of a false alarm that each look may spend."""
 
+# Samples at least, for noise to show at all: what a check takes by default.
+_FEWEST_OF_ALL = TOTALS[2]
 # Samples at least, times the bias. Calibrated in the judge's room (benchmarks/judge): with 256 for 0.5 % as many of its sixty
 # faults are found as with 1,024; a block of 8 × 8 pixels that is 5 % brighter is the last of them.
 _FEWEST = 1.28
@@ -74,10 +75,10 @@ class Rounds:
 def search(comparison: RadianceComparison, find: float, rounds: Rounds) -> Search:
     """How far a search for a bias of this size is. It ends where it would take more samples than there are rounds for."""
     least, in_blocks = _least(comparison)
-    fewest = max(SAMPLES, _FEWEST / find if comparison.is_noisy else 0)
+    fewest = max(_FEWEST_OF_ALL, _FEWEST / find if comparison.is_noisy else 0)
     expected = max(rounds.samples * (least / find) ** 2, fewest)
     after = next((total for total in TOTALS if total >= expected), None)
-    is_decided = rounds.samples >= SAMPLES and (after is None or after <= rounds.samples)
+    is_decided = rounds.samples >= _FEWEST_OF_ALL and (after is None or after <= rounds.samples)
     is_last = is_decided or not comparison.passed or rounds.samples == TOTALS[-1]
     return Search(find, least, in_blocks, rounds.samples, rounds.count, is_last, expected if after is None else after)
 
