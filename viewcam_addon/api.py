@@ -125,16 +125,16 @@ def compare(
     test_samples : of each test picture, where that is not what its file tells. renderer : who made it, one of
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
     enough. everything : Cycles' picture with all that the scene's ledger says is not modeled, of the first test's seed; it
-    tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object are
-    different, and no error.
+    tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object, or
+    whose light is all a renderer's choice, are different, and no error.
 
     Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
     Raises
     ------
     InputError
-        if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, or no pixel of
-        either picture shows an object.
+        if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, no pixel of
+        either picture shows an object, or nearly all pixels with light had to be taken out.
     """
     from .comparison import geometry, radiance, renderers
     from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
@@ -166,6 +166,7 @@ def compare(
             return CoincidentLight(Image(light), pairs, seen_otherwise)
 
         lit = replace(radiance.compare(of, pictures, camera, test_samples, coincident), stated=stated)
+        _check_not_empty(lit, may_be_empty)
         names = tuple(dict.fromkeys((*shown.not_modelled, *lit.taken_out.names)))
         if not names:
             return lit
@@ -187,6 +188,10 @@ def compare(
         found = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, shown.origin, by, partial)
         names = shown.not_modelled
         found = replace(found, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
-    if found.shows_nothing and not may_be_empty:
-        raise InputError(found.sentence)
+    _check_not_empty(found, may_be_empty)
     return found
+
+
+def _check_not_empty(comparison: "GeometryComparison | RadianceComparison", may_be_empty: bool) -> None:
+    if comparison.is_empty and not may_be_empty:
+        raise InputError(comparison.sentence)

@@ -119,6 +119,26 @@ def test_nothing_is_taken_out_where_no_two_surfaces_are_in_one_place(honest):
     assert not radiance.compare(reference, honest, CAMERA, make_coincident=lambda: CoincidentLight(Image(light), pairs)).passed
 
 
+@pytest.fixture(scope="module")
+def chosen_nearly_everywhere(reference, coincident):
+    """The same, but that all light of the columns from the third on is a renderer's choice."""
+    passes = {name: values.copy() for name, values in coincident.light.passes.items()}
+    passes["Combined"][:, 2:, :3] = reference["Combined"][:, 2:, :3] + 1e-3
+    return CoincidentLight(Image(passes), coincident.pairs)
+
+
+def test_where_nearly_all_is_taken_out_there_is_no_answer_and_the_rest_may_still_differ(
+    reference, honest, chosen_nearly_everywhere
+):
+    found = radiance.compare(reference, honest, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
+    assert found.is_empty and not found.passed
+    assert found.sentence.startswith("Nothing to compare: 9"), found.sentence
+    assert all(words in found.sentence for words in ("'Carpet' and 'Floor'", "move one of two", "level geometry"))
+    dark = [replace(image, passes={**image.passes, "Combined": 0.5 * image["Combined"]}) for image in honest]
+    found = radiance.compare(reference, dark, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
+    assert not found.is_empty and found.sentence.startswith("Different here"), found.sentence
+
+
 FAULTS = {
     "a lamp 2 % too bright": {"energy": 2.04},
     "another wall": {"colours": {**COLOURS, "Wall": (0.3, 0.5, 0.74)}},

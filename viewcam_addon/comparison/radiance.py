@@ -58,7 +58,9 @@ def compare(
     if make_coincident is not None and not all(row.ok for row in compared.rows) and (coincident := make_coincident()):
         rest = coincident.rest(combined)
         compared = compare_quantities(reference, tests, pinhole, test_samples, rest)
-        taken_out = TakenOut(rest.out, coincident.pairs, coincident.seen_otherwise)
+        lit = np.maximum(combined.reference, combined.test).max(axis=-1) > 0.0
+        share = float(rest.out[lit].mean()) if lit.any() else 0.0
+        taken_out = TakenOut(rest.out, coincident.pairs, coincident.seen_otherwise, share)
     maps = dict(compared.maps)
     appearance, flip = perception.appearance(combined)
     if flip is not None:
@@ -122,8 +124,8 @@ def compare_quantities(
         if is_noisy:
             row, drawn = _noisy(sides, rounding, freedom, FALSE_ALARMS / len(unequal))
             if rest is not None:
-                hidden = float(rest.tolerance(sides).mean())
-                row = replace(row, visible=row.visible + _relative(hidden, abs(row.reference)))
+                hidden, left = float(rest.tolerance(sides).mean()), float(sides.reference[~rest.out].sum() / sides.reference.size)
+                row = replace(row, visible=_relative(row.visible * row.reference + hidden, left))
         else:
             row, drawn = _noise_free(sides, rounding)
         rows.append(row)
