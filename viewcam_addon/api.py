@@ -140,6 +140,7 @@ def compare(
     from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
     from .comparison.coincident import CoincidentLight
     from .comparison.everything import not_modelled
+    from .comparison.sides import samples_of, seed_of
     from .comparison.tolerances import ROUNDINGS
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
@@ -159,13 +160,21 @@ def compare(
         if shown is None:
             return radiance.compare(of, pictures, camera, test_samples)
         makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(shown, threads))
+        level, samples, seed = of.attributes.get("level", "path"), samples_of(of), seed_of(of)
 
         def coincident() -> CoincidentLight:
-            level = of.attributes.get("level", "path")
-            light, pairs, seen_otherwise = makes_tracer().coincident_light(level, SAMPLES_OF_COINCIDENT, 0, ROUNDINGS[-1])
-            return CoincidentLight(Image(light), pairs, seen_otherwise)
+            spent = (level, SAMPLES_OF_COINCIDENT, seed + 1)
+            light, pairs, seen_otherwise = makes_tracer().coincident_light(*spent, ROUNDINGS[-1])
+            total = makes_tracer().render_light(*spent)["Combined"][..., :3]
+            return CoincidentLight(Image(light), total, pairs, seen_otherwise)
 
-        lit = replace(radiance.compare(of, pictures, camera, test_samples, coincident), stated=stated)
+        def anew() -> list[Image]:
+            others = (seed + 2 + number for number in range(radiance.SEEDS))
+            return [Image(makes_tracer().render_light(level, samples, other), camera, of.attributes) for other in others]
+
+        can_be_traced_anew = samples and samples <= MOST_SAMPLES and "Sample Count" not in of.passes
+        lit = radiance.compare(of, pictures, camera, test_samples, coincident, anew if can_be_traced_anew else None)
+        lit = replace(lit, stated=stated)
         _check_not_empty(lit, may_be_empty)
         names = tuple(dict.fromkeys((*shown.not_modelled, *lit.taken_out.names)))
         if not names:

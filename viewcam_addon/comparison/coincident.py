@@ -34,8 +34,8 @@ SAMPLES = 64
 # pixels are taken out that could still tell larger faults, with a larger one some stay that can tell nothing else.
 _SHARE = 0.1
 
-# Of the pixels with light, below which the rest of a comparison answers nothing. Calibrated: a room that is lit by a lamp in the
-# plane of its ceiling has 0 to 4 % left, and of strangers' files that are lit otherwise none has less than half.
+# Of the pixels with light, below which the rest of a comparison answers nothing. Calibrated: a room lit by a lamp in the
+# plane of its ceiling has 0 to 4 % left, and scenes with other choices have a third or more.
 _LEAST_LEFT = 0.1
 
 
@@ -43,11 +43,14 @@ _LEAST_LEFT = 0.1
 class CoincidentLight:
     """The light that is a renderer's choice, at most.
 
-    light : its passes. pairs : two names in order of the alphabet → how often rays found these in one place. seen_otherwise :
-    objects and lamps whose shadows not all kinds of rays see → how often that made a difference.
+    light : its passes. total : (height, width, 3), all light, traced with the same seed, which is not the reference's: pixels
+    that were taken out because the reference is dark there would leave those where it is bright. pairs : two names in order of
+    the alphabet → how often rays found these in one place. seen_otherwise : objects and lamps whose shadows not all kinds of
+    rays see → how often that made a difference.
     """
 
     light: Image
+    total: Array
     pairs: Mapping[tuple[str, str], int]
     seen_otherwise: Mapping[str, int] = field(default_factory=dict)
 
@@ -64,7 +67,7 @@ class CoincidentLight:
     def rest(self, combined: Sides) -> "Rest":
         """The rest of a comparison without the pixels of which this light is a share to speak of."""
         light = self.of(combined)
-        return Rest(self, (light > 0.0) & (light >= _SHARE * combined.reference.max(axis=-1)))
+        return Rest(self, (light > 0.0) & (light >= _SHARE * self.total.max(axis=-1)))
 
 
 @dataclass(frozen=True, eq=False)

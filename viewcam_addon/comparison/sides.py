@@ -4,7 +4,8 @@ of both.
 Several test pictures are one picture rendered with several seeds: their mean is the test, and their spread tells its noise. The
 reference brings the variance of its Combined pass along. Of the other passes only the spread is known, and that the reference
 has none where its Combined has none and is one pass's light alone. A sum of several may never change while they do: where rays
-go on to glass that shines as brightly as the world, light that is direct once is indirect another time.
+go on to glass that shines as brightly as the world, light that is direct once is indirect another time. A reference that was
+traced anew with several seeds tells its noise as the tests do.
 
 Cycles divides Diffuse Direct and Diffuse Indirect by the surface's color, each a mean over the pixel: a quotient of means,
 which on edges depends on the number of samples. So their products with Diffuse Color are compared, the light itself.
@@ -66,11 +67,22 @@ def samples_of(image: Image) -> int | None:
         for name, value in image.attributes.items()
         if name == "samples" or (name.startswith("cycles.") and name.endswith(".samples"))
     ]
-    return int(told[0]) if told and told[0].isdecimal() and len(told[0]) <= _MOST_DIGITS else None
+    return _whole(told[0]) if told else None
 
 
-def all_sides(reference: Image, tests: Sequence[Image]) -> Iterator[Sides]:
+def seed_of(image: Image) -> int:
+    """The seed of the tracer's picture, as its file tells, else 0."""
+    return _whole(image.attributes.get("seed", "")) or 0
+
+
+def _whole(text: str) -> int | None:
+    return int(text) if text.isdecimal() and len(text) <= _MOST_DIGITS else None
+
+
+def all_sides(reference: Image, tests: Sequence[Image], anew: Sequence[Image] = ()) -> Iterator[Sides]:
     """Every quantity that all pictures have, Combined first.
+
+    anew : the reference with several other seeds, whose mean and spread count in place of its own.
 
     Raises
     ------
@@ -88,18 +100,19 @@ def all_sides(reference: Image, tests: Sequence[Image]) -> Iterator[Sides]:
     variance = _variance(reference)
     # Where there are as many samples as a wanted error takes, neighbors' noise is not independent, but adds up to what it was.
     shared = np.where(np.isfinite(variance), variance, 0.0) if "Sample Count" in reference.passes else 0.0
-    combined = replace(_sides("Combined", reference, tests, variance), shared=shared)
+    references = anew or [reference]
+    combined = replace(_sides("Combined", references, tests, None if anew else variance), shared=shared)
     yield combined
-    unknown = np.array(np.inf)
+    unknown = None if anew else np.array(np.inf)
     parts = [
-        _sides(name, reference, tests, unknown)
+        _sides(name, references, tests, unknown)
         for name in QUANTITIES[1:]
-        if all(_has(image, name) for image in (reference, *tests))
+        if all(_has(image, name) for image in (*references, *tests))
     ]
     alone = np.any([_is_all(part, combined) for part in parts if part.name in _LIGHT], axis=0)
-    variance = np.where(quiet(combined.reference, combined.variance) & alone, 0.0, np.inf)
+    is_quiet = quiet(combined.reference, combined.variance) & alone
     for part in parts:
-        known = np.broadcast_to(variance, part.reference.shape)
+        known = np.where(is_quiet, 0.0, part.variance)
         yield replace(part, variance=known, shared=shared if part.name in _TIMES_COLOUR else 0.0)
 
 
@@ -130,20 +143,26 @@ def _variance(reference: Image) -> Array:
     return np.full((*reference["Combined"].shape[:2], 3), 0.0 if samples_of(reference) == 1 else np.inf)
 
 
-def _sides(name: str, reference: Image, tests: Sequence[Image], variance: Array) -> Sides:
-    expected = values_of(reference, name)
-    mean, squares = np.zeros_like(expected), np.zeros_like(expected)
+def _sides(name: str, references: Sequence[Image], tests: Sequence[Image], variance: Array | None) -> Sides:
+    """variance : of the reference; None where the spread of several tells it."""
+    expected, own = _mean_and_spread(name, references)
+    mean, spread = _mean_and_spread(name, tests)
+    broken = ~(np.isfinite(expected).all(axis=-1) & np.isfinite(mean).all(axis=-1))
+    if broken.any():
+        expected, mean, spread, own = (np.where(broken[..., None], 0.0, array) for array in (expected, mean, spread, own))
+    return Sides(name, expected, mean, own if variance is None else np.broadcast_to(variance, expected.shape), spread, broken)
+
+
+def _mean_and_spread(name: str, images: Sequence[Image]) -> tuple[Array, Array]:
+    """A quantity's mean over pictures with several seeds, and that mean's variance: inf where there is one picture only."""
+    mean = np.zeros_like(values_of(images[0], name))
+    squares, seeds = np.zeros_like(mean), len(images)
     with np.errstate(invalid="ignore"):
-        for count, image in enumerate(tests, 1):  # Welford's running mean and sum of squares
+        for count, image in enumerate(images, 1):  # Welford's running mean and sum of squares
             step = values_of(image, name) - mean
             mean = mean + step / count
             squares += step**2 * (count - 1) / count
-    seeds = len(tests)
-    spread = squares / (seeds * (seeds - 1)) if seeds > 1 else np.full_like(mean, np.inf)
-    broken = ~(np.isfinite(expected).all(axis=-1) & np.isfinite(mean).all(axis=-1))
-    if broken.any():
-        expected, mean, spread = (np.where(broken[..., None], 0.0, array) for array in (expected, mean, spread))
-    return Sides(name, expected, mean, np.broadcast_to(variance, expected.shape), spread, broken)
+    return mean, squares / (seeds * (seeds - 1)) if seeds > 1 else np.full_like(mean, np.inf)
 
 
 def _has(image: Image, name: str) -> bool:
