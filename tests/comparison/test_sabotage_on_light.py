@@ -144,6 +144,32 @@ def test_a_fault_of_the_scene_is_found(reference, fault):
     assert comparison.sentence.startswith("Different here: ")
 
 
+def with_a_bulb(strength=3.0, tint=1.0):
+    """A ball of some nine pixels before the walls that shines, and gives next to no light to them."""
+    scene = build()
+    count, bulb = len(scene.objects), Object("bulb", "bulb", np.eye(4), 9, materials=("bulb",))
+    glow = Material(emission=Colour((strength, strength, tint * strength)))
+    return replace(
+        scene,
+        geometries={**scene.geometries, "bulb": ball((1.9, -0.4, 1.2), 0.17)},
+        objects=(*scene.objects[:count], bulb),
+        materials={**scene.materials, "bulb": glow},
+    )
+
+
+@pytest.fixture(scope="module")
+def reference_of_a_bulb():
+    return picture(with_a_bulb(), "direct", 64, 0)
+
+
+@pytest.mark.parametrize("fault", [{}, {"strength": 3.05}, {"tint": 0.98}])
+def test_a_bulb_of_nine_pixels_of_another_strength_is_found(reference_of_a_bulb, fault):
+    seen = render(with_a_bulb(), "geometry")["Object Index"] == 9
+    assert 6 <= seen.sum() <= 12, seen.sum()
+    comparison = compared(reference_of_a_bulb, with_a_bulb(**fault), "direct", 64)
+    assert comparison.passed == (not fault), "\n".join(comparison.lines())
+
+
 def brighter(lamp, factor):
     what = "irradiance" if isinstance(lamp, Sun) else "power"
     return replace(lamp, **{what: tuple(factor * value for value in getattr(lamp, what))})

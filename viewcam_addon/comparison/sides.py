@@ -39,7 +39,8 @@ class Sides:
 
     spread : variance of `test`, which is a mean, from the test pictures' differences; inf where there is one picture only.
     variance : variance of `reference`; inf where it is not known. broken : (height, width) bool, no number on one side or both;
-    there both are 0. shared : variance of `reference` that its pixels may have shared with their neighbors, or 0.
+    there both are 0. shared : variance of `reference` that its pixels may have shared with their neighbors, or 0. certain :
+    (height, width, 1) bool, pixels that have no noise, whatever is beside them.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Sides:
     spread: Array
     broken: NDArray[np.bool_]
     shared: Array | float = 0.0
+    certain: NDArray[np.bool_] | bool = False
 
     @property
     def difference(self) -> Array:
@@ -102,13 +104,14 @@ def all_sides(reference: Image, tests: Sequence[Image], anew: Sequence[Image] = 
     shared = np.where(np.isfinite(variance), variance, 0.0) if "Sample Count" in reference.passes else 0.0
     references = anew or [reference]
     combined = replace(_sides("Combined", references, tests, None if anew else variance), shared=shared)
-    yield combined
     unknown = None if anew else np.array(np.inf)
     parts = [
         _sides(name, references, tests, unknown)
         for name in QUANTITIES[1:]
         if all(_has(image, name) for image in (*references, *tests))
     ]
+    emission = [part for part in parts if part.name == "Emission"]
+    yield replace(combined, certain=_is_certain(combined, emission[0])) if emission else combined
     alone = np.any([_is_all(part, combined) for part in parts if part.name in _LIGHT], axis=0)
     is_quiet = quiet(combined.reference, combined.variance) & alone
     for part in parts:
@@ -125,14 +128,28 @@ def _is_all(part: Sides, combined: Sides) -> NDArray[np.bool_]:
     return (rest[0] & rest[1])[..., None]
 
 
+def _is_certain(combined: Sides, emission: Sides) -> NDArray[np.bool_]:
+    """(height, width, 1) bool: where all samples of either side have seen surfaces that shine, alike, and nothing else.
+
+    Had some missed what others see, the values of one side would differ among themselves: that all of one side are one and all
+    of the other another comes by chance as rarely as that many coins fall alike.
+    """
+    loud = [_noise(*side) for side in ((combined.reference, combined.variance), (combined.test, combined.spread))]
+    return _is_all(emission, combined) & ~((loud[0] > 0.0) | (loud[1] > 0.0) | combined.broken)[..., None]
+
+
 def quiet(values: Array, variance: Array) -> NDArray[np.bool_]:
     """(height, width, 1) bool: where neither a pixel nor any around it has noise above float32's rounding.
 
     The surroundings count because the variance of a pixel is an estimate: where an edge crosses a corner of it, all of its
     samples may miss the corner.
     """
-    noise = np.sqrt(variance.max(axis=-1))
-    return ~(largest_around(noise - _QUIET * FLOAT32 * np.abs(values).max(axis=-1)) > 0.0)[..., None]
+    return ~(largest_around(_noise(values, variance)) > 0.0)[..., None]
+
+
+def _noise(values: Array, variance: Array) -> Array:
+    """(height, width): by how much the standard error is more than rounding; negative where it is not."""
+    return np.sqrt(variance.max(axis=-1)) - _QUIET * FLOAT32 * np.abs(values).max(axis=-1)
 
 
 def _variance(reference: Image) -> Array:

@@ -89,11 +89,10 @@ def _rendered(
         return None
     width = world_image.width(world)
     image = f"both sides show an image of it, {width} × {width // 2} pixels, that Cycles renders"
-    status = "exported"
     if result.suns:
-        status, image = "approximated", f"{image}, and lamps that shine evenly for its suns"
+        image += ", and lamps that shine evenly for its suns"
     for reason in reasons:
-        ledger.note(world.name, status, f"the world {reason}: {image}")
+        ledger.note(world.name, "approximated" if result.suns else "exported", f"the world {reason}: {image}")
     if world_image.tells_rays_apart(world):
         ledger.note(
             world.name, "approximated", "the world tells kinds of rays apart, and all but the camera's see what diffuse ones do"
@@ -102,7 +101,8 @@ def _rendered(
     if scene.render.film_transparent:
         hidden |= {"camera"}
     result = replace(result, suns=tuple(replace(sun, hidden_from=sun.hidden_from | hidden) for sun in result.suns))
-    ledger.call_for_cycles(world.original, world_image.show, scene.original, result)
+    is_another = bool(result.suns) or world_image.tells_rays_apart(world)
+    ledger.call_for_cycles(world.original, world_image.show, scene.original, result, stands_in=is_another)
     return result
 
 
