@@ -160,7 +160,7 @@ def compare(
         if shown is None:
             return radiance.compare(of, pictures, camera, test_samples)
         makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(shown, threads))
-        level, samples, seed = of.attributes.get("level", "path"), samples_of(of), seed_of(of)
+        level, samples, seed = of.attributes.get("level", "path"), samples_of(of) or 0, seed_of(of)
 
         def coincident() -> CoincidentLight:
             spent = (level, SAMPLES_OF_COINCIDENT, seed + 1)
@@ -172,7 +172,7 @@ def compare(
             others = (seed + 2 + number for number in range(radiance.SEEDS))
             return [Image(makes_tracer().render_light(level, samples, other), camera, of.attributes) for other in others]
 
-        can_be_traced_anew = samples and samples <= MOST_SAMPLES and "Sample Count" not in of.passes
+        can_be_traced_anew = 0 < samples <= MOST_SAMPLES and "Sample Count" not in of.passes
         lit = radiance.compare(of, pictures, camera, test_samples, coincident, anew if can_be_traced_anew else None)
         lit = replace(lit, stated=stated)
         _check_not_empty(lit, may_be_empty)

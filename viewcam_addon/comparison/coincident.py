@@ -50,7 +50,7 @@ class CoincidentLight:
     """
 
     light: Image
-    total: Array
+    total: NDArray[np.floating]
     pairs: Mapping[tuple[str, str], int]
     seen_otherwise: Mapping[str, int] = field(default_factory=dict)
 
