@@ -25,7 +25,7 @@ from . import hypothesis_tests, noise_free, perception
 from .coincident import MakeCoincidentLight, Rest, TakenOut
 from .light_verdict import FALSE_ALARMS, LightRow, RadianceComparison
 from .sides import Sides, all_sides, quiet, samples_of
-from .tolerances import Array, in_float32
+from .tolerances import FLOAT32, Array, in_float32
 
 SEEDS = 8
 """The number of seeds with which a reference is traced anew, each with as many samples as it has."""
@@ -71,7 +71,8 @@ def compare(
     if make_coincident is not None and not all(row.ok for row in compared.rows) and (coincident := make_coincident()):
         rest = coincident.rest(combined)
         compared = compare_quantities(reference, tests, pinhole, test_samples, rest)
-        lit = np.maximum(combined.reference, combined.test).max(axis=-1) > 0.0
+        brightest = np.maximum(combined.reference, combined.test).max(axis=-1)
+        lit = brightest > FLOAT32 * brightest.mean()  # less is the cosine to a lamp in the surface's own plane, rounded
         share = float(rest.out[lit].mean()) if lit.any() else 0.0
         taken_out = TakenOut(rest.out, coincident.pairs, coincident.seen_otherwise, share)
     if trace_anew is not None and _is_doubtful(compared):

@@ -29,6 +29,8 @@ CHANNEL_NAMES = ("red", "green", "blue")
 
 # A standard error below so many roundings of float32 of the value itself is no noise but rounding.
 _QUIET = 16.0
+# Of test pictures, so that their means tell whether all samples agree.
+_MANY_SEEDS = 8
 # Of a number of samples: more than anybody renders, and that Python refuses to read.
 _MOST_DIGITS = 9
 
@@ -111,7 +113,8 @@ def all_sides(reference: Image, tests: Sequence[Image], anew: Sequence[Image] = 
         if all(_has(image, name) for image in (*references, *tests))
     ]
     emission = [part for part in parts if part.name == "Emission"]
-    yield replace(combined, certain=_is_certain(combined, emission[0])) if emission else combined
+    has_many = bool(emission) and len(tests) >= _MANY_SEEDS
+    yield replace(combined, certain=_is_certain(combined, emission[0])) if has_many else combined
     alone = np.any([_is_all(part, combined) for part in parts if part.name in _LIGHT], axis=0)
     is_quiet = quiet(combined.reference, combined.variance) & alone
     for part in parts:
@@ -131,11 +134,15 @@ def _is_all(part: Sides, combined: Sides) -> NDArray[np.bool_]:
 def _is_certain(combined: Sides, emission: Sides) -> NDArray[np.bool_]:
     """(height, width, 1) bool: where all samples of either side have seen surfaces that shine, alike, and nothing else.
 
-    Had some missed what others see, the values of one side would differ among themselves: that all of one side are one and all
-    of the other another comes by chance as rarely as that many coins fall alike.
+    Had some seen an edge, the values of one side would differ among themselves, or as many samples of every seed have; so only
+    pixels count that nothing beside them outshines, as a pixel that is covered in part is outshone by one that is whole.
     """
-    loud = [_noise(*side) for side in ((combined.reference, combined.variance), (combined.test, combined.spread))]
-    return _is_all(emission, combined) & ~((loud[0] > 0.0) | (loud[1] > 0.0) | combined.broken)[..., None]
+    certain = _is_all(emission, combined) & ~combined.broken[..., None]
+    for values, variance in ((combined.reference, combined.variance), (combined.test, combined.spread)):
+        brightest = values.max(axis=-1)
+        outshone = largest_around(brightest) - brightest > _QUIET * FLOAT32 * brightest
+        certain &= ~(outshone | (_noise(values, variance) > 0.0))[..., None]
+    return certain
 
 
 def quiet(values: Array, variance: Array) -> NDArray[np.bool_]:

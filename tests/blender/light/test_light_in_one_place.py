@@ -168,7 +168,7 @@ def test_a_room_that_is_lit_from_the_plane_of_its_ceiling_alone_is_nothing_to_co
     paths = [tmp_path / f"cycles-{number}.exr" for number in range(2)]
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=64), paths)
     tests = [Image(passes, exported.camera) for passes in read_passes(paths)]
-    with pytest.raises(InputError, match=r"^Nothing to compare: .* 'Ceiling' and 'Lamp'.*move one of two"):
+    with pytest.raises(InputError, match=r"^Nothing to compare: .*'Ceiling' and 'Lamp'.*move one of two"):
         compared(exported, "direct", tests)
 
 
