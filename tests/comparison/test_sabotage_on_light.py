@@ -233,3 +233,9 @@ def artists_reference():
 def test_a_fault_of_artists_materials_is_found(artists_reference, fault):
     comparison = compared(artists_reference, build_artists(**ARTISTS_FAULTS.get(fault, {})), "path", 256)
     assert comparison.passed == (fault is None), f"{fault}: {comparison.sentence}"
+
+
+@pytest.mark.parametrize("change", [{}, {"roughness": 0.29}, {"base_color": (0.707, 0.35, 0.25)}])
+def test_at_64_samples_a_metal_is_found_to_be_rougher_by_four_hundredths_or_redder_by_one(change):
+    comparison = compared(picture(build_artists(), "path", 64, 0), build_artists(PAINT | change), "path", 64)
+    assert comparison.passed == (not change), f"{change}: {comparison.sentence}"
