@@ -6,8 +6,8 @@ pixel, in tiles of 8 and of 32 pixels and in the whole picture, since the sum ov
 tests together raise a false alarm in one comparison of a hundred at most.
 
 A reference that has missed rare light, such as a lamp that grazes a metal, looks darker and quieter than it is, in many pixels
-side by side. So where a difference is less than twice what chance allows, the reference is traced anew with SEEDS other seeds,
-and what these say counts alone. Their spread tells such noise, and the difference has to be there a second time.
+side by side. So where a difference is less than four times what chance allows, the reference is traced anew with SEEDS other
+seeds, and what these say counts alone. Their spread tells such noise, and the difference has to be there a second time.
 
 Rejected: a threshold for the mean error or for FLIP. Both shrink with the samples and grow with the scene's contrast, so that
 any threshold is right for one picture; they are told, and decide nothing.
@@ -30,9 +30,9 @@ from .tolerances import FLOAT32, Array, in_float32
 SEEDS = 8
 """The number of seeds with which a reference is traced anew, each with as many samples as it has."""
 
-# Times what chance allows, from which on a difference is beyond doubt. Chosen: a file with rare light came to 1.2 times, and to
+# Times what chance allows, from which on a difference is beyond doubt. Chosen: a file with rare light came to 2.2 times, and to
 # trace a picture anew that plainly differs takes nine times as long and tells nothing.
-_BEYOND_DOUBT = 2.0
+_BEYOND_DOUBT = 4.0
 
 VARIANCE_BATCHES = 16
 """The number of means, or of one for each sample, the reference's Variance is estimated at least (tracer/core/film/film.h)."""
