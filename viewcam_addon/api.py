@@ -117,6 +117,7 @@ def compare(
     everything: Image | File | None = None,
     keeper: tracing.Keeper | None = None,
     may_be_empty: bool = False,
+    false_alarms: float | None = None,
 ) -> "GeometryComparison | RadianceComparison":
     """The comparison of a picture with the tracer's: what differs, by how much, and whether it is explained.
 
@@ -126,7 +127,8 @@ def compare(
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
     enough. everything : Cycles' picture with all that the scene's ledger says is not modeled, of the first test's seed; it
     tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object, or
-    whose light is all a renderer's choice, are different, and no error.
+    whose light is all a renderer's choice, are different, and no error. false_alarms : of light, how often the same is called
+    different at most; one in a hundred by default.
 
     Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
@@ -140,6 +142,7 @@ def compare(
     from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
     from .comparison.coincident import CoincidentLight
     from .comparison.everything import not_modelled
+    from .comparison.light_verdict import FALSE_ALARMS
     from .comparison.sides import samples_of, seed_of
     from .comparison.tolerances import ROUNDINGS
 
@@ -157,8 +160,9 @@ def compare(
     shown = scene and replace(scene, camera=camera)
     stated = scene.stated_camera if scene and camera == scene.camera else None
     if radiance.carries_light(of):
+        alarms = false_alarms or FALSE_ALARMS
         if shown is None:
-            return radiance.compare(of, pictures, camera, test_samples)
+            return radiance.compare(of, pictures, camera, test_samples, false_alarms=alarms)
         makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(shown, threads))
         level, samples, seed = of.attributes.get("level", "path"), samples_of(of) or 0, seed_of(of)
 
@@ -172,8 +176,8 @@ def compare(
             others = (seed + 2 + number for number in range(radiance.SEEDS))
             return [Image(makes_tracer().render_light(level, samples, other), camera, of.attributes) for other in others]
 
-        can_be_traced_anew = 0 < samples <= MOST_SAMPLES and "Sample Count" not in of.passes
-        lit = radiance.compare(of, pictures, camera, test_samples, coincident, anew if can_be_traced_anew else None)
+        trace_anew = anew if 0 < samples <= MOST_SAMPLES and "Sample Count" not in of.passes else None
+        lit = radiance.compare(of, pictures, camera, test_samples, coincident, trace_anew, alarms)
         lit = replace(lit, stated=stated)
         _check_not_empty(lit, may_be_empty)
         names = tuple(dict.fromkeys((*shown.not_modelled, *lit.taken_out.names)))

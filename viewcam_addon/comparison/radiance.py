@@ -51,6 +51,7 @@ def compare(
     test_samples: int | None = None,
     make_coincident: MakeCoincidentLight | None = None,
     trace_anew: Callable[[], Sequence[Image]] | None = None,
+    false_alarms: float = FALSE_ALARMS,
 ) -> RadianceComparison:
     """Compare one reference with one test picture or with several of different seeds.
 
@@ -58,6 +59,7 @@ def compare(
     where that is not what its file tells (Cycles counts a first sample that it leaves out). make_coincident : traces the light
     that is a renderer's choice, which is taken out; asked where the pictures differ. trace_anew : traces the reference with
     SEEDS other seeds; asked where they still differ, and not beyond doubt.
+    false_alarms : the probability, at most, that two sides of the same light are called different.
 
     Whatever float32 can hold may stand in the pictures: what is no number is told as broken.
 
@@ -66,17 +68,17 @@ def compare(
     InputError
         if the sizes differ, a pass is missing, or there is no test picture.
     """
-    compared = compare_quantities(reference, tests, pinhole, test_samples)
+    compared = compare_quantities(reference, tests, pinhole, test_samples, false_alarms=false_alarms)
     combined, rest, taken_out = compared.combined, None, TakenOut()
     if make_coincident is not None and not all(row.ok for row in compared.rows) and (coincident := make_coincident()):
         rest = coincident.rest(combined)
-        compared = compare_quantities(reference, tests, pinhole, test_samples, rest)
+        compared = compare_quantities(reference, tests, pinhole, test_samples, rest, false_alarms=false_alarms)
         brightest = np.maximum(combined.reference, combined.test).max(axis=-1)
         lit = brightest > FLOAT32 * brightest.mean()  # less is the cosine to a lamp in the surface's own plane, rounded
         share = float(rest.out[lit].mean()) if lit.any() else 0.0
         taken_out = TakenOut(rest.out, coincident.pairs, coincident.seen_otherwise, share)
     if trace_anew is not None and _is_doubtful(compared):
-        compared = compare_quantities(reference, tests, pinhole, test_samples, rest, trace_anew())
+        compared = compare_quantities(reference, tests, pinhole, test_samples, rest, trace_anew(), false_alarms)
     maps = dict(compared.maps)
     appearance, flip = perception.appearance(combined)
     if flip is not None:
@@ -121,6 +123,7 @@ def compare_quantities(
     test_samples: int | None = None,
     rest: Rest | None = None,
     anew: Sequence[Image] = (),
+    false_alarms: float = FALSE_ALARMS,
 ) -> QuantityComparison:
     """`compare` without what decides nothing. rest : what is compared where light is a renderer's choice. anew : the reference
     with several other seeds."""
@@ -142,7 +145,7 @@ def compare_quantities(
     maps: dict[str, NDArray] = {}
     for sides in unequal:
         if is_noisy:
-            row, drawn = _noisy(sides, rounding, freedom, FALSE_ALARMS / len(unequal))
+            row, drawn = _noisy(sides, rounding, freedom, false_alarms / len(unequal))
             if rest is not None:
                 hidden, left = (
                     float(rest.tolerance(sides).mean()),
