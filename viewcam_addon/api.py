@@ -28,6 +28,9 @@ if TYPE_CHECKING:  # each function imports what no other needs: a picture is tra
 
 File = str | os.PathLike[str]
 
+# From a picture's seed to those of what is traced again beside it: beyond the seeds of all rounds of a search for a bias.
+_OTHER_SEEDS = 1000
+
 
 def read_scene(path: File) -> Scene:
     """A scene file, as docs/scene-file.md has it and `viewcam export` writes it.
@@ -167,13 +170,13 @@ def compare(
         level, samples, seed = of.attributes.get("level", "path"), samples_of(of) or 0, seed_of(of)
 
         def coincident() -> CoincidentLight:
-            spent = (level, SAMPLES_OF_COINCIDENT, seed + 1)
+            spent = (level, SAMPLES_OF_COINCIDENT, seed + _OTHER_SEEDS)
             light, pairs, seen_otherwise = makes_tracer().coincident_light(*spent, ROUNDINGS[-1])
             total = makes_tracer().render_light(*spent)["Combined"][..., :3]
             return CoincidentLight(Image(light), total, pairs, seen_otherwise)
 
         def anew() -> list[Image]:
-            others = (seed + 2 + number for number in range(radiance.SEEDS))
+            others = (seed + _OTHER_SEEDS + 1 + number for number in range(radiance.SEEDS))
             return [Image(makes_tracer().render_light(level, samples, other), camera, of.attributes) for other in others]
 
         trace_anew = anew if 0 < samples <= MOST_SAMPLES and "Sample Count" not in of.passes else None
