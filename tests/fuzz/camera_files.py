@@ -83,10 +83,11 @@ def _crate() -> bytes:
 
 
 def _with_lenses(transforms: dict) -> dict:
-    """The same with a lens for all, and another of one frame's own."""
-    given = {"camera_model": "OPENCV", "k1": -0.1, "k2": 0.02, "p1": 1e-3, "p2": -5e-4, **transforms}
-    transforms["frames"][0] |= {"camera_model": "OPENCV_FISHEYE", "k1": 0.05, "k2": -0.01, "k3": 1e-3, "k4": -1e-4}
-    return given
+    """The same with a lens of each frame's own."""
+    first, second, *_ = transforms["frames"]
+    first |= {"camera_model": "OPENCV", "k1": -0.1, "k2": 0.02, "p1": 1e-3, "p2": -5e-4}
+    second |= {"camera_model": "OPENCV_FISHEYE", "k1": 0.05, "k2": -0.01, "k3": 1e-3, "k4": -1e-4}
+    return transforms
 
 
 def _lenses() -> dict[str, str]:
