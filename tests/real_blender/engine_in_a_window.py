@@ -185,8 +185,8 @@ def swipe():
     expected = displays.displayed(scene, np.ascontiguousarray(running.live.picture[..., :3]))
     line = round(running.line())
     rows, columns = slice(60, part.height - 80), slice(120, line - 20)  # between header, tools and words
-    worst = np.abs(shown[rows, columns, :3] - expected[rows, columns, :3]).max() * 255
-    there = np.abs(shown[rows, line + 20 :, :3] - expected[rows, line + 20 :, :3])
+    left = np.abs(shown[rows, columns, :3] - expected[rows, columns, :3])
+    right = np.abs(shown[rows, line + 20 :, :3] - expected[rows, line + 20 :, :3])
     y = part.y + part.height // 2
     move(part.x + line, y)
     yield
@@ -215,7 +215,7 @@ def swipe():
     yield
     assert module._running is None, "Escape does not end it"
     assert datablocks() == before, "it leaves something in the file"
-    figures = {"worst": float(worst), "right": float(there.mean() * 255), "moved": moved, "longest": longest}
+    figures = {"left": float(left.mean() * 255), "right": float(right.mean() * 255), "moved": moved, "longest": longest}
     Path(OUT).write_text(json.dumps(figures))
 
 

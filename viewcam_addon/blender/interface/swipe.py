@@ -58,6 +58,7 @@ class _Swipe:
         self._shades = shades(scene)
         self._view_transform = _view_transform(scene)
         self._shown: tuple | None = None  # the picture that is on the graphics card, and where
+        self._words = ""  # of it
 
     def is_open(self) -> bool:
         """True while the viewport is there."""
@@ -90,32 +91,38 @@ class _Swipe:
         if self._view_transform != (now := _view_transform(context.scene)):
             self._view_transform, self._shades, self._shown = now, shades(context.scene), None
 
+    def take_picture(self) -> None:
+        """Bring the latest picture to the graphics card, between two drawings: within one, the rest of it would be lost."""
+        live, before = self.live, (self._shown, self._words)
+        live.drawn = live.number  # before the picture, which may change meanwhile
+        picture, self._words = live.picture, live.words()
+        if picture is not None and (self._shown is None or self._shown[0] is not picture):
+            self._shown = picture, _on_the_graphics_card(picture, self._shades)
+        if self._shown is not before[0] or self._words != before[1]:
+            self.area.tag_redraw()
+
     def draw(self) -> None:
         """The picture left of the line, the line, and the two names, in the context's region."""
         context, line = bpy.context, self.line()
         scale, height = context.preferences.system.ui_scale, self.region.height
-        self.live.drawn = self.live.number
-        picture = self.live.picture
-        if picture is not None and not self.message:
-            self._draw_picture(picture, line, height)
+        if self._shown and not self.message:
+            self._draw_picture(self._shown[1], line, height)
         proof_image.fill(line - scale, 0, 2 * scale, height, (0.0, 0.0, 0.0, 0.6))
         proof_image.fill(line - scale / 2, 0, scale, height, (1.0, 1.0, 1.0, 0.9))
-        words = f"Reference: {self.message or self.live.words()}"
+        words = f"Reference: {self.message or self._words}"
         y = _MARGIN * scale
         proof_image.write(words, line - _MARGIN * scale, y, scale, before=True)
         proof_image.write(_name(context), line + _MARGIN * scale, y, scale)
 
-    def _draw_picture(self, picture: np.ndarray, line: float, height: float) -> None:
+    def _draw_picture(self, buffer: Any, line: float, height: float) -> None:
         import gpu
         from gpu_extras.batch import batch_for_shader
 
-        if self._shown is None or self._shown[0] is not picture:
-            self._shown = picture, _on_the_graphics_card(picture, self._shades)
         across = line / self.region.width
         shader = gpu.shader.from_builtin("IMAGE")
         corners = [(0, 0), (line, 0), (line, height), (0, height)]
         batch = batch_for_shader(shader, "TRI_FAN", {"pos": corners, "texCoord": [(0, 0), (across, 0), (across, 1), (0, 1)]})
-        shader.uniform_sampler("image", self._shown[1].texture_color)
+        shader.uniform_sampler("image", buffer.texture_color)
         gpu.state.blend_set("ALPHA")
         batch.draw(shader)
         gpu.state.blend_set("NONE")
@@ -257,6 +264,7 @@ class VIEWCAM_OT_swipe_reference(bpy.types.Operator):
             return self._leave(context)
         if event.type == "TIMER":
             swipe.follow(context)
+            swipe.take_picture()
         elif event.type == "ESC" and event.value == "PRESS" and not context.screen.is_animation_playing:
             return self._leave(context)
         elif event.type == "LEFTMOUSE" and event.value == "PRESS":

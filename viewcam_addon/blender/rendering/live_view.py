@@ -206,7 +206,7 @@ def _redraw() -> float | None:
     if any(each.drawn != each.number for each in LiveView._all):
         for window in bpy.context.window_manager.windows:
             for area in window.screen.areas:
-                if area.type == "VIEW_3D":  # any may have a swipe
+                if area.type == "VIEW_3D" and area.spaces.active.shading.type == "RENDERED":
                     area.tag_redraw()
     return None if all(each.is_settled for each in LiveView._all) else _SECONDS
 
