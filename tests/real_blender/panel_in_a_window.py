@@ -119,9 +119,14 @@ def unfold(panel):
 
 def open_the_panels():
     unfold(bpy.types.VIEWCAM_PT_sidebar_options)
+    yield from show_the_panel()
+
+
+def show_the_panel():
+    """Steps to the panel in the sidebar, and in the Properties editor."""
     view, sidebar = region("VIEW_3D", "UI")
     view.spaces.active.show_region_ui = True
-    window().view_layer.objects.active = camera()
+    window().view_layer.objects.active = bpy.context.scene.camera
     yield
     sidebar.active_panel_category = "Pinhole"
     region("PROPERTIES", "WINDOW")[0].spaces.active.context = "DATA"

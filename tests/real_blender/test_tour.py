@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -9,6 +10,7 @@ SCRIPT = Path(__file__).with_name("tour_in_a_window.py")
 # A virtual screen on a busy machine may lose a click: one loss is no finding, two at different times are.
 ATTEMPTS = 2
 MOVING_SCRIPT = Path(__file__).with_name("moving_picture.py")
+PHOTO, PHOTO_SCRIPT = (Path(__file__).with_name(name) for name in ("photo_of_a_room.py", "photo_picture.py"))
 
 
 def run_in_a_window(real_blender, script, height, *folder):
@@ -36,7 +38,9 @@ def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_b
     assert outcome.returncode == 0, said
     assert "done: the tour" in said and "Traceback" not in said, said  # what fails in a panel's draw() is only printed
     if folder:
-        make_the_moving_picture(real_blender, tmp_path, ROOT / folder[0] / ".." / "moving.webp")
+        images = ROOT / folder[0] / ".."
+        make_the_moving_picture(real_blender, tmp_path, images / "moving.webp")
+        take_the_picture_of_a_photo(real_blender, tmp_path / "photo.png", images / "photo-match.png")
 
 
 def make_the_moving_picture(real_blender, frames, target):
@@ -46,4 +50,11 @@ def make_the_moving_picture(real_blender, frames, target):
     outcome = run_in_a_window(real_blender, MOVING_SCRIPT, 1000, frames)
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     first, *rest = [Image.open(path).convert("RGB") for path in sorted(frames.glob("frame-*.png"))]
-    first.save(target, save_all=True, append_images=rest, duration=110, loop=0, quality=60)
+    first.save(target, save_all=True, append_images=rest, duration=90, loop=0, quality=48)
+
+
+def take_the_picture_of_a_photo(real_blender, photo, target):
+    """Match Photo's, in docs/artists.md."""
+    subprocess.run([sys.executable, PHOTO, photo], check=True)
+    outcome = run_in_a_window(real_blender, PHOTO_SCRIPT, 1000, target, photo)
+    assert outcome.returncode == 0, outcome.stdout + outcome.stderr

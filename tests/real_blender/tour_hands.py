@@ -25,11 +25,14 @@ _LEFT, _MIDDLE, _CHECKBOX, _OPERATORS = 0.2, 0.5, 0.13, (0.31, 0.38, 0.46, 0.53,
 _KEYS = {"-": "MINUS", ".": "PERIOD", " ": "SPACE", "/": "SLASH", "=": "EQUAL", ",": "COMMA"}
 _DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
 
+# The corners of a mouse pointer, pixels right of and below its tip.
+_ARROW = ((0, 0), (0, 17), (4, 13), (7, 19), (10, 18), (7, 12), (12, 12))
+
 _found = {}
 
 
-def begin():
-    """Steps to where the tour starts."""
+def begin(show=open_the_panels):
+    """Steps to where the tour starts. show : the steps that open the sidebar."""
     tour_step.make_the_scene()
     bpy.context.preferences.system.viewport_aa = "OFF"  # drawn in software
     view, _ = region("VIEW_3D", "WINDOW")
@@ -37,7 +40,7 @@ def begin():
     space.shading.color_type = "MATERIAL"
     space.region_3d.view_rotation = Euler((math.radians(66), 0, math.radians(75))).to_quaternion()
     space.region_3d.view_location, space.region_3d.view_distance = (1.2, -2.2, 1.2), 13
-    yield from open_the_panels()
+    yield from show()
 
 
 def under_the_mouse(where):
@@ -269,11 +272,26 @@ def lowest_button(where=SIDEBAR):
     return min(y for _, y in _map(where).values())
 
 
-def photograph(where, path, share=100):
-    """Save what the screen shows of (left, bottom, width, height), in percent of its size and few colors."""
+def hide_the_sidebar(hidden=True):
+    """Steps that hide the viewport's sidebar, or bring it back."""
+    area, _ = region(*VIEWPORT)
+    area.spaces.active.show_region_ui = not hidden
+    for _ in range(30):  # it slides
+        yield
+
+
+def photograph(where, path, share=100, pointer=None):
+    """Save what the screen shows of (left, bottom, width, height), in percent of its size and few colors.
+
+    pointer : where the mouse is, window coordinates, and its arrow is drawn: simulated events move none.
+    """
     left, bottom, width, height = map(int, where)
-    crop = f"{width}x{height}+{left}+{SCREEN_HEIGHT - bottom - height}"
-    few = ("+dither", "-colors", "192", "-depth", "8")
-    subprocess.run(
-        ["import", "-window", "root", "-crop", crop, "+repage", "-resize", f"{share}%", *few, "-strip", str(path)], check=True
-    )
+    screen = ("import", "-window", "root", "-crop", f"{width}x{height}+{left}+{SCREEN_HEIGHT - bottom - height}", "+repage")
+    arrow = ()
+    if pointer:
+        x, y = pointer[0] - left, bottom + height - pointer[1]
+        corners = " ".join(f"{x + 1.6 * right:.0f},{y + 1.6 * down:.0f}" for right, down in _ARROW)
+        arrow = ("-fill", "white", "-stroke", "black", "-strokewidth", "1.5", "-draw", f"polygon {corners}")
+    few = ("-resize", f"{share}%", "+dither", "-colors", "192", "-depth", "8", "-strip")
+    shot = subprocess.run([*screen, "png:-"], check=True, capture_output=True).stdout
+    subprocess.run(["convert", "png:-", *arrow, *few, str(path)], input=shot, check=True)
