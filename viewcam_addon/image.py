@@ -51,7 +51,7 @@ class _Pass:
 
 # Two are the tracer's own, by which a tolerance can be derived: Magnitude, that float32's relative rounding applies to at a
 # hit, in world units (its largest coordinate, plus the distance times the slenderness of the triangle), and Facing, the cosine
-# between ray and true normal. The core (capi.h) numbers them in this order.
+# between ray and true normal. The core (integrators/geometry.h) numbers them in this order.
 _GEOMETRY = {
     "Depth": _Pass("Z", "use_pass_z"),
     "Position": _Pass("XYZ", "use_pass_position"),
@@ -63,7 +63,7 @@ _GEOMETRY = {
     "Facing": _Pass("X"),
 }
 # Variance is the tracer's own: the estimated variance of Combined's color, which is a mean of samples. Here, too, the order is
-# the core's (capi_light.h).
+# the core's (film/film.h).
 _LIGHT = {
     "Combined": _Pass("RGBA"),
     "Emission": _Pass("RGB", "use_pass_emit", "Emit"),

@@ -35,7 +35,7 @@ from .scene.value_nodes import IES, OWN
 from .tiles import Passes
 
 LIGHT = (*LIGHT_PASSES, "Sample Count")
-"""The passes of light, as capi_light.h has them."""
+"""The passes of light, as core/film/film.h has them."""
 NO_HIT = 0xFFFFFFFF
 """In place of the number of what is met, where nothing is."""
 TILE = 32
@@ -143,10 +143,6 @@ class _LightSettings(Structure):
     ]
 
 
-class _LightPasses(Structure):
-    _fields_ = [(name, c_void_p) for name in LIGHT]
-
-
 def _function(result: Any, *arguments: Any) -> Any:
     return ctypes.CFUNCTYPE(result, *arguments)
 
@@ -184,7 +180,7 @@ class _Core(Structure):
         ("light_create", _function(c_int, c_void_p, POINTER(_LightSettings), POINTER(c_void_p))),
         ("light_free", _function(None, c_void_p)),
         ("light_pairs", _function(c_size_t, c_void_p, c_size_t, c_void_p, c_void_p)),
-        ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, POINTER(_LightPasses), c_void_p)),
+        ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, c_void_p, c_void_p)),
         (
             "probe_sobol",
             _function(c_int, c_uint32, c_uint32, c_int, c_size_t, c_void_p, c_void_p, c_int, c_int, c_void_p),
@@ -622,7 +618,7 @@ class CoreLight:
 
     def trace(self, passes: Passes, row: int, column: int, stop: Any) -> None:
         """Write a tile, by its lowest row and first column, into `LIGHT`'s passes, (height, width, channels), C-contiguous."""
-        addresses = _LightPasses(*(_address(passes.get(name)) for name in LIGHT))
+        addresses = (c_void_p * len(LIGHT))(*(_address(passes.get(name)) for name in LIGHT))
         self._scene.check(self._scene.core.trace_light(self._handle, row, column, addresses, stop))
 
     def pairs(self) -> list[tuple[int, int | None, int]]:

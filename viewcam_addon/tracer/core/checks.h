@@ -116,9 +116,9 @@ inline void light(const Scene& scene, const ViewcamLightSettings& given) {
     that(given.coincident >= 0 && given.coincident <= LARGEST, "surfaces in one place are less than 0 roundings apart, or too many");
     that(given.error >= 0 && std::isfinite(given.error), "the error is below 0, or no number");
 }
-inline void tile(const Camera& camera, uint32_t row, uint32_t column, const ViewcamLightPasses& to) {
+inline void tile(const Camera& camera, uint32_t row, uint32_t column, const LightPasses& to) {
     that(row < camera.height && column < camera.width, "a tile is asked for that the picture does not have");
-    that(to.combined, "the pass Combined has no place to go");
+    that(to.plane[LightPasses::COMBINED], "the pass Combined has no place to go");
 }
 
 }  // namespace viewcam::VIEWCAM_ISA::check

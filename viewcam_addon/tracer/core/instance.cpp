@@ -280,10 +280,10 @@ const ViewcamCore core = {
         return pairs.size();
     },
     .trace_light =
-        [](const ViewcamLight* light, uint32_t row, uint32_t column, const ViewcamLightPasses* passes, const volatile int* stop) {
+        [](const ViewcamLight* light, uint32_t row, uint32_t column, float* const* passes, const volatile int* stop) {
             return guarded([&] {
-                check::tile(light_of(light).camera(), row, column, *passes);
-                trace_light(light_of(light), row, column, *passes, stop);
+                check::tile(light_of(light).camera(), row, column, {passes});
+                trace_light(light_of(light), row, column, {passes}, stop);
             });
         },
 

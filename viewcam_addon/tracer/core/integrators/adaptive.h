@@ -40,7 +40,7 @@ class TileSampler {
     const Camera& camera() const { return camera_; }
     const PathIntegrator& integrator() const { return integrator_; }
     // Traces the tile whose lowest row and first column are given. `*stop`, if there is one, ends it early.
-    void trace(uint32_t row, uint32_t column, const ViewcamLightPasses& passes, const volatile int* stop) const {
+    void trace(uint32_t row, uint32_t column, const LightPasses& passes, const volatile int* stop) const {
         Tile tile{row, column, std::min(TILE, camera_.height - row), std::min(TILE, camera_.width - column), {}};
         tile.pixels.resize(TILE * TILE);
         if (error_ > 0 && samples_ > 1) {
@@ -124,7 +124,7 @@ class TileSampler {
         }
     }
 
-    void trace_until_known(Tile& tile, const ViewcamLightPasses& passes, const volatile int* stop) const {
+    void trace_until_known(Tile& tile, const LightPasses& passes, const volatile int* stop) const {
         std::vector<Spread> spreads(TILE * TILE);
         std::vector<double> efficiencies;
         std::vector<uint16_t> active = all(tile), going;
