@@ -6,9 +6,11 @@ test-sanitizers` runs this on a core that stops at whatever is read or written o
 
 import ctypes
 import os
+import re
 import subprocess
 import sys
 from ctypes import byref, c_int, c_void_p
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +21,7 @@ from viewcam_addon.image import GEOMETRY_PASSES
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import native
 from viewcam_addon.tracer.scene import scene_file
+from viewcam_addon.tracer.scene.value_nodes import IES
 from viewcam_addon.tracer.scene.value_nodes import KINDS as VALUES
 
 EXAMPLES = int(os.environ.get("VIEWCAM_FUZZ_CALLS", "60"))
@@ -156,7 +159,7 @@ def make_nodes(draw, calls):
     for _ in range(draw(st.integers(0, 3))):
         kind = draw(mostly(st.sampled_from(sorted(VALUES)), ["principled", ""]))
         inputs = []
-        for name, default in VALUES.get(kind, {}).items():
+        for name, default in (VALUES[kind].inputs if kind in VALUES else {}).items():
             words = default if isinstance(default, tuple) and isinstance(default[0], str) else ("true", "false")
             given = native._Input(name.encode(), draw(mostly(st.sampled_from(words), ["guess"])).encode())
             given.color.rgb[:] = [draw(NUMBER) for _ in range(3)]
@@ -167,6 +170,36 @@ def make_nodes(draw, calls):
             rows, values = calls.at(numbers(draw, 6 * 5), np.float64), np.empty((5, 4))
             calls("probe_nodes", calls.scene, 5, rows, values.ctypes.data)
             calls("constant_node", calls.scene, values.ctypes.data, byref(c_int()))
+
+
+def test_the_core_has_the_nodes_of_the_table_and_asks_for_every_input_of_it():
+    headers = Path(native.__file__).parent.glob("core/nodes/*.h")
+    named = {name for header in headers for name in re.findall(r'NAME = "(\w+)"', header.read_text(encoding="utf-8"))}
+    assert named - {"constant"} == set(VALUES)
+    calls = Calls()
+    assert calls("add_texture", calls.scene, 1, 1, 3, False, 0, calls.at(np.ones(4), np.float32))
+
+    def is_made(kind, names):
+        inputs = [native._Input(name.encode(), word_of(VALUES[kind].inputs[name]), native._Color(node=-1)) for name in names]
+        return calls("add_node", calls.scene, native._Node(kind.encode(), (native._Input * len(inputs))(*inputs), len(inputs)))
+
+    def word_of(default):
+        chosen = default[0] if isinstance(default, tuple) and isinstance(default[0], str) else "true"
+        return b"2 2 0 1 0 1 1 1 1 1" if default == IES else chosen.encode()
+
+    for kind, row in VALUES.items():
+        assert is_made(kind, row.inputs), f"the core has no {kind} with the inputs {', '.join(row.inputs)}"
+        left = [name for name in row.inputs if is_made(kind, [each for each in row.inputs if each != name])]
+        assert not left, f"the core's {kind} does not ask for {', '.join(left)}"
+    calls.close()
+
+
+def test_curves_without_a_table_are_refused():
+    calls = Calls()
+    inputs = [native._Input(name.encode(), b"true", native._Color(image=-1, node=-1)) for name in VALUES["rgb_curves"].inputs]
+    assert not calls("add_node", calls.scene, native._Node(b"rgb_curves", (native._Input * len(inputs))(*inputs), len(inputs)))
+    assert "table" in calls.core.message().decode()
+    calls.close()
 
 
 def trace(draw, calls):
@@ -193,7 +226,7 @@ def trace_light(draw, calls):
         return
     width, height = calls.size
     passes = np.zeros((len(native.LIGHT), 4 * max(width * height, 1)), np.float32)
-    addresses = native._LightPasses(*(values.ctypes.data if draw(st.integers(0, 30)) else None for values in passes))
+    addresses = (c_void_p * len(passes))(*(values.ctypes.data if draw(st.integers(0, 30)) else None for values in passes))
     calls(
         "trace_light",
         light,

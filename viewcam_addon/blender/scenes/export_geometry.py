@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...tracer.scene import Mesh, Spheres
+from ...tracer.scene.value_nodes import VERTEX_COLOR
 from .. import versions
 from . import cycles_attributes
 
@@ -170,7 +171,7 @@ def _corner_uvs(mesh: bpy.types.Mesh, corners: Array) -> Array | None:
 
 def _corner_colours(mesh: bpy.types.Mesh, triangles: Array, corners: Array, faces: Array) -> Array:
     """(triangles, 3, 3) float32, linear: the colors that are active for rendering; black, as in Cycles, where none are."""
-    colours = _corner_values(mesh, cycles_attributes.VERTEX_COLOR, triangles, corners, faces)
+    colours = _corner_values(mesh, VERTEX_COLOR, triangles, corners, faces)
     return np.zeros((*corners.shape, 3), np.float32) if colours is None else np.ascontiguousarray(colours[:, :, :3])
 
 
@@ -180,7 +181,7 @@ def _corner_values(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: A
         return _generated(mesh)[triangles]
     if name in (cycles_attributes.POINTINESS, cycles_attributes.RANDOM_PER_ISLAND):
         return _of_edges(mesh, name)[triangles, np.newaxis]
-    if name == cycles_attributes.VERTEX_COLOR and mesh.color_attributes.render_color_index >= 0:
+    if name == VERTEX_COLOR and mesh.color_attributes.render_color_index >= 0:
         name = mesh.color_attributes[mesh.color_attributes.render_color_index].name
     attribute = mesh.attributes.get(name)
     if attribute is None or attribute.data_type not in _ATTRIBUTES:

@@ -16,6 +16,7 @@ from ...errors import InputError
 from ...tracer.scene.materials import PLAIN, Colour
 from ...tracer.scene.shader_nodes import KINDS, Node
 from ...tracer.scene.value_nodes import GENERATED, OWN, POSITION, UV
+from ...tracer.scene.value_nodes import KINDS as VALUE_NODES
 from .. import versions
 from ..temporary_settings import Overrides
 from . import images, nodes, shaders, value_nodes
@@ -140,22 +141,22 @@ def _shader(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.typ
 
 def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.types.NodeSocket:
     """The output of nodes that make a value; those are one that differ by their output alone."""
-    value = next(value for ours, value in value_nodes.VALUES if ours == node.type)
+    row = VALUE_NODES[node.type].blender[0]
     key = node.type, tuple(each for each in node.inputs if each[0] != "output")
     added = adder.values.get(key)
     if added is None:
-        added = adder.values[key] = adder.add(value.class_name)
-        for name, wanted in value.fixed.items():
+        added = adder.values[key] = adder.add(row.class_name)
+        for name, wanted in row.fixed.items():
             setattr(added, name, wanted)
-        for name, theirs in value.words.items():
+        for name, theirs in row.words.items():
             if node[name] == KINDS[node.type].inputs[name][0] and not hasattr(added, theirs):
                 continue  # what an older version does
-            _choose(added, theirs, value_nodes.word_of(node.type, node[name]))
-        for name, theirs in value.flags.items():
+            _choose(added, theirs, row.word(node[name]))
+        for name, theirs in row.flags.items():
             setattr(added, theirs, node[name])
-        for name, theirs in value.names.items():
+        for name, theirs in row.names.items():
             setattr(added, theirs, node[name])
-        for name, theirs in value.numbers.items():
+        for name, theirs in row.numbers.items():
             setattr(added, theirs, type(getattr(added, theirs))(node[name][0]))
         if "image" in KINDS[node.type].inputs and node["image"] is not None:
             added.image = reading.images[node["image"].image]
@@ -164,14 +165,14 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
         if "table" in KINDS[node.type].inputs:
             table, ends = reading.images[node["table"].image], (node["least"][0], node["most"][0])
             value_nodes.draw_curves(added.mapping, table, *ends, node["extrapolate"])
-        for name, theirs in value.inputs.items():
+        for name, theirs in row.inputs.items():
             socket = value_nodes.input_of(added, theirs)
             if socket is None:
-                _want_as_before(added, theirs, node[name], value.before[name])
+                _want_as_before(added, theirs, node[name], row.before[name])
             elif KINDS[node.type].inputs[name] not in (UV, GENERATED, POSITION, *OWN) or name in dict(node.inputs):
                 _colour(adder, socket, node[name], reading)
     word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
-    found = [socket for socket in added.outputs if value.outputs.get(socket.identifier, "") == word]
+    found = [socket for socket in added.outputs if row.outputs.get(socket.identifier, "") == word]
     return next((socket for socket in found if socket.enabled), found[0])
 
 

@@ -455,13 +455,13 @@ class Tree:
             return self._ramp(output)
         if node.type == "NORMAL":
             return self._along(output)
-        found = value_nodes.value_of(output)
+        found = value_nodes.row_of(output)
         if found is None:
             self._reason(output, "is not modelled")
             return None
         told = len(self.reading.reasons)
-        ours, value = found
-        words = value_nodes.given_words(output, ours, value)
+        ours, row = found
+        words = value_nodes.given_words(output, ours, row)
         why = words if isinstance(words, str) else self._departure(output, ours)
         if why:
             self._reason(output, why)
@@ -488,14 +488,14 @@ class Tree:
                 self._reason(output, f"shows what {str(error).partition(': ')[0].removeprefix('it ')}")
                 return None
             given["text"] = text
-        for name, theirs in value.inputs.items():
+        for name, theirs in row.inputs.items():
             known = KINDS[ours].inputs[name]
             if known in OWN:
                 given |= self._normal(output, name, theirs)
                 continue
             socket = value_nodes.input_of(node, theirs)
             if socket is None:
-                given[name] = (value.before[name],) * 3
+                given[name] = (row.before[name],) * 3
                 continue
             is_beside, self._is_beside = self._is_beside, self._is_beside or name == "height"
             read = self._value_input(Input(socket, output.groups), known)

@@ -103,7 +103,7 @@ KINDS: dict[str, Kind] = {
     ),
     "mix": Kind({"factor": 0.5, "first": None, "second": None}),
     "add": Kind({"first": None, "second": None}),
-    **{name: Kind(inputs, is_value=True) for name, inputs in value_nodes.KINDS.items()},
+    **{name: Kind(row.inputs, is_value=True) for name, row in value_nodes.KINDS.items()},
 }
 
 _NEEDED = {"image": "the name of one", "table": "the name of an image of one row", "text": "that of an IES file"}
