@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewcam_addon import cameras, image
+from viewcam_addon import cameras, commands, image
 from viewcam_addon.cli import main
 from viewcam_addon.commands.demo import SCENE as DEMO_SCENE
 from viewcam_addon.jobs.folder import Folder
@@ -497,3 +497,31 @@ def test_another_engine_is_checked_by_its_geometry_alone(capfd):
     assert "--engine EEVEE is checked at level geometry" in fails(
         capfd, "check", "any.blend", "--engine", "EEVEE", "--level", "path"
     )
+
+
+LISTING = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import viewcam_addon
+from viewcam_addon import cli, commands
+assert viewcam_addon.__file__.startswith(sys.argv[1]), viewcam_addon.__file__
+assert cli.main(["--help"]) == 0
+named = [name for name in sys.modules if name.startswith("viewcam_addon.commands.")]
+assert not named, f"--help imports {named}"
+"""
+
+
+@pytest.mark.parametrize("form", ["folder", "zip"])
+def test_help_tells_the_first_line_of_each_module_of_a_command_and_imports_none(tmp_path, form):
+    package = Path(commands.__file__).parent.parent
+    path = package.parent
+    if form == "zip":
+        path = Path(shutil.make_archive(str(tmp_path / "viewcam"), "zip", package.parent, package.name))
+    done = subprocess.run([sys.executable, "-P", "-c", LISTING, path], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    listed = " ".join(done.stdout.split())
+    assert {"check", "batch", "demo"} <= set(commands.names())
+    for name in commands.names():
+        summary = importlib.import_module(f"viewcam_addon.commands.{name}").__doc__.splitlines()[0]
+        assert summary.endswith(".") and f"{name} {summary}" in listed, name
+    assert "serve" not in listed.partition("positional")[2], "a command for our own processes is listed"

@@ -67,7 +67,7 @@ def test_everything_is_printed_by_the_one_that_makes_it_plain():
         "files.py": {"stdout", "stderr"},  # flushed
         "__main__.py": {"stdout", "stderr"},  # flushed
         "child_process.py": {"stdout", "stderr"},  # flushed; those of child processes
-        "commands/options.py": {"stdout"},  # flushed
+        "commands/_options.py": {"stdout"},  # flushed
     }
     found = {}
     for path in PACKAGE.rglob("*.py"):

@@ -11,7 +11,7 @@ import contextlib
 import functools
 import json
 from collections.abc import Collection, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import bpy
 import numpy as np
@@ -24,6 +24,9 @@ from . import datablocks, versions
 
 EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
 _VECTORS = ("eye", "look_at", "up")
+# What is no property of its own, or not as it is; a property with the name of each other value holds it.
+_NOT_PLAIN = EXACT | {"counted_in", "set_for", "view_when_set", "precision", "follows", "asked"}
+_PLAIN = tuple(each.name for each in fields(CameraValues) if each.name not in _NOT_PLAIN)
 _ASKED = "asked"  # where Blender keeps what `ask` has noted
 # What is noted of a camera once it has been set.
 _NOTED = ("distance", "counted_in", "set_for", "view_when_set", "held_roll")
@@ -72,18 +75,13 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
         look_at=numbers[3:6],
         up=numbers[6:9],
         distance=numbers[9],
-        zoom=group.zoom,
-        enabled=group.enabled,
-        keeps=group.keeps,
         counted_in=_frame(tuple(group.counted_in)),
         set_for=_frame(tuple(group.picture)),
-        pole=group.pole,
-        hold_within=group.hold_within,
-        held_roll=group.held_roll,
         view_when_set=(when_set[0][0:3], when_set[0][3:6], when_set[0][6:9]) if when_set else None,
         precision=2.0**-53 if is_exact and not follows else 2.0**-24,
         follows=follows,
         asked=tuple(asked.items()),
+        **{name: getattr(group, name) for name in _PLAIN},
     )
 
 

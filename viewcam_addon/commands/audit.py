@@ -1,5 +1,7 @@
-"""`viewcam audit`: what is wrong with a dataset's cameras, by points, depth maps, true cameras or the .blend that was
-rendered (cameras/audit.py)."""
+"""Tell what is wrong with a dataset's cameras, by its points or depth maps.
+
+By points, depth maps, true cameras or the .blend that was rendered (cameras/audit.py).
+"""
 
 import argparse
 import dataclasses
@@ -15,7 +17,7 @@ from ..cameras.evidence import depths, tracks
 from ..errors import InputError
 from ..terminal import say, silent_libraries
 from . import Result, blender_room
-from . import options as shared
+from . import _options as shared
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:

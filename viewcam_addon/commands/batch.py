@@ -1,4 +1,7 @@
-"""`viewcam batch`: what is asked for becomes jobs, and these are carried out (carry_out.py)."""
+"""Render many shots of one file: opened once, each written whole, and continued after whatever ended it.
+
+What is asked for becomes jobs, and these are carried out (_carry_out.py).
+"""
 
 import argparse
 import dataclasses
@@ -16,9 +19,9 @@ from ..jobs.job import ENGINES, LEVELS, Job
 from ..jobs.plan import Plan
 from ..labels import KINDS
 from . import Result
-from . import options as shared
+from . import _options as shared
+from ._carry_out import add_machines, carry_out
 from .camera import add_reading_options, options_of
-from .carry_out import add_machines, carry_out
 
 _EXAMPLES = """\
 examples:

@@ -1,6 +1,6 @@
-"""`viewcam camera`: cameras of any program, a .blend among them, listed or written for another.
+"""List the cameras of another program's file, or write them for a third one.
 
-A file, a folder or, as "-", what stands on standard input; see cameras/.
+A .blend is such a file, too. A file, a folder or, as "-", what stands on standard input; see cameras/.
 """
 
 import argparse

@@ -1,11 +1,11 @@
-"""`viewcam compare`: EXRs of one camera, compared against derived tolerances and noise."""
+"""Compare EXRs of one camera against derived tolerances and noise."""
 
 import argparse
 
 from .. import argument_types as types
 from ..terminal import say
 from . import Result
-from . import options as shared
+from . import _options as shared
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:

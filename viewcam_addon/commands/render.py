@@ -1,4 +1,7 @@
-"""`viewcam render`: a scene file traced into an EXR, and its ground truth beside it."""
+"""Trace a scene file into an EXR.
+
+The ground truth is written beside it.
+"""
 
 import argparse
 import dataclasses
@@ -9,7 +12,7 @@ from .. import argument_types as types
 from ..errors import InputError
 from ..terminal import say
 from . import Result
-from . import options as shared
+from . import _options as shared
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
