@@ -38,6 +38,23 @@ def add_camera(fresh_blender, scene):
 
 
 @pytest.fixture
+def add_rig(fresh_blender, scene):
+    """A function that adds an armature of one bone, Head, from (0, 0, 1) to (0, 1, 2)."""
+
+    def add(roll=0.0):
+        armature = fresh_blender.data.objects.new("Rig", fresh_blender.data.armatures.new("Rig"))
+        scene.collection.objects.link(armature)
+        fresh_blender.context.view_layer.objects.active = armature
+        fresh_blender.ops.object.mode_set(mode="EDIT")
+        bone = armature.data.edit_bones.new("Head")
+        bone.head, bone.tail, bone.roll = (0, 0, 1), (0, 1, 2), roll
+        fresh_blender.ops.object.mode_set(mode="OBJECT")
+        return armature
+
+    return add
+
+
+@pytest.fixture
 def camera_object(add_camera):
     """A new camera at the origin, looking down."""
     return add_camera()

@@ -103,14 +103,8 @@ def test_a_parents_place_rotation_and_uniform_scale_are_respected(camera_object,
     assert moved <= 9 * FLOAT32 * 100, f"{moved:.2e}"  # lengths below 100 went into it
 
 
-def test_a_bone_as_parent_is_respected(camera_object, scene):
-    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    scene.collection.objects.link(armature)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.object.mode_set(mode="EDIT")
-    bone = armature.data.edit_bones.new("Head")
-    bone.head, bone.tail, bone.roll = (0, 0, 1), (0, 1, 2), 0.4
-    bpy.ops.object.mode_set(mode="OBJECT")
+def test_a_bone_as_parent_is_respected(camera_object, scene, add_rig):
+    armature = add_rig(0.4)
     armature.location = (1, 2, 3)
     camera_object.parent, camera_object.parent_type, camera_object.parent_bone = armature, "BONE", "Head"
     pinhole = random_pinhole(np.random.default_rng(4))

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from viewcam_addon.commands.carry_out import _refuse_names_of_labels
+from viewcam_addon.commands._carry_out import _refuse_names_of_labels
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs.folder import Folder, Outputs
 from viewcam_addon.jobs.job import Job

@@ -50,7 +50,7 @@ from types import ModuleType
 import numpy as np
 
 from .. import checks, terminal
-from ..errors import InputError
+from ..errors import InputError, several
 from ..files import written_whole
 from ..pinhole import Pinhole
 from . import (
@@ -71,7 +71,6 @@ from . import (
     metashape,
     mitsuba,
     mujoco,
-    naming,
     opencv,
     openmvg,
     own,
@@ -224,7 +223,7 @@ def _each_of_folder(source: Source, module: ModuleType, options: Options) -> lis
         with left_out.unless_pinhole(name):
             found = _read(file, module, options)
             cameras += [replace(camera, name=name if len(found) == 1 else f"{name} {camera.name}") for camera in found]
-    told = (f"Not read, since they are not {module.TITLE}: {naming.several(others)}",) if others else ()
+    told = (f"Not read, since they are not {module.TITLE}: {several(others)}",) if others else ()
     return [camera.noted(*told) for camera in left_out.told(sorted(cameras, key=lambda camera: camera.name))]
 
 

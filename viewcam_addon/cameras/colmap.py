@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import checks
-from ..errors import InputError
+from ..errors import InputError, several
 from ..pinhole import Pinhole, ViewPlane
 from . import axes, distortion, naming, own
 from .axes import intrinsics, quaternion, world_to_camera
@@ -322,7 +322,7 @@ def check_names(files: Iterable[str]) -> None:
     """Raise InputError if a picture's name holds a space, of any width, since some readers part there, too."""
     parted = [file for file in files if any(map(str.isspace, file))]
     if parted:
-        raise InputError(f"a COLMAP model can't name a picture with a space, as {naming.several(parted)}: rename it")
+        raise InputError(f"a COLMAP model can't name a picture with a space, as {several(parted)}: rename it")
 
 
 def texts(cameras: Iterable[Camera], tracks: Tracks | None = None) -> dict[str, str]:

@@ -136,7 +136,8 @@ class Source:
         problem = ""
         for attempt in attempts:
             try:
-                return json.loads(attempt, object_pairs_hook=_unique, parse_int=_whole, parse_constant=_not_finite), ""
+                numbers = {"parse_int": checks.whole_of_json, "parse_constant": _not_finite}
+                return json.loads(attempt, object_pairs_hook=_unique, **numbers), ""
             except json.JSONDecodeError as error:
                 problem = f"line {error.lineno}, column {error.colno}: {error.msg}"
             except RecursionError:
@@ -361,10 +362,6 @@ def _unique(pairs: list[tuple[str, object]]) -> dict:
         twice, _ = Counter(key for key, _ in pairs).most_common(1)[0]
         raise InputError(f"the key {checks.shown(twice)} is given twice: leave one out")
     return result
-
-
-def _whole(digits: str) -> int | float:
-    return int(digits) if len(digits) <= 300 else float(digits)  # Python refuses thousands of them
 
 
 def _not_finite(name: str) -> float:

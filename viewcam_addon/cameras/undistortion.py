@@ -23,7 +23,7 @@ from typing import Any, cast
 import numpy as np
 
 from .. import npy
-from ..errors import InputError
+from ..errors import InputError, several
 from ..files import read_bytes, written_whole
 from ..pinhole import ViewPlane
 from . import colmap, naming, transforms
@@ -174,7 +174,7 @@ def _save(cameras: Sequence[Camera], dataset: Path, out: Path, form: str, blank:
     beside = _beside(dataset, cameras)
     files = [naming.picture_of(camera, folder) for camera in cameras]
     if missing := [naming.image_of(camera) for camera, file in zip(cameras, files, strict=True) if file is None]:
-        raise InputError(f"{naming.several(missing)} can't be found beside {dataset} nor in images/: put the pictures there")
+        raise InputError(f"{several(missing)} can't be found beside {dataset} nor in images/: put the pictures there")
     cut_planes: dict[tuple[Lens, ViewPlane], ViewPlane] = {}
     written, frames = [], []
     for camera, file, others in zip(cameras, files, beside, strict=True):

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import several
+
 SAME, SAME_BUT, DIFFERENT = "same", "same_but", "different"
 ANSWERS = (SAME, SAME_BUT, DIFFERENT)
 
 COLORS = {SAME: "green", SAME_BUT: "amber", DIFFERENT: "red"}
-
-_MOST_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -164,8 +164,7 @@ def percent_of(share: float) -> str:
 
 
 def _named(not_modelled: NotModelled) -> str:
-    names = not_modelled.names
-    named = ", ".join(names[:_MOST_NAMED]) + (f" and {len(names) - _MOST_NAMED:,} more" if len(names) > _MOST_NAMED else "")
+    named = several(not_modelled.names)
     if not_modelled.share is None:
         return f"{named}; on how much of the picture was not measured"
     return f"{named}; {percent_of(not_modelled.share)} of the picture"

@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..cameras import Camera, colmap, save, transforms
-from ..cameras.naming import several
-from ..errors import InputError
+from ..errors import InputError, several
 from ..files import check_writable
 from ..pinhole import Pinhole
 from .folder import Folder

@@ -19,9 +19,8 @@ from viewcam_addon.blender.temporary_settings import cameras_unbound, overridden
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import makers
 from viewcam_addon.jobs.job import Job
-from viewcam_addon.jobs.tracing import Tracing
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("one_process")]
 
 LEFT = Job("left", eye=(-3.0, -6.0, 2.5), look_at=(0.0, 0.0, 0.5), up=(0.0, 0.0, 1.0), d=90.0)
 RIGHT = replace(LEFT, name="right", eye=(3.0, -5.0, 2.0), d=110.0)
@@ -31,21 +30,6 @@ SIZE = (96, 54)
 def add(kind, **options):
     getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**options)
     return bpy.context.object
-
-
-@pytest.fixture(scope="module")
-def tracing():
-    """One for all tests, since to start it takes as long as a test."""
-    with Tracing() as tracing:
-        yield tracing
-
-
-@pytest.fixture(autouse=True)
-def one_process(tracing, monkeypatch):
-    class Kept(Tracing):
-        ask = staticmethod(tracing.ask)  # its own process is never started
-
-    monkeypatch.setattr(renderers, "Tracing", Kept)
 
 
 @pytest.fixture

@@ -9,14 +9,14 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import image
-from viewcam_addon.blender.jobs import renderer as renderers
 from viewcam_addon.blender.jobs import scene_files
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
 from viewcam_addon.jobs.folder import Folder, Outputs
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.one import render_one
-from viewcam_addon.jobs.tracing import Tracing
 from viewcam_addon.pinhole import Pinhole
+
+pytestmark = pytest.mark.usefixtures("one_process")
 
 ALLOWED = 1e-3
 """Pixels: what flow may differ by where depths are float32."""
@@ -25,21 +25,6 @@ SLOPE = 0.25
 STATED = Job("stated", eye=(-3.0, -6.0, 2.5), look_at=(0.0, 0.0, 0.5), up=(0.0, 0.0, 1.0), d=90.0, frame=2)
 FRAMES = [Job(f"frame_{number}", camera="Camera", frame=number) for number in (1, 2, 3)]
 ALL = Outputs(picture=False, labels=("depth", "masks", "amodal", "flow"))
-
-
-@pytest.fixture(scope="module")
-def tracing():
-    """One for all tests, since to start it takes as long as a test."""
-    with Tracing() as tracing:
-        yield tracing
-
-
-@pytest.fixture(autouse=True)
-def one_process(tracing, monkeypatch):
-    class Kept(Tracing):
-        ask = staticmethod(tracing.ask)  # its own process is never started
-
-    monkeypatch.setattr(renderers, "Tracing", Kept)
 
 
 @pytest.fixture

@@ -548,14 +548,8 @@ def test_child_of_under_a_parent_carries_the_camera_and_the_pose_sticks(posed_ca
     odd.check(posed_camera)
 
 
-def test_an_armature_constraint_carries_the_camera_and_the_pose_sticks(posed_camera, constrain, scene, odd):
-    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    scene.collection.objects.link(armature)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.object.mode_set(mode="EDIT")
-    bone = armature.data.edit_bones.new("Head")
-    bone.head, bone.tail = (0, 0, 1), (0, 1, 2)
-    bpy.ops.object.mode_set(mode="OBJECT")
+def test_an_armature_constraint_carries_the_camera_and_the_pose_sticks(posed_camera, constrain, add_rig, odd):
+    armature = add_rig()
     armature.pose.bones["Head"].location = (1, 0, 0)
     target = constrain("ARMATURE", target=False).targets.new()
     target.target, target.subtarget = armature, "Head"
