@@ -179,17 +179,20 @@ def test_the_core_has_the_nodes_of_the_table_and_asks_for_every_input_of_it():
     calls = Calls()
     assert calls("add_texture", calls.scene, 1, 1, 3, False, 0, calls.at(np.ones(4), np.float32))
 
-    def is_made(kind, names):
-        inputs = [native._Input(name.encode(), word_of(VALUES[kind].inputs[name]), native._Color(node=-1)) for name in names]
+    def is_made(kind, names, which=0):
+        words = [word_of(VALUES[kind].inputs[name], which) for name in names]
+        inputs = [native._Input(name.encode(), word, native._Color(node=-1)) for name, word in zip(names, words, strict=True)]
         return calls("add_node", calls.scene, native._Node(kind.encode(), (native._Input * len(inputs))(*inputs), len(inputs)))
 
-    def word_of(default):
-        chosen = default[0] if isinstance(default, tuple) and isinstance(default[0], str) else "true"
+    def word_of(default, which):
+        chosen = default[which] if isinstance(default, tuple) and isinstance(default[0], str) else "true"
         return b"2 2 0 1 0 1 1 1 1 1" if default == IES else chosen.encode()
 
     for kind, row in VALUES.items():
-        assert is_made(kind, row.inputs), f"the core has no {kind} with the inputs {', '.join(row.inputs)}"
-        left = [name for name in row.inputs if is_made(kind, [each for each in row.inputs if each != name])]
+        names = tuple(row.inputs)
+        assert is_made(kind, names), f"the core has no {kind} with the inputs {', '.join(names)}"
+        # By the first words, or by the last, as the direction of rings alone.
+        left = [each for each in names if all(is_made(kind, set(names) - {each}, which) for which in (0, -1))]
         assert not left, f"the core's {kind} does not ask for {', '.join(left)}"
     calls.close()
 
