@@ -109,13 +109,14 @@ def write(scene: Scene, folder: Path) -> None:
     for number, placed in enumerate(scene.objects):
         geometry = scene.geometries[placed.geometry]
         material = scene.materials.get(placed.materials[0], PLAIN) if placed.materials else PLAIN
-        if not isinstance(geometry, Mesh) or set(material.colours) != {"diffuse"} or len(set(placed.materials)) > 1:
+        is_matte = [each.node.type for each in material.closures] == ["diffuse"]
+        if not isinstance(geometry, Mesh) or not is_matte or len(set(placed.materials)) > 1:
             raise InputError(f"object {placed.name!r} is more than one matte mesh: race Mitsuba on another scene")
         smooth = geometry.corner_normals is not None
         for place, matrix in enumerate(placed.matrices):
             file = folder / f"{number}.{place}.ply"
             _mesh(mitsuba, geometry, placed.name, matrix).write_ply(str(file))
-            document["objects"].append({"file": file.name, "smooth": smooth, "colour": material.diffuse.rgb})
+            document["objects"].append({"file": file.name, "smooth": smooth, "colour": material.surface["color"].rgb})
     for lamp in scene.lamps:
         if not isinstance(lamp, Sun) or lamp.angle:
             raise InputError(f"light {lamp.name!r} is no sun without size: race Mitsuba on another scene")

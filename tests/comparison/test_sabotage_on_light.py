@@ -16,7 +16,7 @@ from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Area, Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, Material, Picture
+from viewcam_addon.tracer.scene.materials import Colour, Material, Picture, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 pytestmark = pytest.mark.slow
@@ -44,7 +44,7 @@ def ball(centre, radius, rings=16):
 
 
 def lambert(*colour):
-    return Material(diffuse=Colour(colour))
+    return sum_of(diffuse=Colour(colour))
 
 
 def build():
@@ -104,7 +104,7 @@ def test_the_right_picture_is_the_same_within_noise(reference, level, samples):
 
 
 def recoloured(scene, name, factor):
-    colour = tuple(factor * value for value in scene.materials[name].diffuse.rgb)
+    colour = tuple(factor * value for value in scene.materials[name].surface["color"].rgb)
     return replace(scene, materials={**scene.materials, name: lambert(*colour)})
 
 

@@ -16,7 +16,7 @@ from viewcam_addon.tracer.render import PASSES, Keeper, Tracer, render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Point, Sun
-from viewcam_addon.tracer.scene.materials import Colour, Material
+from viewcam_addon.tracer.scene.materials import Colour, sum_of
 from viewcam_addon.tracer.scene.sameness import same, same_things
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -301,7 +301,7 @@ def test_spheres_that_touch_one_depth_overlap_or_coincide_are_all_found(make_sce
 
 
 WIDTH, HEIGHT = 96, 64
-GREEN, RED = Material(diffuse=Colour((0.1, 0.8, 0.2))), Material(diffuse=Colour((0.9, 0.1, 0.1)))
+GREEN, RED = sum_of(diffuse=Colour((0.1, 0.8, 0.2))), sum_of(diffuse=Colour((0.9, 0.1, 0.1)))
 GROUND = np.array([[-300, -300, -1.2], [300, -300, -1.2], [300, 300, -1.2], [-300, 300, -1.2]], float)
 
 

@@ -159,6 +159,7 @@ def test_a_wrong_formula_is_caught(pictures, sun, sabotage, monkeypatch):
 
     from viewcam_addon.blender.scenes import lamps
     from viewcam_addon.tracer.scene import materials
+    from viewcam_addon.tracer.scene.shader_nodes import Closure, node
 
     right = lamps.lamps_in
 
@@ -174,12 +175,14 @@ def test_a_wrong_formula_is_caught(pictures, sun, sabotage, monkeypatch):
 
     monkeypatch.setattr(lamps, "lamps_in", wrong)
     if sabotage == "albedo":
-        colours = materials.Material.colours.fget
+        closures = materials.Material.closures.fget
 
         def darker(material):
-            return {name: replace(each, rgb=tuple(0.99999 * x for x in each.rgb)) for name, each in colours(material).items()}
+            for each in closures(material):
+                color = each.node["color"]
+                yield Closure(node(each.node.type, color=replace(color, rgb=tuple(0.99999 * x for x in color.rgb))))
 
-        monkeypatch.setattr(materials.Material, "colours", property(darker))
+        monkeypatch.setattr(materials.Material, "closures", property(lambda material: tuple(darker(material))))
     sides = pictures(sun, scenes=2)
     with pytest.raises(AssertionError):
         check(sides * 5, SUN)

@@ -210,15 +210,15 @@ def test_a_percent_less_light_is_caught(take, scene, sabotage, monkeypatch):
     """The tests above must be able to fail."""
     from viewcam_addon.blender.scenes import export, shaders
     from viewcam_addon.tracer.scene.film import Bounces
-    from viewcam_addon.tracer.scene.materials import Colour, Material
+    from viewcam_addon.tracer.scene.materials import Colour, sum_of
 
     if sabotage == "albedo":
         right = shaders.read
 
         def darker(material):
             reading = right(material)
-            rgb = tuple(0.99 * value for value in reading.material.diffuse.rgb)
-            reading.material = Material(diffuse=Colour(rgb))
+            rgb = tuple(0.99 * value for value in reading.material.surface["color"].rgb)
+            reading.material = sum_of(diffuse=Colour(rgb))
             return reading
 
         monkeypatch.setattr(shaders, "read", darker)

@@ -379,7 +379,7 @@ def test_without_nodes_the_viewports_colours_count(pictures, floor, scene):
     bpy.data.objects["Monkey"].hide_render = True
     sides = pictures(scenes=1)
     check(sides, FLAT)
-    assert not told(sides) and sides[0].exported.materials["Floor"].diffuse.rgb == pytest.approx((0.7, 0.4, 0.2))
+    assert not told(sides) and sides[0].exported.materials["Floor"].surface["color"].rgb == pytest.approx((0.7, 0.4, 0.2))
     assert np.allclose(sides[0].traced["Environment"], sides[0].cycles[0]["Environment"], rtol=1e-6)
     assert sides[0].traced["Environment"].max() == pytest.approx(0.3)
 
@@ -391,7 +391,7 @@ def test_images_that_are_missing_are_the_magenta_that_cycles_shows(pictures, flo
     texture(floor, missing if is_named else None, "Linear")
     sides = pictures(scenes=1)
     check(sides, FLAT)
-    assert not told(sides) and sides[0].exported.materials["Floor"].diffuse.rgb == (1.0, 0.0, 1.0)
+    assert not told(sides) and sides[0].exported.materials["Floor"].surface["color"].rgb == (1.0, 0.0, 1.0)
     (said,) = (entry.reason for entry in sides[0].exported.ledger if entry.object == "Floor")
     assert ("'Gone', which is missing: magenta" if is_named else "without an image: magenta") in said
 

@@ -9,8 +9,8 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.scenes import materials, shaders
 from viewcam_addon.blender.temporary_settings import overridden
-from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material
-from viewcam_addon.tracer.scene.shader_nodes import KINDS, Node, node
+from viewcam_addon.tracer.scene.materials import PLAIN_COLOR, Colour, Material, sum_of
+from viewcam_addon.tracer.scene.shader_nodes import KINDS, SHADERS, Node, node
 
 RED, GREEN = (0.5, 0.25, 0.125), (0.0, 1.0, 0.5)
 
@@ -160,7 +160,7 @@ def test_an_ies_text_is_made_for_blender_and_gone_with_the_stand_in(diffuse):
 def test_a_displacement_is_read_as_the_height_that_it_is_made_of(diffuse):
     """And as what it is made into along the normal, where it is a Vector Displacement, or goes along other axes."""
     height = node("noise", vector=node("texture_coordinate"), scale=3.0)
-    made = Material(diffuse=Colour(RED), displacement=height)
+    made = sum_of(diffuse=Colour(RED), displacement=height)
     with overridden() as overrides:
         materials.stand_in(overrides, diffuse, shaders.Reading(made))
         assert exactly(diffuse) == made
@@ -235,7 +235,7 @@ def test_a_normal_node_is_its_direction_and_how_far_another_goes_along_it(diffus
     assert exactly(diffuse).surface["color"] == node("vector_math", operation="dot_product", **unit)
 
 
-@pytest.mark.parametrize("surface", [TEXTURED, *(node(kind) for kind in shaders.SHADERS if kind not in ("mix", "add"))])
+@pytest.mark.parametrize("surface", [TEXTURED, *(node(kind) for kind in SHADERS if kind not in ("mix", "add"))])
 def test_the_stand_in_of_a_shader_is_read_as_that_shader(diffuse, image, surface):
     if surface.type == "metallic" and bpy.app.version < (4, 3):
         return  # it came with 4.3
@@ -263,15 +263,15 @@ def diffuse(make_material):
 
 
 def test_the_shaders_that_are_components_are_read_as_they_are(make_material):
-    assert exactly(make_material("d", "ShaderNodeBsdfDiffuse", Color=colour(RED))) == Material(diffuse=Colour(RED))
+    assert exactly(make_material("d", "ShaderNodeBsdfDiffuse", Color=colour(RED))) == sum_of(diffuse=Colour(RED))
     emission = make_material("e", "ShaderNodeEmission", Color=colour(RED), Strength=4.0)
-    assert exactly(emission) == Material(emission=Colour((2.0, 1.0, 0.5)))
+    assert exactly(emission) == sum_of(emission=Colour((2.0, 1.0, 0.5)))
     mirror = make_material("m", "ShaderNodeBsdfGlossy", Color=colour(RED), Roughness=0.0)
-    assert exactly(mirror) == Material(mirror=Colour(RED))
+    assert exactly(mirror) == sum_of(mirror=Colour(RED))
     glass = make_material("g", "ShaderNodeBsdfGlass", Color=colour(RED), Roughness=0.0, IOR=1.5)
-    assert exactly(glass) == Material(glass=Colour(RED), ior=1.5)
+    assert exactly(glass) == sum_of(glass=Colour(RED), ior=1.5)
     clear = make_material("r", "ShaderNodeBsdfRefraction", Color=colour(RED), Roughness=0.0, IOR=1.25)
-    assert exactly(clear) == Material(refraction=Colour(RED), ior=1.25)
+    assert exactly(clear) == sum_of(refraction=Colour(RED), ior=1.25)
 
 
 @pytest.mark.parametrize(("socket", "value"), [("Specular IOR Level", 0.0), ("IOR", 1.0)])
@@ -279,9 +279,9 @@ def test_a_principled_surface_without_gloss_is_lamberts(make_material, socket, v
     material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED), Roughness=0.3, Anisotropic=0.5)
     inputs = material.node_tree.nodes["Shader"].inputs
     inputs[socket].default_value = value
-    assert exactly(material) == Material(diffuse=Colour(RED))
+    assert exactly(material) == sum_of(diffuse=Colour(RED))
     inputs["Emission Color"].default_value, inputs["Emission Strength"].default_value = colour(GREEN), 2.0
-    assert exactly(material) == Material(diffuse=Colour(RED), emission=Colour((0.0, 2.0, 1.0)))
+    assert exactly(material) == sum_of(diffuse=Colour(RED), emission=Colour((0.0, 2.0, 1.0)))
 
 
 PRINCIPLED = {
@@ -303,7 +303,7 @@ PRINCIPLED = {
 def test_a_principled_surface_is_read_with_what_it_is_given(make_material, name):
     material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED))
     inputs = material.node_tree.nodes["Shader"].inputs
-    socket = shaders.SHADERS["principled"].inputs[name]
+    socket = SHADERS["principled"].inputs[name]
     if socket not in inputs:  # Diffuse Roughness came with 4.3
         assert socket == "Diffuse Roughness" and bpy.app.version < (4, 3)
         return
@@ -323,7 +323,7 @@ def test_what_a_principled_surface_is_beyond_that_is_named_and_left_out(make_mat
 
 @pytest.mark.parametrize("kind", ["diffuse", "glossy", "glass", "refraction"])
 def test_rough_shaders_are_read_as_shaders(make_material, kind):
-    material = make_material("rough", shaders.SHADERS[kind].class_name, Color=colour(RED), Roughness=0.25)
+    material = make_material("rough", SHADERS[kind].class_name, Color=colour(RED), Roughness=0.25)
     read = exactly(material).surface
     assert read.type == kind and read["color"] == Colour(RED) and read["roughness"] == Colour((0.25,) * 3)
 
@@ -367,12 +367,12 @@ def test_shaders_are_mixed_and_added_by_constant_factors(diffuse):
     mixed = add_shader(diffuse, "ShaderNodeMixShader", (1, nodes["Shader"]), (2, added))
     mixed.inputs[0].default_value = 0.25
     show(diffuse, mixed)
-    assert exactly(diffuse) == Material(
+    assert exactly(diffuse) == sum_of(
         diffuse=Colour((0.375, 0.1875, 0.09375)), emission=Colour((0.5,) * 3), mirror=Colour((0.0, 0.25, 0.125))
     )
     both = add_shader(diffuse, "ShaderNodeAddShader", (0, mixed), (1, nodes["Shader"]))
     show(diffuse, both)
-    assert exactly(diffuse).diffuse == Colour((0.875, 0.4375, 0.21875)), "two of a kind add up"
+    assert exactly(diffuse).surface["first"]["second"]["color"] == Colour((0.875, 0.4375, 0.21875)), "two of a kind add up"
 
 
 @pytest.mark.parametrize(("factor", "left"), [(0.0, "first"), (-1.0, "first"), (1.0, "second"), (7.0, "second")])
@@ -382,7 +382,7 @@ def test_what_has_no_weight_in_a_mixture_is_not_looked_at(diffuse, factor, left)
     mixed = add_shader(diffuse, "ShaderNodeMixShader", *enumerate(pair if left == "first" else pair[::-1], start=1))
     mixed.inputs[0].default_value = factor
     show(diffuse, mixed)
-    assert exactly(diffuse) == Material(diffuse=Colour(RED))
+    assert exactly(diffuse) == sum_of(diffuse=Colour(RED))
 
 
 @pytest.mark.parametrize(("socket", "weight"), [("Coat Roughness", "Coat Weight"), ("Sheen Tint", "Sheen Weight")])
@@ -400,7 +400,7 @@ def test_a_texture_that_is_not_modelled_leaves_the_color_of_the_viewport_and_is_
         pytest.skip(f"Blender {bpy.app.version_string} has no {kind}")
     diffuse.diffuse_color = (*RED, 1.0)
     link(diffuse, f"ShaderNode{kind}", 0, "Color")
-    assert approximately(diffuse, "not modelled") == Material(diffuse=Colour(RED))
+    assert approximately(diffuse, "not modelled") == sum_of(diffuse=Colour(RED))
 
 
 def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
@@ -414,14 +414,14 @@ def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
 
 def test_other_shaders_are_lamberts_of_their_colour(make_material):
     toon = make_material("t", "ShaderNodeBsdfToon", Color=colour(RED))
-    assert approximately(toon, "'Shader'", "not modelled") == Material(diffuse=Colour(RED))
+    assert approximately(toon, "'Shader'", "not modelled") == sum_of(diffuse=Colour(RED))
 
 
 def test_what_has_no_colour_has_the_viewports(make_material):
     unknown = make_material("s", "ShaderNodeBsdfDiffuse")
     link(unknown, "ShaderNodeAmbientOcclusion", 0, "Color").name = "Wires"
     unknown.diffuse_color = colour(GREEN)
-    assert approximately(unknown, "'Wires'", "not modelled") == Material(diffuse=Colour(GREEN))
+    assert approximately(unknown, "'Wires'", "not modelled") == sum_of(diffuse=Colour(GREEN))
 
 
 def test_constant_nodes_reroutes_muted_nodes_and_groups_are_looked_through(diffuse):
@@ -445,14 +445,14 @@ def test_constant_nodes_reroutes_muted_nodes_and_groups_are_looked_through(diffu
     tree.links.new(muted.outputs[0], reroute.inputs[0])
     tree.links.new(reroute.outputs[0], node.inputs["Tint"])
     show(diffuse, node)
-    assert exactly(diffuse) == Material(emission=Colour((1.0, 0.5, 0.25)))
+    assert exactly(diffuse) == sum_of(emission=Colour((1.0, 0.5, 0.25)))
 
 
 def test_a_value_is_a_grey_and_a_colour_has_a_luminance(make_material):
     material = make_material("e", "ShaderNodeEmission")
     link(material, "ShaderNodeValue", 0, "Color").outputs[0].default_value = 0.5
     link(material, "ShaderNodeRGB", 0, "Strength").outputs[0].default_value = colour((0.0, 1.0, 0.0))
-    assert exactly(material).emission.rgb == pytest.approx((0.5 * 0.7151687,) * 3)
+    assert exactly(material).surface["color"].rgb == pytest.approx((0.5 * 0.7151687,) * 3)
 
 
 @pytest.fixture
@@ -465,9 +465,9 @@ def image(fresh_blender):
 def test_an_image_and_the_meshs_colours_are_factors(diffuse, image):
     texture = link(diffuse, "ShaderNodeTexImage", 0, "Color")
     texture.image, texture.interpolation = image, "Closest"
-    assert exactly(diffuse) == Material(diffuse=Colour((1.0, 1.0, 1.0), "Checks", closest=True))
+    assert exactly(diffuse) == sum_of(diffuse=Colour((1.0, 1.0, 1.0), "Checks", closest=True))
     link(diffuse, "ShaderNodeVertexColor", 0, "Color")
-    assert exactly(diffuse) == Material(diffuse=Colour((1.0, 1.0, 1.0), vertex=True))
+    assert exactly(diffuse) == sum_of(diffuse=Colour((1.0, 1.0, 1.0), vertex=True))
 
 
 @pytest.mark.parametrize(
@@ -508,12 +508,12 @@ def test_colours_that_light_can_not_have_are_named(diffuse, value):
 def test_without_nodes_or_without_an_output_the_viewports_colour_counts(diffuse):
     diffuse.diffuse_color = colour(GREEN)
     diffuse.node_tree.nodes.remove(diffuse.node_tree.nodes["Output"])
-    assert shaders.read(diffuse).material == Material(diffuse=Colour(GREEN))
+    assert shaders.read(diffuse).material == sum_of(diffuse=Colour(GREEN))
 
 
 def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image):
     """What Cycles is shown is what the tracer is given, or the shader below would be another."""
-    made = Material(
+    made = sum_of(
         diffuse=Colour(RED),
         emission=Colour((1.0, 2.0, 3.0)),
         mirror=Colour(GREEN),
@@ -526,11 +526,11 @@ def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image
         materials.stand_in(overrides, diffuse, shaders.Reading(made))
         assert exactly(diffuse) == made
     assert [node.name for node in diffuse.node_tree.nodes] == before
-    assert exactly(diffuse) == Material(diffuse=Colour(RED))
+    assert exactly(diffuse) == sum_of(diffuse=Colour(RED))
 
 
 def test_products_of_colours_are_read_as_what_they_stand_for(diffuse, image):
-    made = Material(
+    made = sum_of(
         diffuse=Colour((0.5, 0.25, 0.0), image.name_full, closest=True, vertex=True),
         emission=Colour((4.0, 2.0, 1.0), vertex=True),
         mirror=Colour((0.5, 0.5, 0.5), image.name_full),
@@ -542,5 +542,5 @@ def test_products_of_colours_are_read_as_what_they_stand_for(diffuse, image):
 
 def test_the_plain_material_is_the_tracers(fresh_blender):
     with overridden() as overrides:
-        assert exactly(materials.plain(overrides)).diffuse.rgb == pytest.approx(PLAIN.diffuse.rgb, rel=2.0**-24)
+        assert exactly(materials.plain(overrides)).surface["color"].rgb == pytest.approx(PLAIN_COLOR.rgb, rel=2.0**-24)
     assert not bpy.data.materials

@@ -11,7 +11,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import ies, scene_file
 from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun
-from viewcam_addon.tracer.scene.materials import Colour, Material, Picture
+from viewcam_addon.tracer.scene.materials import Colour, Material, Picture, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 DOWN = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 32, 24)
@@ -36,7 +36,7 @@ def ies_text(across, up, values, kind=1, factor=1.0):
 
 
 def lambert(albedo) -> Material:
-    return Material(diffuse=Colour((albedo,) * 3))
+    return sum_of(diffuse=Colour((albedo,) * 3))
 
 
 def square(make_mesh, half=1.0):

@@ -13,7 +13,7 @@ from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.colours import RGBE
 from viewcam_addon.tracer.scene.film import Film
-from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material, Picture
+from viewcam_addon.tracer.scene.materials import PLAIN_COLOR, Colour, Picture, sum_of
 
 CAMERA = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 10, 8, 8)
 SEEDS = st.integers(0, 2**32 - 1)
@@ -236,15 +236,15 @@ def shown(*materials, pass_name="Diffuse Color", images=None, uv=None, vertex_co
 
 
 def test_each_surface_has_the_colour_of_its_material_and_black_where_its_material_has_none():
-    materials = None, Material(diffuse=RED), Material(emission=GREEN)
-    np.testing.assert_allclose(shown(*materials), [PLAIN.diffuse.rgb, RED.rgb, (0, 0, 0)], rtol=1e-7)
+    materials = None, sum_of(diffuse=RED), sum_of(emission=GREEN)
+    np.testing.assert_allclose(shown(*materials), [PLAIN_COLOR.rgb, RED.rgb, (0, 0, 0)], rtol=1e-7)
     np.testing.assert_allclose(shown(*materials, pass_name="Emission"), [(0, 0, 0), (0, 0, 0), GREEN.rgb], rtol=1e-7)
 
 
 def test_images_and_vertex_colours_multiply_the_colour_where_their_material_is_and_nowhere_else():
     images = {"ramp": grey([[0.5, 0.25]])}
-    textured = Material(diffuse=Colour((1.0, 0.5, 0.0), image="ramp", closest=True, vertex=True))
-    of_red = Material(diffuse=RED)
+    textured = sum_of(diffuse=Colour((1.0, 0.5, 0.0), image="ramp", closest=True, vertex=True))
+    of_red = sum_of(diffuse=RED)
     for u, expected in ((0.1, (0.5, 0.125, 0)), (0.9, (0.25, 0.0625, 0))):
         found = shown(textured, of_red, images=images, uv=(u, 0.5), vertex_colours=(1.0, 0.5, 0.25))
         np.testing.assert_allclose(found, [expected, RED.rgb], rtol=1e-6)

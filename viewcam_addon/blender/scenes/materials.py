@@ -14,7 +14,8 @@ import bpy
 
 from ...errors import InputError
 from ...tracer.scene.materials import PLAIN, Colour
-from ...tracer.scene.shader_nodes import KINDS, Node
+from ...tracer.scene.shader_nodes import KINDS, SHADERS, Node, word_of
+from ...tracer.scene.shader_nodes import node as _node
 from ...tracer.scene.value_nodes import GENERATED, OWN, POSITION, UV
 from ...tracer.scene.value_nodes import KINDS as VALUE_NODES
 from .. import versions
@@ -26,14 +27,6 @@ _TRANSPARENT = {"BSDF_TRANSPARENT", "HOLDOUT"}
 _TURNING = {"BUMP", "NORMAL_MAP", "BEVEL"}
 _UNKNOWN = {"SCRIPT"}
 _WHITE = (1.0, 1.0, 1.0)
-# The shaders of the tracer's components.
-_SHADERS = {
-    "diffuse": "ShaderNodeBsdfDiffuse",
-    "emission": "ShaderNodeEmission",
-    "mirror": "ShaderNodeBsdfGlossy",
-    "glass": "ShaderNodeBsdfGlass",
-    "refraction": "ShaderNodeBsdfRefraction",
-}
 
 
 def departures(material: bpy.types.Material, lit: bool = False) -> list[str]:
@@ -109,27 +102,17 @@ def _add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Re
         raised.space = "WORLD"
         _colour(adder, raised.inputs["Height"], made.displacement, reading)
         adder.link(raised.outputs[0], output.inputs["Displacement"])
-    if made.surface is not None:
-        adder.link(_shader(adder, made.surface, reading).outputs[0], output.inputs["Surface"])
-        return
-    total = None
-    for component, colour in made.colours.items():
-        shader = adder.add(_SHADERS[component])
-        _set(shader, "Roughness", 0.0)
-        _set(shader, "IOR", made.ior)
-        _colour(adder, shader.inputs["Color"], colour, reading)
-        total = shader if total is None else adder.add("ShaderNodeAddShader", total.outputs[0], shader.outputs[0])
     # Without any light Cycles would draw nothing: not even the depth.
-    total = total or adder.add("ShaderNodeBsdfDiffuse", Color=(0.0, 0.0, 0.0, 1.0))
-    adder.link(total.outputs[0], output.inputs["Surface"])
+    surface = made.surface or _node("diffuse", color=Colour((0.0, 0.0, 0.0)))
+    adder.link(_shader(adder, surface, reading).outputs[0], output.inputs["Surface"])
 
 
 def _shader(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.types.Node:
     """Add the nodes that a tree of shader nodes is."""
-    shader = shaders.SHADERS[node.type]
+    shader = SHADERS[node.type]
     added = adder.add(shader.class_name)
     for name, theirs in shader.words.items():
-        setattr(added, theirs, shaders.word_of(node[name]))
+        setattr(added, theirs, word_of(node[name]))
     for name, theirs in shader.inputs.items():
         value = node[name]
         if isinstance(value, Node) and not value.is_value:
@@ -224,11 +207,6 @@ def _times(adder: nodes.Adder, *factors: bpy.types.NodeSocket) -> bpy.types.Node
     multiply = adder.add("ShaderNodeVectorMath", *factors)
     multiply.operation = "MULTIPLY"
     return multiply
-
-
-def _set(node: bpy.types.Node, name: str, value: float) -> None:
-    if name in node.inputs:
-        node.inputs[name].default_value = value
 
 
 def keep_normals(overrides: Overrides, material: bpy.types.Material) -> None:

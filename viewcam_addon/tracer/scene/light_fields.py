@@ -19,7 +19,7 @@ from .fields import Arrays, Field
 from .film import Bounces, Film
 from .geometry_fields import LARGEST_INLINE, array_document
 from .lamps import Lamp, World
-from .materials import Colour, Material, Picture
+from .materials import COMPONENTS, Colour, Material, Picture, sum_of
 from .shader_nodes import KINDS, MOST_DEEP, Node
 
 KEYS = ("images", "materials", "lamps", "world", "film", "bounces", "cycles")
@@ -96,14 +96,9 @@ def _changed(owner: Lamp | World | Film | Bounces) -> dict[str, Any]:
 
 
 def _material_document(material: Material) -> dict[str, Any]:
-    plain = ((name, getattr(material, name)) for name in ("ior", "transparent_shadow"))
-    document: dict[str, Any] = {name: value for name, value in plain if value != getattr(Material, name)}
-    for each in dataclasses.fields(material):
-        colour = getattr(material, each.name)
-        if isinstance(colour, Colour):
-            document[each.name] = _colour_document(colour)
     trees = ((name, getattr(material, name)) for name in ("surface", "displacement"))
-    return document | {name: _node_document(tree) for name, tree in trees if tree is not None}
+    document: dict[str, Any] = {name: _node_document(tree) for name, tree in trees if tree is not None}
+    return document if material.transparent_shadow else document | {"transparent_shadow": False}
 
 
 def _node_document(node: Node) -> dict[str, Any]:
@@ -140,17 +135,20 @@ def _picture(field: Field, arrays: Arrays) -> Picture:
 
 
 def _material(field: Field) -> Material:
-    others = ("ior", "surface", "transparent_shadow", "displacement")
-    components = [each.name for each in dataclasses.fields(Material) if each.name not in others]
-    keys = field.fields((), (*components, *others))
-    given: dict[str, Any] = {name: _colour(keys[name]) for name in components if name in keys}
+    """A tree of nodes, or components, which are read as one."""
+    keys = field.fields((), (*COMPONENTS, "ior", "surface", "transparent_shadow", "displacement"))
+    given: dict[str, Any] = {name: _colour(keys[name]) for name in COMPONENTS if name in keys}
+    beside = [name for name, colour in given.items() if not colour.is_black]
+    if "surface" in keys and beside:
+        field.fail(f"has a surface beside {', '.join(beside)}: give one or the other")
     if "ior" in keys:
         given["ior"] = keys["ior"].number()
-    given |= {name: _node(keys[name]) for name in ("surface", "displacement") if name in keys}
+    trees = {name: _node(keys[name]) for name in ("surface", "displacement") if name in keys}
     if "transparent_shadow" in keys:
-        given["transparent_shadow"] = keys["transparent_shadow"].truth()
+        trees["transparent_shadow"] = keys["transparent_shadow"].truth()
     try:
-        return Material(**given)
+        made = sum_of(**given)
+        return dataclasses.replace(made, **trees)
     except InputError as error:
         field.hand_on(error)
 
