@@ -370,7 +370,7 @@ def test_some_hundred_random_attacks(attack):
 
 def test_what_is_no_number_is_shown_in_one_short_line():
     for value in NO_NUMBERS:
-        text = checks.shown(value)
+        text = checks.quoted(value)
         assert "\n" not in text and len(text) < 70, text
     with pytest.raises(InputError, match=r"eye is array\(\[\[1., 2., 3.\]\]\): give 3 numbers"):
         Pinhole(np.array([[1.0, 2.0, 3.0]]), (0, 0, 0), (0, 0, 1), 500, 64, 48)

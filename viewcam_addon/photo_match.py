@@ -221,13 +221,13 @@ def solve_edges(
     ends : (..., n, 2, 2): edge, end, pixels from the principal point. axes : (n,) which of the world's axes each runs along.
     half : of the picture's larger side, pixels. known_distance : d in pixels where the lens is known.
     """
-    found = np.unique(axes)
+    present = np.unique(axes)
     scaled = np.concatenate([ends / half, np.ones((*ends.shape[:-1], 1))], axis=-1)
     normals = np.cross(scaled[..., 0, :], scaled[..., 1, :])
     normals /= np.linalg.norm(normals[..., :2], axis=-1, keepdims=True)
-    vanishing = np.stack([np.linalg.svd(normals[..., axes == axis, :])[2][..., -1, :] for axis in found], axis=-2)
+    vanishing = np.stack([np.linalg.svd(normals[..., axes == axis, :])[2][..., -1, :] for axis in present], axis=-2)
     above = below = 0.0
-    for i, j in combinations(range(len(found)), 2):
+    for i, j in combinations(range(len(present)), 2):
         across = (vanishing[..., i, :2] * vanishing[..., j, :2]).sum(axis=-1)
         away = vanishing[..., i, 2] * vanishing[..., j, 2]
         above, below = above - across * away, below + away * away
@@ -239,12 +239,12 @@ def solve_edges(
     seen /= np.linalg.norm(seen, axis=-1, keepdims=True)
     # What moves along an axis moves in the picture by V − p W, where (V, W) is its vanishing point.
     along = scaled[..., 1, :2] - scaled[..., 0, :2]
-    for k, axis in enumerate(found):
+    for k, axis in enumerate(present):
         of = axes == axis
         towards = vanishing[..., k, None, :2] - scaled[..., of, 0, :2] * vanishing[..., k, None, 2:]
         seen[..., k, :] *= np.where((along[..., of, :] * towards).sum(axis=(-1, -2)) < 0.0, -1.0, 1.0)[..., None]
-    is_mirrored = np.linalg.det(seen) < 0.0 if len(found) == 3 else np.zeros(distance.shape, bool)
-    rotation = _nearest_rotation(np.einsum("...ki,kj->...ij", seen, np.eye(3)[found]))
+    is_mirrored = np.linalg.det(seen) < 0.0 if len(present) == 3 else np.zeros(distance.shape, bool)
+    rotation = _nearest_rotation(np.einsum("...ki,kj->...ij", seen, np.eye(3)[present]))
     directions = np.eye(3)[axes]
 
     def measured(rotation: Array, _eye: Array, distance: Array) -> tuple[Array, Array]:

@@ -81,8 +81,8 @@ def _chart(
     wanted = dict(zip(still.wanted, ratios, strict=True))
     times = standings.times(tracks, wanted, reference.error)
     found = standings.standings(times, wanted)
-    told = [standing.told() for standing in found]
-    told += [f"to {error:g} nobody can tell" for error in wanted if error not in {standing.target for standing in found}]
+    claims = [standing.summary() for standing in found]
+    claims += [f"to {error:g} nobody can tell" for error in wanted if error not in {standing.target for standing in found}]
     width, height = still.size
     rounds = max(len(point.seconds) for points in tracks.values() for point in points)
     return standings.Contested(
@@ -91,7 +91,8 @@ def _chart(
         f"seconds, {figure.seconds}: median, least and most of {rounds}",
         "RMS error of Combined",
         standings.curves(tracks, reference.error, found),
-        f"Read how long each takes to an error: {'; '.join(told)}. {reference.told()}{' Quick: not judged.' if quick else ''}",
+        f"Read how long each takes to an error: {'; '.join(claims)}. {reference.summary()}"
+        + (" Quick: not judged." if quick else ""),
         tie=0.0,
         levels=tuple(wanted),
         standings=found,

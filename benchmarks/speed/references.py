@@ -52,7 +52,7 @@ class Reference:
         measured = rms(combined(path) - self.picture)
         return math.sqrt(max(measured * measured - self.error * self.error, 0.0))
 
-    def told(self) -> str:
+    def summary(self) -> str:
         sides = " and ".join(f"{half.side} with 2 × {half.samples:,} samples" for half in self.halves)
         return (
             f"The reference, {sides}, is itself off by {self.error:.2g}, which is taken off; the two differ by "

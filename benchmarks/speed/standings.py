@@ -21,7 +21,7 @@ class Reached:
     seconds: float
     beyond: bool
 
-    def told(self) -> str:
+    def summary(self) -> str:
         return f"{self.method.name} {self.seconds:.3g} s{' (its curve followed on)' if self.beyond else ''}"
 
     def figures(self) -> dict[str, object]:
@@ -41,9 +41,9 @@ class Standing:
     def ratio(self) -> float:
         return self.rival.seconds / self.ours.seconds
 
-    def told(self) -> str:
+    def summary(self) -> str:
         wanted = "" if self.wanted is None else f", wanted {self.wanted:g}"
-        return f"to {self.target:g} {self.ours.told()}, {self.rival.told()}: {self.ratio:.2f} times as fast{wanted}"
+        return f"to {self.target:g} {self.ours.summary()}, {self.rival.summary()}: {self.ratio:.2f} times as fast{wanted}"
 
     def figures(self) -> dict[str, object]:
         sides = {"ours": self.ours.figures(), "rival": self.rival.figures()}
@@ -54,7 +54,7 @@ class Standing:
 class Contested(Chart):
     """A chart of error against time, judged by its standings.
 
-    standings : each with ratio, wanted, told() and figures(). times : error → when each method reaches it. measured : all
+    standings : each with ratio, wanted, summary() and figures(). times : error → when each method reaches it. measured : all
     points, for JSON. judged : whether what is wanted and missed counts.
     """
 
@@ -65,7 +65,7 @@ class Contested(Chart):
 
     def behind(self) -> list[str]:
         missed = (standing for standing in self.standings if standing.wanted is not None and standing.ratio < standing.wanted)
-        return [f"{self.title}: {standing.told()}" for standing in missed if self.judged]
+        return [f"{self.title}: {standing.summary()}" for standing in missed if self.judged]
 
     def lines(self) -> list[str]:
         """A table of the times of all methods, the fastest first."""
@@ -73,7 +73,7 @@ class Contested(Chart):
         for target, all_reached in self.times.items():
             lines += [
                 f"  to {target:g}",
-                *(f"    {each.told()}" for each in sorted(all_reached, key=lambda each: each.seconds)),
+                *(f"    {each.summary()}" for each in sorted(all_reached, key=lambda each: each.seconds)),
             ]
         return lines
 

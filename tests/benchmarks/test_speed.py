@@ -89,7 +89,7 @@ def test_between_points_of_a_power_law_the_time_is_that_of_the_law(exponent, sec
 def test_beyond_its_points_a_curve_is_followed_on_no_further_than_to_a_quarter_of_its_error_and_that_is_said():
     points = power_law(1.0, -0.5)
     found = reached(OURS, points, points[-1].error / 2)
-    assert found.beyond and found.seconds == pytest.approx(256.0) and "followed on" in found.told()
+    assert found.beyond and found.seconds == pytest.approx(256.0) and "followed on" in found.summary()
     assert reached(OURS, points, points[-1].error / 5) is None
 
 

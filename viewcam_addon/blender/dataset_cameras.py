@@ -39,7 +39,7 @@ def of_file(
         scene = bpy.context.scene
         objects = {each.name: each for each in scene.objects if each.type == "CAMERA"}
         if not objects or (name is not None and name not in objects):
-            wrong = f"no camera {checks.shown(name)}" if objects else "no camera"
+            wrong = f"no camera {checks.quoted(name)}" if objects else "no camera"
             raise InputError(f"scene {scene.name!r} of {blend} has {wrong}: name one of {', '.join(objects) or 'another file'}")
         if shots is not None:
             return [camera.noted(*notes) for camera in of_frames(scene, shots, objects.get(name or ""))]
@@ -47,7 +47,7 @@ def of_file(
         for called, camera_object in sorted(objects.items()):
             with left_out.unless_pinhole(called):
                 found.append(Camera(called, cameras.read(camera_object, scene), notes=notes, image=f"{called}.png"))
-        return left_out.told(found)
+        return left_out.with_notes(found)
 
 
 def of_frames(
@@ -101,6 +101,6 @@ def of_pictures(names: Iterable[str], blend: str | os.PathLike[str], trust: bool
                 found.append(Camera(name, cameras.read(camera_object, scene), notes=notes))
         if not found or (len(found) > 1 and len({camera.pinhole for camera in found}) == 1):
             why = "its camera stands still" if found else "its cameras are called otherwise, and no name ends with a frame"
-            shown = ", ".join(checks.shown(name) for name in names[:3])
+            shown = ", ".join(checks.quoted(name) for name in names[:3])
             raise InputError(f"{blend} does not tell which camera took {shown}: {why}; give the true cameras with --against")
         return found

@@ -195,7 +195,7 @@ def _of_all(source: Source, module: ModuleType, options: Options) -> list[Camera
     cameras = []
     for (name, _), part in zip(parts, sources, strict=True):
         if not module.recognises(part):
-            raise InputError(f"{source.name} names the camera {checks.shown(name)} and has no such camera: export it again")
+            raise InputError(f"{source.name} names the camera {checks.quoted(name)} and has no such camera: export it again")
         cameras += [replace(camera, name=name) for camera in _read(part, module, options)]
     return cameras
 
@@ -225,7 +225,7 @@ def _each_of_folder(source: Source, module: ModuleType, options: Options) -> lis
             found = _read(file, module, options)
             cameras += [replace(camera, name=name if len(found) == 1 else f"{name} {camera.name}") for camera in found]
     told = (f"Not read, since they are not {module.TITLE}: {naming.several(others)}",) if others else ()
-    return [camera.noted(*told) for camera in left_out.told(sorted(cameras, key=lambda camera: camera.name))]
+    return [camera.noted(*told) for camera in left_out.with_notes(sorted(cameras, key=lambda camera: camera.name))]
 
 
 def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
@@ -277,7 +277,7 @@ def recognised(source: str | Path | Source) -> str:
     if source.json_problem:
         raise InputError(f"{source.name} looks like JSON and is none ({source.json_problem}): correct it")
     if source.path is None:
-        place = checks.shown(source.text.strip()[:40])
+        place = checks.quoted(source.text.strip()[:40])
         raise InputError(
             f"the text is no camera that is understood, from its beginning {place} on: copy a whole camera, or write "
             "eye=1,2,3 look_at=0,0,0 up=0,0,1 d=1000"
@@ -329,7 +329,7 @@ def _module(name: str, does: str) -> ModuleType:
     able: Sequence[str] = readable() if does == "read" else writable()
     if name not in able:
         raise InputError(
-            f"the format {checks.shown(name)} can't be {'read' if does == 'read' else 'written'}: {', '.join(able)} can"
+            f"the format {checks.quoted(name)} can't be {'read' if does == 'read' else 'written'}: {', '.join(able)} can"
         )
     return FORMATS[name]
 

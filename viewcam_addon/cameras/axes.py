@@ -104,7 +104,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
     rows = matrix.tolist()
     if len(rows) == 4 and max(map(abs, map(float.__sub__, rows.pop(), (0.0, 0.0, 0.0, 1.0)))) > _NOTED:
         hint = "transpose it" if not any(row[3] for row in rows) else "it should be 0 0 0 1"
-        raise InputError(f"the last row of the matrix of {what} is {checks.shown(matrix[3].tolist())}: {hint}")
+        raise InputError(f"the last row of the matrix of {what} is {checks.quoted(matrix[3].tolist())}: {hint}")
     eye = checks.vector(f"the eye of {what}", [row[3] for row in rows], 3)
     away = math.hypot(*eye)
     if not away < _FARTHEST:

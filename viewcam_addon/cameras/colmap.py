@@ -92,13 +92,14 @@ class _Image(NamedTuple):
 class Tracks(NamedTuple):
     """Points in world space, and where pictures show them.
 
-    positions : (n, 3). colours : (n, 3), 0 … 255. shown : of each picture the numbers of the points that it shows, (m,) from 0,
-    and their places, (m, 2): x to the right and y down from the picture's corner.
+    positions : (n, 3). colours : (n, 3), 0 … 255.
+    observations : of each picture the numbers of the points that it shows, (m,) from 0, and their places, (m, 2): x to the
+        right and y down from the picture's corner.
     """
 
     positions: np.ndarray
     colours: np.ndarray
-    shown: Sequence[tuple[np.ndarray, np.ndarray]]
+    observations: Sequence[tuple[np.ndarray, np.ndarray]]
 
 
 def recognises(source: Source) -> bool:
@@ -118,7 +119,9 @@ def read(source: Source, options: Options) -> list[Camera]:
     left_out, taken = LeftOut(), []
     for image, name in zip(images, naming.distinct([image.name for image in images]), strict=True):
         if image.camera not in intrinsic:
-            raise InputError(f"{source.name}: image {checks.shown(image.name)} is of camera {image.camera}, which is not there")
+            raise InputError(
+                f"{source.name}: image {checks.quoted(image.name)} is of camera {image.camera}, which is not there"
+            )
         with left_out.unless_pinhole(name):
             if image.camera not in planes:
                 planes[image.camera] = _plane(intrinsic[image.camera], f"camera {image.camera}", options)
@@ -128,11 +131,11 @@ def read(source: Source, options: Options) -> list[Camera]:
         Camera(name, pinhole, True, (*notes, *planes[image.camera][2], *more), image.name, lens=planes[image.camera][1])
         for (image, name), (pinhole, more) in zip(taken, poses, strict=True)
     ]
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def _poses(images: Sequence[_Image], planes: dict) -> list[tuple[Pinhole, tuple[str, ...]]]:
-    whats = [f"image {checks.shown(image.name)}" for image in images]
+    whats = [f"image {checks.quoted(image.name)}" for image in images]
     numbers = [
         checks.vector(f"the pose of {what}", (*image.quaternion, *image.translation), 7)
         for image, what in zip(images, whats, strict=True)
@@ -225,9 +228,9 @@ def _text_cameras(source: Source) -> dict[int, _Intrinsics]:
             continue
         place = f"line {number} of {source.name}"
         if len(words) < 5 or not words[0].isdecimal():
-            raise InputError(f"{place} is {checks.shown(line)}: it should be CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
+            raise InputError(f"{place} is {checks.quoted(line)}: it should be CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
         if words[1] not in MODELS:
-            raise InputError(f"{place}: the camera model {checks.shown(words[1])} is unknown: convert it to PINHOLE")
+            raise InputError(f"{place}: the camera model {checks.quoted(words[1])} is unknown: convert it to PINHOLE")
         size = (pixels(f"{what} of {place}", word) for what, word in zip(("width", "height"), words[2:4], strict=True))
         found[_id(words[0], place)] = _Intrinsics(words[1], *size, flat(f"parameters of {place}", words[4:]))
     return found
@@ -241,7 +244,7 @@ def _text_images(source: Source) -> Iterator[_Image]:
             continue
         place = f"line {number} of {source.name}"
         if len(words) < 10 or not words[0].isdecimal():
-            raise InputError(f"{place} is {checks.shown(line)}: it should be IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")
+            raise InputError(f"{place} is {checks.quoted(line)}: it should be IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")
         pose = flat(f"the pose in {place}", words[1:8])
         yield _Image(
             _id(words[0], place), re.split(r"\s+", line.strip(), maxsplit=9)[9], pose[:4], pose[4:], _id(words[8], place)
@@ -256,7 +259,7 @@ def _text_images(source: Source) -> Iterator[_Image]:
 
 def _id(word: str, place: str) -> int:
     if not word.isdecimal() or len(word) > 20:
-        raise InputError(f"{place} has {checks.shown(word)} where a number of a camera or image should be: correct it")
+        raise InputError(f"{place} has {checks.quoted(word)} where a number of a camera or image should be: correct it")
     return int(word)
 
 
@@ -359,7 +362,7 @@ def _points(tracks: Tracks | None, images: int) -> tuple[list[str], str]:
         return images * [""], ""
     shown_in: list[list[str]] = [[] for _ in tracks.positions]
     lines = []
-    for image, (points, places) in enumerate(tracks.shown, start=1):
+    for image, (points, places) in enumerate(tracks.observations, start=1):
         found = list(zip(points.tolist(), places.tolist(), strict=True))
         lines.append(" ".join(f"{_spaced(*place)} {point + 1}" for point, place in found))
         for index, (point, _) in enumerate(found):

@@ -66,7 +66,7 @@ def _text_points(path: Path) -> Iterator[tuple[int, tuple[float, float, float]]]
             try:
                 yield int(words[0]), checks.vector("a point", [float(word) for word in words[1:4]], 3)
             except ValueError:
-                raise InputError(f"line {number} of {path} is {checks.shown(line)}: it should be POINT3D_ID X Y Z …") from None
+                raise InputError(f"line {number} of {path} is {checks.quoted(line)}: it should be POINT3D_ID X Y Z …") from None
 
 
 def _text_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, int]]]]:
@@ -80,7 +80,7 @@ def _text_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, int
             yield name, [(float(x), float(y), int(p)) for x, y, p in zip(words[::3], words[1::3], words[2::3], strict=True)]
         except (ValueError, IndexError):
             raise InputError(
-                f"{path} has a line {checks.shown(head)}: each image has two lines, the second X Y POINT3D_ID"
+                f"{path} has a line {checks.quoted(head)}: each image has two lines, the second X Y POINT3D_ID"
             ) from None
 
 

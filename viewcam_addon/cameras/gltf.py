@@ -53,7 +53,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             if moving & {index, *worlds.above(index)}:
                 found[-1] = found[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
     names = naming.distinct([camera.name for camera in found])
-    return left_out.told([_renamed(camera, name) for camera, name in zip(found, names, strict=True)])
+    return left_out.with_notes([_renamed(camera, name) for camera, name in zip(found, names, strict=True)])
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
@@ -103,7 +103,7 @@ class _Worlds:
             for child in _list(node.get("children")):
                 if not isinstance(child, int) or not 0 <= child < len(nodes) or child in self._parents:
                     raise InputError(
-                        f"{node.place} has the child {checks.shown(child)}, which is none or another's: correct it"
+                        f"{node.place} has the child {checks.quoted(child)}, which is none or another's: correct it"
                     )
                 self._parents[child] = index
 
@@ -139,7 +139,7 @@ def _local(node: Record) -> np.ndarray:
 def _index(node: Record, key: str, count: int) -> int:
     index = node.get(key)
     if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < count:
-        raise InputError(f"{node.called(key)} is {checks.shown(index)}: the file has {count} of them")
+        raise InputError(f"{node.called(key)} is {checks.quoted(index)}: the file has {count} of them")
     return index
 
 
@@ -164,9 +164,9 @@ def _key(value: object, key: str) -> object:
 
 
 def _camera(name: str, camera: Record, matrix: np.ndarray, options: Options) -> Camera:
-    what = f"camera {checks.shown(name)}"
+    what = f"camera {checks.quoted(name)}"
     if camera.get("type") != "perspective":
-        not_a_pinhole(what, f"{checks.shown(camera.get('type'))}")
+        not_a_pinhole(what, f"{checks.quoted(camera.get('type'))}")
     lens = camera.record("perspective")
     angle = lens.number("yfov", least=1e-9)
     if angle >= math.pi:
@@ -218,7 +218,7 @@ def _perspective(camera: Camera) -> dict:
     pinhole = camera.pinhole
     width, height = pinhole.width, pinhole.height
     if pinhole.principal_point != (width / 2, height / 2):
-        raise InputError(f"glTF can't say that a camera is shifted, as {checks.shown(camera.name)} is: choose another format")
+        raise InputError(f"glTF can't say that a camera is shifted, as {checks.quoted(camera.name)} is: choose another format")
     d_x, d_y = pinhole.distance
     lens = {
         "yfov": 2 * math.atan2(height / 2, d_y),

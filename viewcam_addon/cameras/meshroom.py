@@ -61,7 +61,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             plane, lens, notes = planes[intrinsic]
             if "rigId" in view and str(view.get("isPoseIndependant")).lower() in ("false", "0"):
                 raise InputError(
-                    f"view {checks.shown(name)} is of a rig, on whose pose its cameras stand: give each a pose of its own"
+                    f"view {checks.quoted(name)} is of a rig, on whose pose its cameras stand: give each a pose of its own"
                 )
             pose = poses[str(view.get("poseId"))].record("pose").record("transform")
             matrix = np.eye(4)
@@ -69,9 +69,9 @@ def read(source: Source, options: Options) -> list[Camera]:
                 3, 3
             )  # column by column is its transpose, row by row
             matrix[:3, 3] = pose.numbers("center", 3)
-            pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
+            pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.quoted(name)}")
             cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), path, lens=lens))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def _key(record: Record, key: str) -> str:
@@ -88,7 +88,7 @@ def _plane(
 ) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
     kind = str(intrinsic.get("type") or "pinhole")
     if kind not in _PINHOLES:
-        not_a_pinhole(intrinsic.place, f"of the type {checks.shown(kind)}")
+        not_a_pinhole(intrinsic.place, f"of the type {checks.quoted(kind)}")
     width, height = intrinsic.size("width"), intrinsic.size("height")
     ratio = intrinsic.number("pixelRatio", 1.0, 1e-6)
     if "pxFocalLength" in intrinsic:
@@ -126,7 +126,7 @@ def _of_lens(
         return None, ()
     model = str(intrinsic.get("distortionType") or kind)
     if model not in _LENSES:
-        said = f"{intrinsic.place} has lens distortion of the unknown model {checks.shown(model)}"
+        said = f"{intrinsic.place} has lens distortion of the unknown model {checks.quoted(model)}"
         if options.without_distortion:
             return None, (f"{said}, which was left out",)
         raise NoPinholeError(f"{said}, which no pinhole has: undistort the pictures, or choose to take it without distortion")

@@ -103,7 +103,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             if sensor.kind != "perspective":
                 not_a_pinhole(f"Mitsuba's sensor {sensor.name}", f"a {sensor.kind}")
             cameras.append(_camera(sensor, options))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def _camera(sensor: _Sensor, options: Options) -> Camera:
@@ -119,7 +119,7 @@ def _camera(sensor: _Sensor, options: Options) -> Camera:
         if "fov" in values:
             axis = str(values.get("fovaxis", "x")).lower()
             if axis not in _FOV_AXES:
-                raise InputError(f"fov_axis of {what} is {checks.shown(axis)}: give one of {', '.join(_FOV_AXES)}")
+                raise InputError(f"fov_axis of {what} is {checks.quoted(axis)}: give one of {', '.join(_FOV_AXES)}")
             angle = math.radians(_number(values["fov"], f"fov of {what}"))
         else:
             length = str(values.get("focallength", "50mm")).strip().removesuffix("mm")
@@ -173,7 +173,7 @@ def _number(value: object, name: str) -> float:
         try:
             value = float(value.strip())
         except ValueError:
-            raise InputError(f"{name} is {checks.shown(value)}: give a number") from None
+            raise InputError(f"{name} is {checks.quoted(value)}: give a number") from None
     if isinstance(value, Unknown):
         raise InputError(f"{name} is computed from what the text does not say: write the number")
     return checks.number(name, value, -1e300, 1e300)
@@ -202,7 +202,7 @@ def _in_xml(root: ElementTree.Element) -> Iterator[_Sensor]:
             return value
         value = _DEFAULT.sub(said, value)
         if "$" in value:
-            raise InputError(f"{checks.shown(value)} stands for a value that the text does not say: write the value")
+            raise InputError(f"{checks.quoted(value)} stands for a value that the text does not say: write the value")
         return value
 
     # An emitter's or a texture's transform is nobody's camera.
@@ -249,7 +249,7 @@ def _sensor(element: ElementTree.Element, name: str, kind: str, text, given: Map
             raise InputError(f"Mitsuba's sensor {name} moves while the shutter is open: give one transform")
         elif tag == "ref":
             raise InputError(
-                f"Mitsuba's sensor {name} refers to {checks.shown(child.get('id'))}, which is not there: copy it as well"
+                f"Mitsuba's sensor {name} refers to {checks.quoted(child.get('id'))}, which is not there: copy it as well"
             )
         elif child.get("value") is not None and key:
             values[key] = _read(child, text)
@@ -292,7 +292,7 @@ def _step(step: ElementTree.Element, name: str, text) -> "np.ndarray | _Look":
         if len(parts) == 1 and usual == 1.0:
             parts = parts * 3
         if len(parts) != 3:
-            raise InputError(f"{key} of {what} is {checks.shown(step.get(key, ''))}: give three numbers")
+            raise InputError(f"{key} of {what} is {checks.quoted(step.get(key, ''))}: give three numbers")
         return tuple(_number(part, f"{key} of {what}") for part in parts)
 
     result = np.eye(4)
@@ -317,7 +317,7 @@ def _step(step: ElementTree.Element, name: str, text) -> "np.ndarray | _Look":
         else:
             raise InputError(f"{what} has {len(parts)} numbers: give 16, row by row")
         if result[3].tolist() != [0, 0, 0, 1]:
-            raise InputError(f"the last row of {what} is {checks.shown(result[3].tolist())}: it should be 0 0 0 1")
+            raise InputError(f"the last row of {what} is {checks.quoted(result[3].tolist())}: it should be 0 0 0 1")
     else:
         raise InputError(f"{what} is no move of a camera that is known: give lookat, translate, rotate, scale or matrix")
     return result

@@ -49,7 +49,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         name = element.get("name") or f"camera {number}"
         with left_out.unless_pinhole(name):
             cameras.append(model.camera(name, element, matrix))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 class _Model:
@@ -58,7 +58,7 @@ class _Model:
         self.in_radians = compiler.get("angle") == "radian"
         self.sequence = compiler.get("eulerseq", "xyz")
         if len(self.sequence) != 3 or not {*self.sequence.lower()} <= {*"xyz"}:
-            raise InputError(f"eulerseq of the compiler is {checks.shown(self.sequence)}: give three of x, y, z, X, Y, Z")
+            raise InputError(f"eulerseq of the compiler is {checks.quoted(self.sequence)}: give three of x, y, z, X, Y, Z")
         usual = root.find("default/camera")
         self.usual = {} if usual is None else dict(usual.attrib)
         self.has_classes = root.find("default//default//camera") is not None
@@ -76,11 +76,11 @@ class _Model:
                 yield child, matrix
             elif child.tag in ("body", "frame") and child.find(".//camera") is not None:
                 yield from self._inside(
-                    child, matrix @ self._pose(child.attrib, f"{child.tag} {checks.shown(child.get('name', ''))}")
+                    child, matrix @ self._pose(child.attrib, f"{child.tag} {checks.quoted(child.get('name', ''))}")
                 )
 
     def camera(self, name: str, element: ElementTree.Element, around: np.ndarray) -> Camera:
-        what = f"camera {checks.shown(name)}"
+        what = f"camera {checks.quoted(name)}"
         if self.has_classes:
             raise InputError(
                 f"a default class says something of cameras, and which one {what} has is not followed: write it out"

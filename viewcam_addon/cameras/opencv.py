@@ -79,11 +79,11 @@ def read(source: Source, options: Options) -> list[Camera]:
     left_out, cameras, before = LeftOut(), [], np.eye(4)
     for name, values in _found(source):
         if "tcncnm1" in values:  # Kalibr's: from the camera before to this one
-            before = _four_rows(values["tcncnm1"], f"T_cn_cnm1 of camera {checks.shown(name)}") @ before
+            before = _four_rows(values["tcncnm1"], f"T_cn_cnm1 of camera {checks.quoted(name)}") @ before
             values |= {"r": before[:3, :3].tolist(), "t": before[:3, 3].tolist()}
         with left_out.unless_pinhole(name):
             cameras.append(camera(name, values, options))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def _four_rows(value: Any, name: str) -> np.ndarray:
@@ -282,7 +282,7 @@ def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float
         f_x, skew, c_x, lower, f_y, c_y, *last = values
         if [lower, *last[:2]] != [0, 0, 0] or last[2] != 1:
             hint = "transpose it" if [values[1], values[2], values[5]] == [0, 0, 0] else "its last row should be 0 0 1"
-            raise InputError(f"K of {what} is {checks.shown([*values])}: {hint}")
+            raise InputError(f"K of {what} is {checks.quoted([*values])}: {hint}")
         if abs(skew) > 1e-9 * abs(f_x):
             raise NoPinholeError(
                 f"K of {what} has a skew of {skew:g} pixels, which no pinhole camera here has: rectify the pictures"
@@ -375,7 +375,7 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     InputError
         if they are no camera, or leave open what it is.
     """
-    what = f"camera {checks.shown(name)}"
+    what = f"camera {checks.quoted(name)}"
     is_fisheye = says_fisheye(values, what)
     if {"t", "hw"} <= values.keys():
         return _of_infinigen(name, values, what, options)
@@ -418,7 +418,7 @@ def says_fisheye(values: Mapping[str, Any], what: str) -> bool:
     is_fisheye = [bool(_FISHEYE.search(model.lower())) for model in models]
     for model, known in zip(models, is_fisheye, strict=True):
         if not known and _OTHER_LENS.search(model.lower()):
-            not_a_pinhole(what, f"of the model {checks.shown(model)}")
+            not_a_pinhole(what, f"of the model {checks.quoted(model)}")
     return any(is_fisheye)
 
 

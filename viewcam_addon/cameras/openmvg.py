@@ -64,15 +64,15 @@ def read(source: Source, options: Options) -> list[Camera]:
             matrix = np.eye(4)
             matrix[:3, :3] = np.array(pose.numbers("rotation", 9)).reshape(3, 3).T
             matrix[:3, 3] = pose.numbers("center", 3)
-            pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
+            pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.quoted(name)}")
             image = f"{root}/{path}" if isinstance(root, str) and root else path
             cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), image, lens=lens))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def _plane(data: Record, kind: str, options: Options) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
     if kind not in _PINHOLES:
-        not_a_pinhole(data.place, f"of the type {checks.shown(kind)}")
+        not_a_pinhole(data.place, f"of the type {checks.quoted(kind)}")
     inner = data.record("value0") if "value0" in data and "focal_length" not in data else data
     f = inner.number("focal_length", least=1e-9)
     c_x, c_y = inner.numbers("principal_point", 2)

@@ -268,9 +268,9 @@ def _of_json(document: dict) -> Values:
             continue
         name = _spelt(key)
         if name is None:
-            raise InputError(f"the key {checks.shown(key)} is none of a camera: write eye, look_at, up and distance")
+            raise InputError(f"the key {checks.quoted(key)} is none of a camera: write eye, look_at, up and distance")
         if name in values:
-            raise InputError(f"the key {checks.shown(key)} says {name} once more: leave one of them out")
+            raise InputError(f"the key {checks.quoted(key)} says {name} once more: leave one of them out")
         values[name] = _checked(key, name, value)
     if "size" in values:
         values["width"], values["height"] = values.pop("size")

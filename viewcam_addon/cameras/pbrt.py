@@ -158,7 +158,7 @@ class _Scene:
     def camera(self, options: Options) -> Camera:
         kind, at, parameters = self.lens or ("perspective", 0, {})
         if kind != "perspective":
-            said = checks.shown(kind)
+            said = checks.quoted(kind)
             not_a_pinhole(f"pbrt's Camera {said}", "of a real lens" if kind == "realistic" else said.strip("'"))
         matrix, look, mirrored = (self.at_camera or self.transforms)[0]
         notes = [f"pbrt's {name} was not taken" for name in parameters if name not in (*_HARMLESS, *_OF_LENS)]

@@ -33,7 +33,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     for file in files:
         with left_out.unless_pinhole(naming.stem(file.path.stem) if file.path else "RealityCapture"):
             cameras.append(_camera(file, options))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def _camera(source: Source, options: Options) -> Camera:

@@ -33,7 +33,7 @@ def recognises(source: Source) -> bool:
 def read(source: Source, options: Options) -> list[Camera]:
     document = Record(source.yaml, source.name)
     name = str(document.values.get("camera_name") or "camera")
-    what = f"camera {checks.shown(name)}"
+    what = f"camera {checks.quoted(name)}"
     is_fisheye = opencv.says_fisheye(document.values, what)
     k = document.record("camera_matrix").numbers("data", 9)
     if k[0] == 0:

@@ -80,7 +80,7 @@ def _camera(source: Source) -> Camera:
     camera = document.record("camera")
     fields = {field.name for field in dataclasses.fields(Pinhole)}
     if unknown := camera.values.keys() - fields:
-        raise InputError(f"the key {checks.shown(min(unknown))} of {camera.place} is none of a camera: take it out")
+        raise InputError(f"the key {checks.quoted(min(unknown))} of {camera.place} is none of a camera: take it out")
     if missing := fields - camera.values.keys():
         raise InputError(f"{camera.place} has no {min(missing)}: it can't be a camera without")
     preview = next((document.get(key) for key in ("preview", "image") if isinstance(document.get(key), str)), None)

@@ -42,7 +42,7 @@ def fail(text: str, at: int, advice: str) -> NoReturn:
     place = text[at : at + 40].strip()
     line = text.count("\n", 0, at) + 1
     raise InputError(
-        f"the text is not understood {f'at {checks.shown(place)}' if place else 'at its end'} (line {line}): {advice}"
+        f"the text is not understood {f'at {checks.quoted(place)}' if place else 'at its end'} (line {line}): {advice}"
     )
 
 

@@ -173,7 +173,7 @@ def _cameras(source: Source, options: Options) -> list[Camera]:
             time = frame.number("time") if "time" in frame else None
             image = image if "file_path" in frame else None
             cameras.append(Camera(name, pinhole, stated, (*told, *notes, *more), image, time=time, lens=lens))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def _merged(top: Record, frame: Record) -> Record:
@@ -181,7 +181,7 @@ def _merged(top: Record, frame: Record) -> Record:
     for key in (*_INTRINSICS, *_LENS, "distortion_params", "camera_model", "is_fisheye", *_OTHER_CAMERAS):
         if key in top and key in frame and top.get(key) != frame.get(key):
             raise InputError(
-                f"{key} is {checks.shown(top.get(key))} at the top of the file and {checks.shown(frame.get(key))} in "
+                f"{key} is {checks.quoted(top.get(key))} at the top of the file and {checks.quoted(frame.get(key))} in "
                 f"{frame.place}, and programs differ in which of them counts: take one out"
             )
     said = {key: value for key, value in top.values.items() if key != "frames" and value is not None}
@@ -199,7 +199,7 @@ def _plane(
     for key in ("camera_model", "camera_type"):
         model = both.values.get(key)
         if model is not None and str(model).upper() not in (*_PINHOLES, *_FISHEYES):
-            not_a_pinhole(both.place, f"of the {key.replace('_', ' ')} {checks.shown(model)}")
+            not_a_pinhole(both.place, f"of the {key.replace('_', ' ')} {checks.quoted(model)}")
     is_fisheye = any(str(both.values.get(key)).upper() in _FISHEYES for key in ("camera_model", "camera_type"))
     is_fisheye |= bool(both.values.get("is_fisheye"))
     if unread := next((key for key in both.values if key.lower() in _NOT_READ), None):
@@ -212,7 +212,7 @@ def _plane(
     convention = both.get("camera_convention")
     if convention is not None and str(convention).lower() not in _AXES:
         raise InputError(
-            f"{both.place} has the camera_convention {checks.shown(convention)}: write its matrices in opengl's axes"
+            f"{both.place} has the camera_convention {checks.quoted(convention)}: write its matrices in opengl's axes"
         )
     for key in _OTHER_AXES:
         if both.values.get(key):

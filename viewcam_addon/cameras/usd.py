@@ -48,9 +48,9 @@ def read(source: Source, options: Options) -> list[Camera]:
     for camera in stage["cameras"]:
         with left_out.unless_pinhole(camera["name"]):
             if "error" in camera:
-                raise InputError(f"camera {checks.shown(camera['name'])} can't be read ({camera['error']}): export it again")
+                raise InputError(f"camera {checks.quoted(camera['name'])} can't be read ({camera['error']}): export it again")
             found += [_camera(camera["name"], sample, options).noted(*told) for sample in camera["samples"]]
-    return left_out.told(found)
+    return left_out.with_notes(found)
 
 
 def _told(stage: dict[str, Any]) -> tuple[str, ...]:
@@ -60,7 +60,7 @@ def _told(stage: dict[str, Any]) -> tuple[str, ...]:
         scaled = f"one unit of it is {unit:g} m" if unit != 1 else "it counts in metres"
         notes.append(f"The world was taken as the stage says it, as Blender's importer does: {turned}, {scaled}")
     if others := stage["left_out"]:
-        names = ", ".join(map(checks.shown, others[:_MOST_NAMED])) + (" …" if len(others) > _MOST_NAMED else "")
+        names = ", ".join(map(checks.quoted, others[:_MOST_NAMED])) + (" …" if len(others) > _MOST_NAMED else "")
         notes.append(f"Not read, since nothing but layers in the file's own folder is: {names}")
     return tuple(notes)
 
@@ -95,7 +95,7 @@ def _stage(source: Source) -> dict[str, Any]:
 
 def _camera(name: str, sample: dict[str, Any], options: Options) -> Camera:
     name = name if sample["time"] is None else f"{name} {sample['time']:g}"
-    what = f"camera {checks.shown(name)}"
+    what = f"camera {checks.quoted(name)}"
     values = Record(sample, what)
     if sample["Projection"] == "orthographic":
         not_a_pinhole(what, "orthographic")
@@ -127,7 +127,7 @@ def _camera(name: str, sample: dict[str, Any], options: Options) -> Camera:
 
 def _size(said: object, what: str) -> tuple[int, int]:
     if not isinstance(said, list) or len(said) != 2:
-        raise InputError(f"{_SIZE} of {what} is {checks.shown(said)}: it should be two numbers of pixels")
+        raise InputError(f"{_SIZE} of {what} is {checks.quoted(said)}: it should be two numbers of pixels")
     width, height = (pixels(f"{_SIZE} of {what}", side) for side in said)
     return width, height
 

@@ -63,7 +63,7 @@ def write_sides(
     if isinstance(comparison, RadianceComparison):
         light |= {"reference": reference["Combined"][..., :3], "test": comparison.test}
     else:
-        for name, picture in zip(SIDES, shown(comparison, reference, tests), strict=False):
+        for name, picture in zip(SIDES, on_screen(comparison, reference, tests), strict=False):
             _write(picture, Path(folder) / f"{name}.png")
     for name, values in light.items():
         with written_whole(Path(folder) / f"{name}.npy") as temporary, open(temporary, "wb") as file:
@@ -71,7 +71,7 @@ def write_sides(
 
 
 @np.errstate(all="ignore")
-def shown(
+def on_screen(
     comparison: GeometryComparison | RadianceComparison, reference: Image, tests: Sequence[Image]
 ) -> tuple[pictures.Picture, pictures.Picture]:
     """Reference and test as an eye can compare them: light tone-mapped alike, geometry shaded."""

@@ -284,10 +284,10 @@ def settle(
         rays, names, traced = surfaces_at(batch % width, batch // width, *np.full((2, len(batch)), 0.5))
         nearest, pixel = np.searchsorted(rays, np.arange(len(batch))), batch[rays]
         here = agreement.at(pixel)
-        shown = at(seen, pixel)
-        agrees = here.same_surface(traced, shown) & in_one_place(agreement, rays, traced) & (differs | doubtful)[pixel]
+        rendered = at(seen, pixel)
+        agrees = here.same_surface(traced, rendered) & in_one_place(agreement, rays, traced) & (differs | doubtful)[pixel]
         right = np.flatnonzero(agrees)
-        steps = np.ceil(here.roundings(traced, shown)[right] / tolerances.ROUNDINGS[0])  # as good as half of all pixels: one
+        steps = np.ceil(here.roundings(traced, rendered)[right] / tolerances.ROUNDINGS[0])  # as good as half of all pixels: one
         right = right[np.lexsort((right, steps, rays[right]))]
         right = right[np.unique(rays[right], return_index=True)[1]]  # the nearest of those that agree best
         kinds[pixel[right]] = -1
@@ -335,11 +335,11 @@ def explain(
         pending = batch
         for ring in _RINGS:
             radius = reach[pending] * (ring / _RINGS[-1])
-            found = _explained_by(
+            explained = _explained_by(
                 columns[pending], rows[pending], at(seen, pending), radius, agreement.at(pending), surfaces_at
             )
-            shifts[pending[found]] = radius[found]
-            pending = pending[~found]
+            shifts[pending[explained]] = radius[explained]
+            pending = pending[~explained]
             if not len(pending):
                 break
         if len(pending) > len(batch) / 2:
@@ -356,13 +356,13 @@ def _explained_by(
     px = 0.5 + np.outer(radius, np.cos(angles)).ravel()
     py = 0.5 + np.outer(radius, np.sin(angles)).ravel()
     rays, _, traced = surfaces_at(columns[each], rows[each], px, py)
-    shown, here = at(seen, each[rays]), agreement.at(each[rays])
+    rendered, here = at(seen, each[rays]), agreement.at(each[rays])
     counts = in_one_place(agreement, rays, traced)
     nearest = np.searchsorted(rays, np.arange(len(each)))
     grazed = (tolerances.facing(agreement.pinhole, traced) < _RIM)[nearest].reshape(-1, _DIRECTIONS)
     same_surface, same_place = (
         np.logical_or.reduceat(same & counts, nearest).reshape(-1, _DIRECTIONS)
-        for same in (here.same_surface(traced, shown), here.same_place(traced, shown))
+        for same in (here.same_surface(traced, rendered), here.same_place(traced, rendered))
     )
     on_silhouette = grazed.any(axis=1) | ~same_place.all(axis=1)
     return same_surface.any(axis=1) | (same_place.any(axis=1) & on_silhouette)

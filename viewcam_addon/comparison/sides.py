@@ -61,12 +61,12 @@ class Sides:
 
 def samples_of(image: Image) -> int | None:
     """Samples a pixel, as the file tells: the tracer's own attribute, or the one that Cycles writes for each view layer."""
-    told = [
+    counts = [
         value
         for name, value in image.attributes.items()
         if name == "samples" or (name.startswith("cycles.") and name.endswith(".samples"))
     ]
-    return int(told[0]) if told and told[0].isdecimal() and len(told[0]) <= _MOST_DIGITS else None
+    return int(counts[0]) if counts and counts[0].isdecimal() and len(counts[0]) <= _MOST_DIGITS else None
 
 
 def all_sides(reference: Image, tests: Sequence[Image]) -> Iterator[Sides]:

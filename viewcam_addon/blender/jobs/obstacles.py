@@ -51,7 +51,7 @@ def obstacles(
             else:
                 _check_storable(stated(shot, settings.frame_of(shot)), settings.frame_of(shot), own().data)
         except InputError as error:
-            yield f"the shot {checks.shown(shot.name)}: {error}"
+            yield f"the shot {checks.quoted(shot.name)}: {error}"
 
 
 def cameras_of(scene: bpy.types.Scene, own: bpy.types.Object | None) -> dict[str, bpy.types.Object]:
