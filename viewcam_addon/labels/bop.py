@@ -32,7 +32,7 @@ from ..files import folder_written_whole
 from ..pinhole import Pinhole
 from ..png import encoded
 from . import files, masks
-from .coco import Document, category, read_pictures, with_mask
+from .coco import Document, category, found, with_mask
 
 _MILLIMETRES = 1000.0
 """In a meter."""
@@ -54,40 +54,40 @@ def write(folder: Path, output: Path) -> dict[str, int]:
     InputError
         if there are no label files, one lacks something or can't be read, or the folder can't be written.
     """
-    pictures, _ = read_pictures(folder)
+    pictures, _ = found(folder)
     objects = _Objects(pictures)
     scene: dict[str, dict[str, Any]] = {"scene_camera": {}, "scene_gt": {}, "scene_gt_info": {}}
     with folder_written_whole(output) as temporary:
         for kind in ("depth", "mask", "mask_visib"):
             (temporary / kind).mkdir()
-        for number, (path, document) in enumerate(pictures):
+        for number, (path, told) in enumerate(pictures):
             with files.understood(path):
-                values = _picture(path, document, objects, temporary, number)
+                values = _picture(path, told, objects, temporary, number)
             for name, each in zip(scene, values, strict=True):
                 scene[name][str(number)] = each
-        for name, values in {**scene, "objects": objects.to_json()}.items():
+        for name, values in {**scene, "objects": objects.told()}.items():
             (temporary / f"{name}.json").write_text(_lines(values), encoding="utf-8", newline="\n")
-        copied = sum(_copy_rgb(path, document, temporary, number) for number, (path, document) in enumerate(pictures))
+        shown = sum(_copy_rgb(path, told, temporary, number) for number, (path, told) in enumerate(pictures))
     count = sum(len(poses) for poses in scene["scene_gt"].values())
-    return {"images": len(pictures), "instances": count, "objects": len(objects.to_json()), "rgb": copied}
+    return {"images": len(pictures), "instances": count, "objects": len(objects.told()), "rgb": shown}
 
 
-def _picture(path: Path, document: Document, objects: "_Objects", output: Path, number: int) -> tuple[Any, Any, Any]:
+def _picture(path: Path, told: Document, objects: "_Objects", output: Path, number: int) -> tuple[Any, Any, Any]:
     """The entries of a picture in the three files; its depth and masks are written."""
-    depth = files.passes(path, document, ("Depth",))
+    depth = files.passes(path, told, ("Depth",))
     if not depth:
         raise InputError(f"{path} has no depth: render it with --labels depth")
-    with_mask("visible", path, document)
-    levels = files.depth_levels(depth["Depth"][..., 0], document["depth_png_steps"])
+    with_mask("visible", path, told)
+    levels = files.depth_levels(depth["Depth"][..., 0], told["depth_png_steps"])
     (output / "depth" / f"{number:06d}.png").write_bytes(encoded(levels))
     poses, seen = [], []
-    for place, each in enumerate(with_mask("amodal", path, document)):
+    for place, each in enumerate(with_mask("amodal", path, told)):
         whole, visible = (_mask(each[kind], levels.shape) for kind in ("amodal", "visible"))
         for kind, mask in (("mask", whole), ("mask_visib", visible)):
             (output / kind / f"{number:06d}_{place:06d}.png").write_bytes(encoded(np.uint8(255) * mask))
         poses.append({"obj_id": objects.number(each), **_pose(each), "instance_id": each["id"]})
         seen.append(_seen(each, int((levels[whole] > 0).sum())))
-    return {**_camera(document), "depth_scale": _MILLIMETRES / document["depth_png_steps"]}, poses, seen
+    return {**_camera(told), "depth_scale": _MILLIMETRES / told["depth_png_steps"]}, poses, seen
 
 
 class _Objects:
@@ -96,9 +96,9 @@ class _Objects:
     def __init__(self, pictures: list[tuple[Path, Document]]) -> None:
         self._named: dict[str, list[tuple[int, dict[str, Any], NDArray]]] = {}
         alike: dict[str, list[tuple[dict[str, Any], NDArray]]] = {}
-        for path, document in pictures:
+        for path, told in pictures:
             with files.understood(path):
-                for each in document["instances"]:
+                for each in told["instances"]:
                     known = alike.setdefault(category(each["name"]), [])
                     box, stretch = each["box"], _turned_and_stretched(each)[1]
                     if not any(_is_one(box, stretch, *other) for other in known):
@@ -111,7 +111,7 @@ class _Objects:
         box, stretch = instance["box"], _turned_and_stretched(instance)[1]
         return next(number for number, *other in self._named[category(instance["name"])] if _is_one(box, stretch, *other))
 
-    def to_json(self) -> dict[str, Any]:
+    def told(self) -> dict[str, Any]:
         return {
             str(number): {"name": name, "box": box, "object_to_model": (_MILLIMETRES * stretch).tolist()}
             for name, alike in self._named.items()
@@ -123,9 +123,9 @@ def _is_one(box: dict[str, Any], stretch: NDArray, its_box: dict[str, Any], its_
     return _are_same(stretch, its_stretch) and _are_same([box["min"], box["max"]], [its_box["min"], its_box["max"]])
 
 
-def _are_same(first: Any, second: Any) -> bool:
-    first, second = np.array(first), np.array(second)
-    return bool(np.abs(first - second).max() <= _SAME * np.abs(first).max())
+def _are_same(some: Any, others: Any) -> bool:
+    some, others = np.array(some), np.array(others)
+    return bool(np.abs(some - others).max() <= _SAME * np.abs(some).max())
 
 
 def _turned_and_stretched(instance: Document) -> tuple[NDArray, NDArray]:
@@ -159,18 +159,18 @@ def _box(mask: Document | None) -> list[int]:
     return [x, y, width - 1, height - 1]
 
 
-def _mask(document: Document | None, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    return masks.decoded(document["segmentation"]) if document else np.zeros(shape, bool)
+def _mask(told: Document | None, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    return masks.decoded(told["segmentation"]) if told else np.zeros(shape, bool)
 
 
-def _camera(document: Document) -> Document:
-    camera = cameras.Camera(document["picture"], Pinhole(**document["camera"]), image=document["picture"])
+def _camera(told: Document) -> Document:
+    camera = cameras.Camera(told["picture"], Pinhole(**told["camera"]), image=told["picture"])
     return json.loads(cameras.write([camera], "bop", cameras.Options(scale=1 / _MILLIMETRES)))["0"]
 
 
-def _copy_rgb(path: Path, document: Document, output: Path, number: int) -> bool:
+def _copy_rgb(path: Path, told: Document, output: Path, number: int) -> bool:
     """True if there is a picture."""
-    picture = files.photograph(path, document)
+    picture = files.photograph(path, told)
     if picture is None:
         return False
     (output / "rgb").mkdir(exist_ok=True)

@@ -28,7 +28,7 @@ from ..files import folder_written_whole
 from ..image import BACKGROUND_DEPTH
 from ..pinhole import Pinhole
 from . import files
-from .coco import Document, read_pictures
+from .coco import Document, found
 
 Array = NDArray[np.float64]
 
@@ -69,26 +69,26 @@ def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
         if there are no label files, one lacks something or can't be read, a camera or picture is none that COLMAP can name, or
         the folder can't be written.
     """
-    pictures, _ = read_pictures(folder)
+    pictures, _ = found(folder)
     states: dict[str, int] = {}
     with folder_written_whole(output, _has_no_points) as temporary:
         views, pieces = [], []
-        for number, (path, document) in enumerate(pictures):
+        for number, (path, told) in enumerate(pictures):
             with files.understood(path):
-                name = files.picture(path, document)
-                views.append(cameras.Camera(name, Pinhole(**document["camera"]), image=name))
-                pieces.append(_sampled(number, views[-1].pinhole, *_planes(path, document, states), points))
+                name = files.picture(path, told)
+                views.append(cameras.Camera(name, Pinhole(**told["camera"]), image=name))
+                pieces.append(_sampled(number, views[-1].pinhole, *_planes(path, told, states), points))
         sampled = _Sampled(*map(np.concatenate, zip(*pieces, strict=True)))
-        visible = [
-            _visible(sampled, number, view.pinhole, *_planes(path, document, states)[:2])
-            for number, (view, (path, document)) in enumerate(zip(views, pictures, strict=True))
+        shown = [
+            _shown(sampled, number, view.pinhole, *_planes(path, told, states)[:2])
+            for number, (view, (path, told)) in enumerate(zip(views, pictures, strict=True))
         ]
-        often = np.bincount(np.concatenate([which for which, _ in visible]), minlength=len(sampled.source)) > 1
+        often = np.bincount(np.concatenate([which for which, _ in shown]), minlength=len(sampled.source)) > 1
         new = np.cumsum(often) - 1
         tracks = colmap.Tracks(
             sampled.positions[often],
             files.id_colours(sampled.ids[often]),
-            [(new[which[often[which]]], places[often[which]]) for which, places in visible],
+            [(new[which[often[which]]], places[often[which]]) for which, places in shown],
         )
         for file, text in colmap.texts(views, tracks).items():
             (temporary / file).write_text(text, encoding="utf-8", newline="\n")
@@ -99,12 +99,12 @@ def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
     }
 
 
-def _planes(path: Path, document: Document, states: dict[str, int]) -> tuple[Array, NDArray[np.int64], NDArray[np.float32]]:
+def _planes(path: Path, told: Document, states: dict[str, int]) -> tuple[Array, NDArray[np.int64], NDArray[np.float32]]:
     """(height, width) each, rows from the top: depth; which instance in which state, −1 where nothing is; its id.
 
     states : of all pictures, numbered as they are met; an instance's matrix and box are its state.
     """
-    passes = files.passes(path, document, ("Depth", "Instance"))
+    passes = files.passes(path, told, ("Depth", "Instance"))
     if len(passes) < 2:
         missing = "depth" if "Depth" not in passes else "masks"
         raise InputError(f"{path} has no {missing}: render it with --labels depth,masks")
@@ -112,7 +112,7 @@ def _planes(path: Path, document: Document, states: dict[str, int]) -> tuple[Arr
     known, places = np.unique(ids, return_inverse=True)
     of_ids = {
         each["id"]: states.setdefault(f"{each['id']} {each['object_to_world']} {each['box']}", len(states))
-        for each in document["instances"]
+        for each in told["instances"]
     }
     numbers = np.array([of_ids[each] if each else -1 for each in known.astype(int).tolist()])
     state = np.where(depth < BACKGROUND_DEPTH, numbers[places.reshape(ids.shape)], -1)
@@ -141,7 +141,7 @@ def _sampled(
     return _Sampled(positions, np.full(len(z), number), z, state[rows, columns], ids[rows, columns])
 
 
-def _visible(
+def _shown(
     sampled: _Sampled, number: int, camera: Pinhole, depth: Array, state: NDArray[np.int64]
 ) -> tuple[NDArray[np.intp], Array]:
     """The points that a picture shows, and their places: (n, 2), x to the right and y **down** from the picture's corner."""

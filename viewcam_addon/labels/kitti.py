@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..files import folder_written_whole
 from ..png import encoded
 from . import files
-from .coco import read_pictures
+from .coco import found
 
 DEPTH_STEPS = 256.0
 """In a meter."""
@@ -37,11 +37,11 @@ def write(folder: Path, output: Path) -> dict[str, int]:
     InputError
         if there are no label files, one has neither, or can't be read, or the folder can't be written.
     """
-    pictures, _ = read_pictures(folder)
+    pictures, _ = found(folder)
     counts = {"depth": 0, "flow": 0}
     with folder_written_whole(output) as temporary:
-        for path, document in pictures:
-            planes = _planes(files.passes(path, document, ("Depth", "Forward Flow", "Forward Hidden")))
+        for path, told in pictures:
+            planes = _planes(files.passes(path, told, ("Depth", "Forward Flow", "Forward Hidden")))
             if not planes:
                 raise InputError(f"{path} has neither depth nor forward flow: render it with --labels depth,flow --next")
             for kind, pixels in planes.items():
