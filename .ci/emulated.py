@@ -50,13 +50,34 @@ BUNDLED = ["OpenEXR==3.5.3", "Jinja2==3.1.6", "MarkupSafe==3.0.4", "tqdm==4.70.1
 TESTS = ["numpy==1.26.*", "pytest>=8.3", "pytest-timeout>=2.3", "hypothesis>=6.100", "mpmath>=1.3", "pyyaml>=6"]
 # The cryptography is of before Rust 1.78, whose programs need bcryptprimitives.dll, which wine 8 lacks.
 WINDOWS_TESTS = ["pytest-xdist>=3.5", "lief>=0.16", "distributed>=2025.1", "cryptography==42.0.5"]
-# wine's clocks tick every 100 ns. Dask waits until it has the same time twice, and so for ever.
-WINDOWS_CLOCKS = """\
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+# With Blender 5.0 alone, whose suite has the tests of cameras and labels.
+EXTRAS = PROJECT["optional-dependencies"]
+JUDGES = [*EXTRAS["judges"], *EXTRAS["flip"], "embreex>=4.4", "numpy==1.26.*"]
+# What every Python under wine does first.
+# - wine's clocks tick every 100 ns. Dask waits until it has the same time twice, and so for ever.
+# - wine 8 has VirtualAlloc2, but none of the placeholders into which Blender maps files from 5.0 on: it would read no image and
+#   link no file. Where Windows is too old for that function Blender does without; so its name is hidden in kernelbase's table.
+WINE_AS_WINDOWS = """\
+import ctypes
 import time
 
 precise_time, precise_monotonic = time.time, time.monotonic
 time.time = lambda: precise_time() * 64 // 1 / 64
 time.monotonic = lambda: precise_monotonic() * 64 // 1 / 64
+
+
+def unsigned(address):
+    return ctypes.c_uint32.from_address(address).value
+
+
+kernelbase = ctypes.WinDLL("kernelbase")._handle
+header = kernelbase + unsigned(kernelbase + 60)
+exports, size = kernelbase + unsigned(header + 136), unsigned(header + 140)
+name = exports + 1 + ctypes.string_at(exports, size).index(b"\\0VirtualAlloc2\\0")
+writable = ctypes.c_ulong(4)
+ctypes.windll.kernel32.VirtualProtect(ctypes.c_void_p(name), 13, writable, ctypes.byref(writable))
+ctypes.memmove(name, b"VirtualAlloc1", 13)
 """
 
 
@@ -151,13 +172,12 @@ def of_this_checkout(platform: str) -> Path:
     shutil.rmtree(folder, ignore_errors=True)
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder)
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     version = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))["version"]
     information = folder / f"virtual_pinhole-{version}.dist-info"
     information.mkdir()
-    metadata = f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {version}\n"
+    metadata = f"Metadata-Version: 2.1\nName: {PROJECT['name']}\nVersion: {version}\n"
     (information / "METADATA").write_text(metadata, encoding="utf-8")
-    plugins = "".join(f"{name} = {module}\n" for name, module in project["entry-points"]["pytest11"].items())
+    plugins = "".join(f"{name} = {module}\n" for name, module in PROJECT["entry-points"]["pytest11"].items())
     (information / "entry_points.txt").write_text(f"[pytest11]\n{plugins}", encoding="utf-8")
     return folder
 
@@ -176,13 +196,15 @@ def windows(blender: str, bare: bool = False) -> tuple[list[str], dict[str, str]
     if not bare:
         tests = packages("windows-x64", "windows-tests", *BUNDLED, *TESTS, *WINDOWS_TESTS, *WINDOWS_ALONE)
         folders += [tests, of_this_checkout("windows-x64"), ROOT]
+    if blender == "5.0":
+        folders.append(packages("windows-x64", "windows-judges", *JUDGES))
     # By a file of paths in a folder of the user's packages, since tests give their child processes a PYTHONPATH of their own.
     user = ROOT / "build" / "emulated" / f"windows-{blender}{'-bare' * bare}"
     site_packages = user / "Python311" / "site-packages"
     site_packages.mkdir(parents=True, exist_ok=True)
     lines = "".join(f"{of_windows(folder)}\n" for folder in folders)
     (site_packages / "folders.pth").write_text(lines, encoding="utf-8")
-    (site_packages / "usercustomize.py").write_text(WINDOWS_CLOCKS, encoding="utf-8")
+    (site_packages / "usercustomize.py").write_text(WINE_AS_WINDOWS, encoding="utf-8")
     variables = {
         "WINEPREFIX": str(prefix()),
         "WINEDEBUG": "-all",

@@ -294,14 +294,15 @@ def test_a_command_whose_standard_streams_are_closed_does_the_same(tmp_path, clo
     )
 
 
-@posix
 def test_ctrl_c_while_modules_are_imported_ends_the_process_without_a_traceback(tmp_path):
     (tmp_path / "numpy.py").write_text("import signal, time\nsignal.raise_signal(signal.SIGINT)\ntime.sleep(60)")
     paths = os.pathsep.join([str(tmp_path), str(Path(__file__).parent.parent)])
-    foreground = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    on_windows = sys.platform == "win32"
+    foreground = {} if on_windows else {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
     command, environment = [sys.executable, "-m", "viewcam_addon", "render"], os.environ | {"PYTHONPATH": paths}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, **foreground)
-    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+    status = 3 if on_windows else -signal.SIGINT  # that of C's runtime there
+    assert (done.returncode, done.stdout, done.stderr) == (status, "", "")
 
 
 def mounted(options, script, *arguments):

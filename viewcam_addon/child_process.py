@@ -14,10 +14,12 @@ which a process that is stopped or stuck does not give.
 Rejected: ending a child alone (`viewcam check` has children itself, which would trace on for minutes after it; and a signal
 that the child could answer by ending them Blender does not let Python hear while it renders); standard input and output for
 requests, into which Blender and libraries print; a socket with a name and a key, which waits for ever for a process that dies
-before it calls; pickle, which runs what it is sent; files that appear, watched.
+before it calls; pickle, which runs what it is sent; files that appear, watched; on Windows, taskkill, which misses whoever has
+lost its parent.
 """
 
 import contextlib
+import ctypes
 import importlib.util
 import json
 import math
@@ -115,6 +117,7 @@ class ProcessGroup:
             self._first = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=words, stderr=subprocess.STDOUT, env=variables, **apart
             )
+        self._job = _WindowsJob(self._first) if _ON_WINDOWS else None
 
     def status(self) -> int | None:
         """The first process's exit status, None while it runs, negative if a signal has ended it."""
@@ -127,12 +130,30 @@ class ProcessGroup:
 
     def end(self) -> None:
         """End those that still run, and wait for the first."""
-        if _ON_WINDOWS:
-            subprocess.run(["taskkill", "/F", "/T", "/PID", str(self._first.pid)], capture_output=True, check=False)
+        if self._job:
+            self._job.end()
+            self._first.kill()  # if Windows has refused to take it into the job
         else:
             with contextlib.suppress(ProcessLookupError):  # all have ended by themselves
                 os.killpg(self._first.pid, signal.SIGKILL)
         self._first.wait()
+
+
+class _WindowsJob:
+    """A job object: a process and all that it starts."""
+
+    def __init__(self, process: subprocess.Popen) -> None:
+        self._kernel32 = ctypes.WinDLL("kernel32")
+        self._kernel32.CreateJobObjectW.restype = ctypes.c_void_p
+        self._handle = ctypes.c_void_p(self._kernel32.CreateJobObjectW(None, None))
+        self._kernel32.AssignProcessToJobObject(self._handle, ctypes.c_void_p(int(process._handle)))
+
+    def end(self) -> None:
+        """End those of its processes that still run, with status 1."""
+        self._kernel32.TerminateJobObject(self._handle, 1)
+
+    def __del__(self) -> None:
+        self._kernel32.CloseHandle(self._handle)
 
 
 def _inherited(handle: int) -> dict[str, object]:

@@ -2,7 +2,6 @@
 
 import io
 import json
-import shlex
 import sys
 from dataclasses import replace
 
@@ -19,15 +18,17 @@ from viewcam_addon.pinhole import Pinhole
 @pytest.fixture
 def named(tmp_path, monkeypatch):
     """A function that names a program, which writes its words down and ends with this status."""
-    if sys.platform == "win32":
-        pytest.skip("a script of the shell stands in for Blender")
 
     def name(status):
-        program = tmp_path / "blender"
-        program.write_text(f'#!/bin/sh\nprintf "%s\\n" "$@" > {shlex.quote(str(tmp_path / "words.txt"))}\nexit {status}\n')
+        written, program = tmp_path / "words.txt", tmp_path / "blender"
+        text = f"import pathlib, sys\npathlib.Path({str(written)!r}).write_text('\\n'.join(sys.argv[1:]))\nsys.exit({status})\n"
+        program.write_text(f"#!{sys.executable}\n{text}")
         program.chmod(0o755)
+        if sys.platform == "win32":  # where no script is a program by its first line
+            script, program = program, program.with_suffix(".cmd")
+            program.write_text(f'@"{sys.executable}" "{script}" %*\n')
         monkeypatch.setenv("VIEWCAM_BLENDER", str(program))
-        return lambda: (tmp_path / "words.txt").read_text().splitlines()
+        return lambda: written.read_text().splitlines()
 
     return name
 

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import os
 import pickle
 import shlex
 import subprocess
@@ -189,8 +190,8 @@ def test_the_hash_is_the_same_in_another_process_with_other_hashes_of_texts():
     imports = "from viewcam_addon.jobs.settings import settings_hash; from viewcam_addon.jobs.job import Job"
     program = f"{imports}\nprint(settings_hash({SHOT!r}, {MADE_FROM!r}))"
     command = [sys.executable, "-X", "utf8", "-c", program]
-    root = Path(__file__).parents[2]
-    outcome = subprocess.run(command, cwd=root, env={"PYTHONHASHSEED": "7"}, capture_output=True, text=True, check=True)
+    root, seed = Path(__file__).parents[2], os.environ | {"PYTHONHASHSEED": "7"}
+    outcome = subprocess.run(command, cwd=root, env=seed, capture_output=True, text=True, check=True)
     assert outcome.stdout.strip() == settings_hash(SHOT, MADE_FROM)
 
 

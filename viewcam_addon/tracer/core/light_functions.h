@@ -58,7 +58,7 @@ inline Lamp lamp_of(const ViewcamLamp& given, Vec3 color, Vec3 origin) {
 inline void add_lamp(Scene& scene, const ViewcamLamp& given, const ViewcamColor& emission) {
     Vec3 color = vector(given.color);
     Color factor = color_of(emission, scene.illumination.nodes);
-    if (!factor.varies()) color *= Vec3{larger(factor.rgb.x, 0), larger(factor.rgb.y, 0), larger(factor.rgb.z, 0)};
+    if (!factor.varies()) color *= max(factor.rgb, 0);
     if (is_black(color)) return;
     scene.illumination.lamps.push_back(lamp_of(given, color, scene.origin));
     scene.illumination.lamps.back().emission = factor;

@@ -103,7 +103,7 @@ struct Material {
         double weight = 1;
         for (const MixFactor& factor : one.factors) {
             double mean = unit_range(factor.value.mean(textures).x), value = factor.rest ? 1 - mean : mean;
-            weight *= factor.value.varies() ? larger(value, LEAST) : value;
+            weight *= factor.value.varies() ? max(value, LEAST) : value;
         }
         return weight;
     }

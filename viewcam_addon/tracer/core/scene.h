@@ -432,7 +432,7 @@ inline double ShadingPoint::edge_distance() const {
     double least = INFINITE;
     for (int c = 0; c < 3; c++) {
         Vec3 edge = corner[(c + 1) % 3] - corner[c];
-        if (double size = length(edge); size > 0) least = smaller(least, length(cross(edge, point.position - corner[c])) / size);
+        if (double size = length(edge); size > 0) least = min(least, length(cross(edge, point.position - corner[c])) / size);
     }
     return least;
 }

@@ -24,7 +24,7 @@ inline Vec2 equirectangular(Vec3 direction) {
 }
 inline Vec2 mirror_ball(Vec3 direction) {
     Vec3 half = direction / length(direction) - Vec3{0, 1, 0};
-    double size = 2 * std::sqrt(larger(-half.y / 2, 0.0));
+    double size = 2 * std::sqrt(max(-half.y / 2, 0.0));
     return size > 0 ? Vec2{(half.x / size + 1) / 2, (half.z / size + 1) / 2} : Vec2{0.5, 0.5};
 }
 
@@ -133,8 +133,8 @@ struct Texture {
         double u = uv.x, v = uv.y;
         if (lookup.extension == Lookup::REPEAT) {
             u -= std::floor(u), v -= std::floor(v);
-            u = u >= 0 ? smaller(u, LARGEST) : 0;
-            v = v >= 0 ? smaller(v, LARGEST) : 0;
+            u = u >= 0 ? min(u, LARGEST) : 0;
+            v = v >= 0 ? min(v, LARGEST) : 0;
         } else {  // far outside an image all is as it is just outside, or mirrored
             if (!(std::fabs(u) < FARTHEST)) u = 0;
             if (!(std::fabs(v) < FARTHEST)) v = 0;

@@ -24,7 +24,7 @@ inline float round_up(double distance) { return float(distance * (1 + 2.5e-7) + 
 // Which of a direction's components is the largest, given their sizes. No branch, which rays from surfaces would take at random.
 inline int dominant_axis(double x, double y, double z) {
     int axis = !(x > y);
-    return larger(x, y) > z ? axis : 2;
+    return max(x, y) > z ? axis : 2;
 }
 
 // The same of four directions, given their sizes.
@@ -54,7 +54,7 @@ inline bool enter(const Bvh& bvh, const Ray& ray, double t_max, double origin_er
     double4 direction = load<double4>(&ray.direction.x), origin = load<double4>(&ray.origin.x);
     double4 size = abs(direction);
     int axis = dominant_axis(size[0], size[1], size[2]);
-    double longest = larger(larger(size[0], size[1]), size[2]);
+    double longest = max(max(size[0], size[1]), size[2]);
     if (!(longest > 0) || !(longest < 1e300)) return false;
     double inverse = 1 / longest;
     double4 unit = direction * splat4(inverse), reciprocal = splat4(longest) * (splat4(1.0) / direction);

@@ -25,7 +25,7 @@ inline double fresnel(double cosine, double ratio) {
     double slowed = ratio * ratio * cosine;
     double perpendicular = excess / ((far + cosine) * (far + cosine));  // (far − cosine) / (far + cosine) without cancellation
     double parallel = (far - slowed) / (far + slowed);
-    return smaller(0.5 * (perpendicular * perpendicular + parallel * parallel), 1.0);
+    return min(0.5 * (perpendicular * perpendicular + parallel * parallel), 1.0);
 }
 
 struct SpecularTransmission {

@@ -12,7 +12,7 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-inline double unit_range(double x) { return x > 0 ? smaller(x, 1.0) : 0; }
+inline double unit_range(double x) { return x > 0 ? min(x, 1.0) : 0; }
 inline Vec3 unit_range(Vec3 x) { return {unit_range(x.x), unit_range(x.y), unit_range(x.z)}; }
 inline double mix(double a, double b, double t) { return a + (b - a) * t; }
 inline Vec3 mix(Vec3 a, Vec3 b, double t) { return a + (b - a) * t; }
@@ -24,7 +24,7 @@ inline double f0_of(double ior) {
     return root * root;
 }
 inline double ior_of_f0(double f0) {
-    double root = std::sqrt(f0 > 0 ? smaller(f0, 0.99) : 0);
+    double root = std::sqrt(f0 > 0 ? min(f0, 0.99) : 0);
     return (1 + root) / (1 - root);
 }
 inline double mean_fresnel(double ior) {
@@ -94,7 +94,7 @@ struct ConductorFresnel {
             return 0.5 * (parallel + across);
         }
         double real = n * n - k * k - (1 - c * c), size = std::sqrt(real * real + 4 * n * n * k * k);
-        double u2 = larger(0.5 * (size + real), 0.0), v2 = larger(0.5 * (size - real), 0.0), u = std::sqrt(u2), v = std::sqrt(v2);
+        double u2 = max(0.5 * (size + real), 0.0), v2 = max(0.5 * (size - real), 0.0), u = std::sqrt(u2), v = std::sqrt(v2);
         double across = ((c - u) * (c - u) + v2) / ((c + u) * (c + u) + v2);
         double a = (n * n - k * k) * c, e = 2 * n * k * c;
         double parallel = ((a - u) * (a - u) + (e - v) * (e - v)) / ((a + u) * (a + u) + (e + v) * (e + v));

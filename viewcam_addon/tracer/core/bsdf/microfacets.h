@@ -30,10 +30,10 @@ struct Microfacets {
     // A facet as often as the viewer sees it. wi: to the viewer, above the surface.
     Vec3 sample_visible(Vec3 wi, Vec2 u) const {
         Vec3 stretched = normalize(Vec3{wi.x * alpha_x, wi.y * alpha_y, wi.z});
-        double z = (1 - u.y) * (1 + stretched.z) - stretched.z, across = std::sqrt(larger(1 - z * z, 0.0));
+        double z = (1 - u.y) * (1 + stretched.z) - stretched.z, across = std::sqrt(max(1 - z * z, 0.0));
         SinCos turn = sincos_of_turns(u.x);
         Vec3 h = Vec3{across * turn.cos, across * turn.sin, z} + stretched;
-        return normalize(Vec3{h.x * alpha_x, h.y * alpha_y, larger(h.z, LEAST_RISE)});
+        return normalize(Vec3{h.x * alpha_x, h.y * alpha_y, max(h.z, LEAST_RISE)});
     }
     // The density of that, by solid angle.
     double pdf_visible(Vec3 wi, Vec3 h) const {

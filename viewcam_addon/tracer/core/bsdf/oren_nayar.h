@@ -18,7 +18,7 @@ struct OrenNayar {
         : color(color), normal(normal), to_viewer(to_viewer) {
         a = 1 / (PI + roughness * (PI / 2 - 2.0 / 3)), b = roughness * a;
         if (!multiple) return;
-        double mean = a * PI + (2 * PI - 5.6) / 3 * b, lost = (1 - albedo_under(larger(dot(normal, to_viewer), 0.0))) * mean / (1 - mean) / PI;
+        double mean = a * PI + (2 * PI - 5.6) / 3 * b, lost = (1 - albedo_under(max(dot(normal, to_viewer), 0.0))) * mean / (1 - mean) / PI;
         auto kept = [&](double rho) { return lost * rho * rho / (1 - rho * (1 - mean)); };
         Vec3 rho = unit_range(albedo);
         this->multiple = {kept(rho.x), kept(rho.y), kept(rho.z)};
@@ -26,13 +26,13 @@ struct OrenNayar {
 
     double importance() const { return color.x + color.y + color.z; }
     Vec3 eval(Vec3 to_light) const {
-        double light = larger(dot(normal, to_light), 0.0), viewer = larger(dot(normal, to_viewer), 0.0);
+        double light = max(dot(normal, to_light), 0.0), viewer = max(dot(normal, to_viewer), 0.0);
         if (!(light > 0)) return {};
         double t = dot(to_viewer, to_light) - light * viewer;
-        if (t > 0) t /= larger(light, viewer);
+        if (t > 0) t /= max(light, viewer);
         return color * ((grey(a + b * t) + multiple * (1 - albedo_under(light))) * light);
     }
-    double pdf(Vec3 to_light) const { return larger(dot(normal, to_light), 0.0) / PI; }
+    double pdf(Vec3 to_light) const { return max(dot(normal, to_light), 0.0) / PI; }
     LobeSample sample(Vec2 u) const {
         double cosine;
         Vec3 direction = cosine_direction(normal, u, cosine);
@@ -43,7 +43,7 @@ struct OrenNayar {
     // What is reflected once of light that comes under a cosine.
     double albedo_under(double cosine) const {
         if (cosine < 1e-6) return a * PI + b * (PI / 2 - 2.0 / 3 - cosine);
-        double sine = std::sqrt(larger(1 - cosine * cosine, 0.0));
+        double sine = std::sqrt(max(1 - cosine * cosine, 0.0));
         double g = sine * (acos(cosine) - 2.0 / 3 - sine * cosine) + 2.0 / 3 * (sine / cosine) * (1 - sine * sine * sine);
         return a * PI + b * g;
     }

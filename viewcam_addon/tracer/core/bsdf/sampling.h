@@ -32,6 +32,6 @@ template <class T> inline T one_minus_cosine(T squared_sine) { return squared_si
 
 // About the cosine under which what reaches `reach` round a place is seen, 0 only if all of it is below the horizon.
 // height: of the place above the surface's plane. distance: of the place.
-inline double risen(double height, double distance, double reach) { return larger(height + reach, 0.0) / (distance + reach); }
+inline double risen(double height, double distance, double reach) { return max(height + reach, 0.0) / (distance + reach); }
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -25,7 +25,7 @@ struct ShadowTerminator {
         double up = std::fabs(flat), cosine = std::fabs(tilt);
         if (up >= 1 || cosine >= 1) return 1;
         if (up < 1e-6) return 0;
-        double squared = smaller(0.125 * (1 / (cosine * cosine) - 1), 1.0);
+        double squared = min(0.125 * (1 / (cosine * cosine) - 1), 1.0);
         return 2 / (1 + std::sqrt(1 + squared * (1 / (up * up) - 1)));
     }
 };

@@ -20,7 +20,7 @@ struct SheenLobe {
     // tint: of all that is scattered. A normal that is turned away from the viewer scatters as one that is seen edge-on.
     SheenLobe(Vec3 tint, Vec3 normal, Vec3 to_viewer, double roughness) : frame(frame_along(normal, to_viewer)) {
         constexpr double LEAST = 1e-5, SMOOTHEST = 1e-3;
-        detail::Place r(larger(roughness, SMOOTHEST), 32), c(dot(normal, to_viewer), 32);
+        detail::Place r(max(roughness, SMOOTHEST), 32), c(dot(normal, to_viewer), 32);
         a = detail::at(sheen_table::A, r, c, 32), b = detail::at(sheen_table::B, r, c, 32);
         double albedo = detail::at(sheen_table::ALBEDO, r, c, 32);
         color = std::fabs(a) < LEAST || albedo < LEAST ? Vec3{} : tint * albedo;
@@ -48,7 +48,7 @@ struct VelvetLobe {
     double spread;  // the square of the fibers' slopes
 
     VelvetLobe(Vec3 color, Vec3 normal, Vec3 to_viewer, double roughness) : color(color), normal(normal), to_viewer(to_viewer) {
-        spread = larger(roughness, 0.01) * larger(roughness, 0.01);
+        spread = max(roughness, 0.01) * max(roughness, 0.01);
     }
 
     Vec3 eval(Vec3 to_light) const {
@@ -59,7 +59,7 @@ struct VelvetLobe {
         double up = dot(normal, h), seen = std::fabs(dot(to_viewer, h));
         if (!(up < 1 - ALIKE && seen > ALIKE)) return {};
         double sine = 1 - up * up, d = exp(-up * up / sine / spread) / (spread * PI * sine * sine);
-        double shadow = smaller(1.0, 2 * larger(up / seen, ALIKE) * smaller(in, out));
+        double shadow = min(1.0, 2 * max(up / seen, ALIKE) * min(in, out));
         return color * (0.25 * d * shadow / in);
     }
     double pdf(Vec3 to_light) const { return dot(normal, to_light) > 0 ? 0.5 / PI : 0; }

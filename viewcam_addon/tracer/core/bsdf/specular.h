@@ -16,13 +16,13 @@ inline Vec3 reflected(Vec3 incoming, Vec3 normal) { return incoming - normal * (
 // at 2α − φ. Its rise, r cos(2α − φ), is the least where α = (φ + arccos(rise / r)) / 2.
 inline Vec3 specular_normal(Vec3 incoming, Vec3 normal, Vec3 shading) {
     constexpr double LEAST_RISE = 0.01, RISE_SHARE = 0.9;
-    double rise = smaller(RISE_SHARE * larger(-dot(incoming, normal), 0.0), LEAST_RISE);
+    double rise = min(RISE_SHARE * max(-dot(incoming, normal), 0.0), LEAST_RISE);
     if (dot(reflected(incoming, shading), normal) >= rise) return shading;
     Vec3 back = -incoming, aside = shading - normal * dot(shading, normal);
     double size = length(aside);
     if (size > 0) aside = aside / size;
     double up = dot(back, normal), along = dot(back, aside), reach = std::sqrt(up * up + along * along);
-    double turn = (atan2(along, up) + acos(smaller(rise / (reach > 0 ? reach : 1), 1.0))) / 2;
+    double turn = (atan2(along, up) + acos(min(rise / (reach > 0 ? reach : 1), 1.0))) / 2;
     return aside * sin(turn) + normal * cos(turn);
 }
 

@@ -11,7 +11,7 @@ struct Translucent {
 
     double importance() const { return color.x + color.y + color.z; }
     Vec3 eval(Vec3 to_light) const { return color * pdf(to_light); }
-    double pdf(Vec3 to_light) const { return larger(-dot(normal, to_light), 0.0) / PI; }
+    double pdf(Vec3 to_light) const { return max(-dot(normal, to_light), 0.0) / PI; }
     LobeSample sample(Vec2 u) const {
         double cosine;
         Vec3 direction = cosine_direction(-normal, u, cosine);

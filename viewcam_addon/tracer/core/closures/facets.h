@@ -22,7 +22,7 @@ struct Anisotropy {
     // As a Glossy BSDF has it: below 0 across the tangent.
     Facets of_glossy(const ShadingPoint& at, Vec3 normal, const Facets& round) const {
         constexpr double MOST = 0.99, NEGLIGIBLE = 1e-4;
-        double a = smaller(larger(at.number(amount), -MOST), MOST);
+        double a = min(max(at.number(amount), -MOST), MOST);
         return std::fabs(a) <= NEGLIGIBLE ? round : stretched(at, normal, round, a < 0 ? 1 / (1 + a) : 1 - a);
     }
     // As Metallic and Principled have it.

@@ -28,7 +28,7 @@ struct GlassClosure {
     bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         Vec3 rgb = at.color(color);
-        double ratio = at.ratio(larger(at.number(ior), LEAST_IOR));
+        double ratio = at.ratio(max(at.number(ior), LEAST_IOR));
         add_glass(bsdf, at, weight, at.specular_normal(normal), distribution.facets(at.number(roughness)), ratio, DielectricFresnel{ratio}, rgb, rgb,
                   distribution.multiple);
     }
@@ -48,7 +48,7 @@ struct RefractionClosure {
         : color(in["color"]), ior(in["ior"]), roughness(in["roughness"]), normal(in["normal"]), distribution(in.choice("distribution")) {}
     bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
-        double ratio = at.ratio(larger(at.number(ior), LEAST_IOR));
+        double ratio = at.ratio(max(at.number(ior), LEAST_IOR));
         add_refraction(bsdf, at, at.color(color) * weight, at.specular_normal(normal), distribution.facets(at.number(roughness)), TotalReflection{ratio},
                        ratio);
     }

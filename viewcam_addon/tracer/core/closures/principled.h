@@ -35,9 +35,9 @@ struct PrincipledClosure {
     }
 
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
-        Vec3 base = not_negative(at.color(base_color)), tint = not_negative(at.color(specular_tint)), clamped = unit_range(base);
+        Vec3 base = max(at.color(base_color), 0), tint = max(at.color(specular_tint), 0), clamped = unit_range(base);
         Vec3 shading = at.normal(this->normal), normal = at.specular(shading);
-        double cosine = -dot(normal, at.incoming), index = larger(at.number(ior), LEAST_IOR);
+        double cosine = -dot(normal, at.incoming), index = max(at.number(ior), LEAST_IOR);
         Facets round = distribution.facets(at.number(roughness)), facets = anisotropy.of(at, shading, round);
 
         if (double share = unit_range(at.number(alpha)); share < 1) {
@@ -58,7 +58,7 @@ struct PrincipledClosure {
             add_glass(bsdf, at, weight * share, normal, round, ratio, fresnel, grey(1), through, distribution.multiple);
             weight *= 1 - share;
         }
-        double level = larger(at.number(specular_level), 0.0), f0 = f0_of(index), eta = index;
+        double level = max(at.number(specular_level), 0.0), f0 = f0_of(index), eta = index;
         if (level != 0.5) {
             f0 *= 2 * level;
             eta = index < 1 ? 1 / ior_of_f0(f0) : ior_of_f0(f0);
@@ -85,26 +85,25 @@ struct PrincipledClosure {
         return distribution.multiple ? of(multiple_reflection(at, normal, facets, mean)) : Scattering{};
     }
 
-    static Vec3 not_negative(Vec3 rgb) { return {larger(rgb.x, 0), larger(rgb.y, 0), larger(rgb.z, 0)}; }
     static bool is_negligible(Vec3 weight) { return weight.x + weight.y + weight.z < 3 * NEGLIGIBLE; }
 
     // Adds the sheen, which stands on the coat where there is one; what it leaves to the layers below. shading: the base's normal.
     Vec3 below_sheen(BSDF& bsdf, const ShadingPoint& at, Vec3 weight, Vec3 shading) const {
-        double share = larger(at.number(sheen_weight), 0.0);
+        double share = max(at.number(sheen_weight), 0.0);
         if (!(share > NEGLIGIBLE)) return weight;
         Vec3 mixed = mix(shading, at.normal(coat_normal), unit_range(at.number(coat_weight)));
         double size = length(mixed);
-        SheenLobe lobe(not_negative(at.color(sheen_tint)) * weight * share, size > 0 ? mixed / size : at.point.shading, -at.incoming,
+        SheenLobe lobe(max(at.color(sheen_tint), 0) * weight * share, size > 0 ? mixed / size : at.point.shading, -at.incoming,
                        unit_range(at.number(sheen_roughness)));
         bsdf.add(lobe);
         return below(weight, lobe.color);
     }
     // Adds the coat; what it leaves to the layers below.
     Vec3 below_coat(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
-        double share = larger(at.number(coat_weight), 0.0);
+        double share = max(at.number(coat_weight), 0.0);
         if (!(share > NEGLIGIBLE)) return weight;
         Vec3 normal = at.specular_normal(coat_normal);  // not the base's where it has none
-        double cosine = -dot(normal, at.incoming), eta = larger(at.number(coat_ior), 1.0);
+        double cosine = -dot(normal, at.incoming), eta = max(at.number(coat_ior), 1.0);
         Facets facets = facets_of(at.number(coat_roughness));
         Scattering scattered;
         double reflected = fresnel(cosine, eta);
@@ -113,18 +112,18 @@ struct PrincipledClosure {
             if (eta > 1) reflected = mix(f0_of(eta), 1, fresnel_progress_seen(eta, roughness_of(facets), cosine));
         }
         add_reflection(bsdf, at, weight * share * scattered.lobe, normal, facets, DielectricFresnel{eta});
-        Vec3 left = below(weight, weight * share * scattered.albedo * reflected), tint = not_negative(at.color(coat_tint));
+        Vec3 left = below(weight, weight * share * scattered.albedo * reflected), tint = max(at.color(coat_tint), 0);
         if (tint.x == 1 && tint.y == 1 && tint.z == 1) return left;
         // The way through it, both ways as one: without end along a coat that does not bend light.
-        double depth = 1 / std::sqrt(larger(1 - (1 - cosine * cosine) / (eta * eta), 1e-300));
-        auto absorbed = [&](double t) { return mix(1, t > 0 ? smaller(pow(t, depth), MOST_TINT) : 0, share); };
+        double depth = 1 / std::sqrt(max(1 - (1 - cosine * cosine) / (eta * eta), 1e-300));
+        auto absorbed = [&](double t) { return mix(1, t > 0 ? min(pow(t, depth), MOST_TINT) : 0, share); };
         return left * Vec3{absorbed(tint.x), absorbed(tint.y), absorbed(tint.z)};
     }
 
     // What a layer leaves of a weight, for all channels alike.
     static Vec3 below(Vec3 weight, Vec3 albedo) {
         auto part = [](double taken, double of) { return of != 0 ? taken / of : 0; };
-        double most = larger(part(albedo.x, weight.x), larger(part(albedo.y, weight.y), part(albedo.z, weight.z)));
+        double most = max(part(albedo.x, weight.x), max(part(albedo.y, weight.y), part(albedo.z, weight.z)));
         return weight * unit_range(1 - most);
     }
 };

@@ -43,7 +43,7 @@ struct ShadingPoint {
     Vec3 color(const Color& color) const {
         if (color.node == NONE) return color.at(textures, point);
         Vec3 rgb = value_of_node(color.node);
-        return {larger(rgb.x, 0), larger(rgb.y, 0), larger(rgb.z, 0)};
+        return {max(rgb.x, 0), max(rgb.y, 0), max(rgb.z, 0)};
     }
     double number(const Color& color) const {
         if (!color.varies()) return color.rgb.x == color.rgb.y && color.rgb.y == color.rgb.z ? color.rgb.x : luminance(color.rgb);

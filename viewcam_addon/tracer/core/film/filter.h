@@ -111,7 +111,7 @@ class Filter {
             double end = std::ldexp(1 + ((step + 1) % (1 << DIGITS)) / double(1 << DIGITS), (step + 1) / (1 << DIGITS)) * LEAST - LEAST;
             double next = place<Shape>(end), next_slope = 1 / Shape::density(next);
             double size = end - begin, rise = next - x;
-            double first = smaller(slope * size, 3 * rise), last = smaller(next_slope * size, 3 * rise);  // so that places keep their order
+            double first = min(slope * size, 3 * rise), last = min(next_slope * size, 3 * rise);  // so that places keep their order
             steps[step] = {x, first, 3 * rise - 2 * first - last, first + last - 2 * rise};
             x = next, slope = next_slope, begin = end;
         }

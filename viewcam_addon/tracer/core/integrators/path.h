@@ -254,7 +254,7 @@ class PathIntegrator {
     // By how much rounding may move a surface along a ray that meets it, in world units. size: of what is rounded.
     double coincident_reach(double size, double cosine) const {
         constexpr double FLOAT32 = 0x1p-24, GRAZED = 0.05;
-        return coincident_ * FLOAT32 * size / larger(cosine, GRAZED);
+        return coincident_ * FLOAT32 * size / max(cosine, GRAZED);
     }
     // Where several surfaces lie in the place of what a path has met: one of them, by chance, in the place of all.
     [[gnu::noinline]] void meet_coincident(Path& path, const Ray& ray, Hit& hit, Interaction& point, int depth, const Block& block) const {
@@ -265,7 +265,7 @@ class PathIntegrator {
         double magnitude, unit = length(ray.direction);
         scene_.interactions(&met_by, &hit, 1, &met, &magnitude);
         double reach = coincident_reach(magnitude + met.t * unit, met.cosine);
-        scene_.surfaces({ray.origin, ray.direction, larger(met.t - reach / unit, ray.t_min), met.t + reach / unit}, path.kind, INFINITE, hits);
+        scene_.surfaces({ray.origin, ray.direction, max(met.t - reach / unit, ray.t_min), met.t + reach / unit}, path.kind, INFINITE, hits);
         // Where surfaces cross at an angle, that is as wide as rounding: no matter.
         if (hits.size() > 1) std::erase_if(hits, [&](const Hit& other) { return length(cross(scene_.interaction(ray, other).normal, met.normal)) > PARALLEL; });
         if (hits.size() < 2) return;
@@ -278,7 +278,7 @@ class PathIntegrator {
         uint32_t chosen = ((block.samples->pixel[path.sample] * 0x9e3779b9u ^ block.samples->number[path.sample]) * 0x85ebca6bu ^ uint32_t(depth)) * 0xc2b2ae35u >> 16;
         hit = hits[chosen % hits.size()];
         point = scene_.interaction(ray, hit);
-        point.offset = larger(point.offset, 2 * reach * larger(point.cosine, 0.0));
+        point.offset = max(point.offset, 2 * reach * max(point.cosine, 0.0));
         path.weight = min(path.weight * double(hits.size()), MOST_WEIGHT);
     }
     // How far before its light a shadow ray must end, so that nothing in the light's place counts; 0 where nothing is there. Notes
@@ -288,7 +288,7 @@ class PathIntegrator {
         if (!(sample.distance < INFINITE && light.casts_shadow)) return 0;
         double largest = max_component(abs(point.position + scene_.origin)) + sample.distance;
         double reach = coincident_reach(largest, sample.cosine);
-        scene_.surfaces({point.position, sample.direction, larger(sample.distance - reach, 0.0), sample.distance + reach}, SHADOW, INFINITE, hits);
+        scene_.surfaces({point.position, sample.direction, max(sample.distance - reach, 0.0), sample.distance + reach}, SHADOW, INFINITE, hits);
         if (light.mesh()) return hits.size() > 1 ? reach : 0;
         if (hits.empty()) return 0;
         std::lock_guard lock(mutex_);
@@ -391,7 +391,7 @@ class PathIntegrator {
     void meet_lamps(const Path& path, const Ray& ray, const Hit& hit, int depth, Block& block) const {
         if (!lights_.meets_lamps(path.kind)) return;
         double size = path.kind == CAMERA ? length(ray.direction) : 1;
-        LightRay seen{ray.origin, ray.direction / size, ray.t_min * size, smaller(ray.t_max, hit.t) * size, !hit, path.kind == CAMERA ? scene_.camera.t_min * size : 0};
+        LightRay seen{ray.origin, ray.direction / size, ray.t_min * size, min(ray.t_max, hit.t) * size, !hit, path.kind == CAMERA ? scene_.camera.t_min * size : 0};
         if (path.kind == CAMERA) return light_of(path, block).add(EMISSION, path.weight * lights_.le(seen, CAMERA));
         Vec3 sum;
         lights_.each_lamp(seen, path.kind, block.points[path.from], path.pdf, depth == 1, path.through, [&](const Light& lamp, Vec3 radiance, double distance) {
@@ -526,7 +526,7 @@ class PathIntegrator {
                 chosen = lights_.choose(point, lights_.is_random() ? number(SobolSampler::LIGHT) : 0, depth == 1, through, choices, brightest);
             if (brightest > 0 && last & DIFFUSE) {
                 if (bsdf.kinds() & leading & ~DIFFUSE)  // lobes that may show lamps take its place
-                    bsdf.thin(DIFFUSE, smaller(lights_.sky_share(brightest, DIFFUSE), 1.0));
+                    bsdf.thin(DIFFUSE, min(lights_.sky_share(brightest, DIFFUSE), 1.0));
                 else
                     sky = lights_.sky_chance(brightest, DIFFUSE);
             }
@@ -552,7 +552,7 @@ class PathIntegrator {
             if (sampled.kind == DIFFUSE && next.last)
                 survival = sky;
             else if (depth > CERTAIN && !next.last)
-                survival = smaller(std::sqrt(max_component(next.weight)), 1.0);
+                survival = min(std::sqrt(max_component(next.weight)), 1.0);
             if (survival < 1) {
                 if (number(SobolSampler::ROULETTE) >= survival) continue;
                 next.weight = next.weight / survival;
@@ -653,7 +653,7 @@ class PathIntegrator {
             if (ends && brightest[i] > 0)
                 survival = lights_.sky_chance(brightest[i], DIFFUSE);
             else if (!ends && depth > CERTAIN)
-                survival = smaller(std::sqrt(max_component(left)), 1.0);
+                survival = min(std::sqrt(max_component(left)), 1.0);
             if (survival < 1) {
                 if (sampler_.number(keys[i], numbers[i], SobolSampler::dimension(depth, SobolSampler::ROULETTE)) >= survival) continue;
                 left = left / survival;
@@ -743,7 +743,7 @@ class PathIntegrator {
         if (has_pixels_) block.shadowed[choice.slot][place].ray.width = at.footprint();
         if (!traced) return;
         Ray ray = shadow_ray(point, sample);
-        if (end > 0) ray.t_max = larger(smaller(ray.t_max, sample.distance - end), 0.0);
+        if (end > 0) ray.t_max = max(min(ray.t_max, sample.distance - end), 0.0);
         block.shadow_rays[choice.slot].set(place, ray);
     }
 
@@ -797,7 +797,7 @@ class PathIntegrator {
     // Where one thing stands on another, their surfaces are in one place, up to rounding. Rays come out of the one before they meet
     // the other, as if there were air between: what is found nearest is not asked there.
     static double nearly(const Interaction& point, Vec3 direction) {
-        return 8 * point.offset / larger(std::fabs(dot(point.normal, direction)), 1e-6);
+        return 8 * point.offset / max(std::fabs(dot(point.normal, direction)), 1e-6);
     }
     // What another thing has from before where a path's ray starts, which comes out of one or goes back to what it came from.
     Hit touched(Path& path, const Interaction& point) const {
@@ -816,7 +816,7 @@ class PathIntegrator {
     void let_out_first(const Path& path, Hit& met, Interaction& point) const {
         double range = nearly(point, path.ray.direction);
         Ray ray = path.ray;
-        ray.t_min = larger(ray.t_min, met.t - range), ray.t_max = met.t + range;
+        ray.t_min = max(ray.t_min, met.t - range), ray.t_max = met.t + range;
         while (Hit hit = scene_.closest(ray, path.kind, met.object)) {
             if (hit.object == path.inside) {
                 Interaction exit = scene_.interaction(ray, hit);
@@ -866,8 +866,6 @@ class PathIntegrator {
         block.live = live;
         std::swap(block.points, block.next_points);
     }
-
-    static Vec3 min(Vec3 rgb, double most) { return {smaller(rgb.x, most), smaller(rgb.y, most), smaller(rgb.z, most)}; }
 
     const Scene& scene_;
     std::vector<Vec3> matte_;  // of each material, Material::matte_color

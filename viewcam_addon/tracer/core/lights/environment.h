@@ -61,7 +61,7 @@ class Environment {
         };
         int row = pick(rows_reached_.data(), rows_, u.y);
         int column = pick(&reached_[size_t(row) * columns_], columns_, u.x);
-        double low = cosine_below(row), z = mix(low, cosine_below(row + 1), u.y), across = std::sqrt(larger(1 - z * z, 0.0));
+        double low = cosine_below(row), z = mix(low, cosine_below(row + 1), u.y), across = std::sqrt(max(1 - z * z, 0.0));
         SinCos turn = sincos_of_turns(0.5 - (column + u.x) / columns_);
         Vec3 direction = to_image.transposed({across * turn.cos, across * turn.sin, z});
         double pdf = pdf_of(row, column);
@@ -95,7 +95,7 @@ class Environment {
             int left = int(int64_t(column) * texture_->width / columns_), right = int(int64_t(column + 1) * texture_->width / columns_);
             Vec3 cell = texture_->mean(left, right, first, last);
             sum += cell;
-            reached[column] = light += larger(mean(cell * radiance), 0.0);
+            reached[column] = light += max(mean(cell * radiance), 0.0);
         }
         return sum;
     }

@@ -98,7 +98,7 @@ class Point {
     }
     double pdf_li(const Interaction& from, Vec3 direction) const {
         if (radius_ == 0) return INFINITE;
-        if (is_around(from.position)) return larger(dot(from.shading, direction), 0.0) / PI;
+        if (is_around(from.position)) return max(dot(from.shading, direction), 0.0) / PI;
         return 1 / (2 * PI * spread(from.position));
     }
 
@@ -127,7 +127,7 @@ class Point {
 
     double estimate(Vec3 position, Vec3 normal) const {
         Vec3 way = center_ - position;
-        double distance = length(way), close = larger(distance, radius_);
+        double distance = length(way), close = max(distance, radius_);
         if (!(distance + radius_ > 0)) return 0;
         return mean(power_) / (4 * PI * close * close) * risen(dot(normal, way), distance, radius_);
     }
@@ -175,10 +175,10 @@ class Spot {
         inverse_[0] = cross(y, z) / determinant, inverse_[1] = cross(z, x) / determinant, inverse_[2] = cross(x, y) / determinant;
         axis_ = normalize(z);
         edge_ = cos(angle / 2);
-        slope_ = 1 / larger((1 - edge_) * in.number("blend"), HARD_EDGE);
-        double askew = larger(std::fabs(dot(x, y)), larger(std::fabs(dot(y, z)), std::fabs(dot(z, x))));
-        double longest = larger(dot(x, x), larger(dot(y, y), dot(z, z)));
-        double wider = larger(dot(x, x), dot(y, y)) / dot(z, z), tangent = sin(angle / 2) / edge_;
+        slope_ = 1 / max((1 - edge_) * in.number("blend"), HARD_EDGE);
+        double askew = max(std::fabs(dot(x, y)), max(std::fabs(dot(y, z)), std::fabs(dot(z, x))));
+        double longest = max(dot(x, x), max(dot(y, y), dot(z, z)));
+        double wider = max(dot(x, x), dot(y, y)) / dot(z, z), tangent = sin(angle / 2) / edge_;
         spread_ = askew > SHEARED * longest ? UNKNOWN : 1 - 1 / std::sqrt(1 + tangent * tangent * wider);
     }
 
@@ -207,11 +207,11 @@ class Spot {
         constexpr double LEAST_OF_A_WIDE_SPOT = 0.05;
         Vec3 way = point_.center() - position;
         double distance = length(way), seen = distance > 0 ? attenuation(way / distance) : 0;
-        return point_.estimate(position, normal) * larger(seen, is_sized() ? LEAST_OF_A_WIDE_SPOT : 0);
+        return point_.estimate(position, normal) * max(seen, is_sized() ? LEAST_OF_A_WIDE_SPOT : 0);
     }
     LightBounds bounds() const {
         LightBounds bounds = point_.bounds();
-        bounds.axis = -axis_, bounds.cos_normals = larger(1 - spread_, -1.0);
+        bounds.axis = -axis_, bounds.cos_normals = max(1 - spread_, -1.0);
         return bounds;
     }
 
@@ -222,7 +222,7 @@ class Spot {
     double attenuation(Vec3 ahead) const {
         double x = dot(inverse_[0], ahead), y = dot(inverse_[1], ahead), z = dot(inverse_[2], ahead);
         double rise = (z / std::sqrt(x * x + y * y + z * z) - edge_) * slope_;
-        rise = rise > 0 ? smaller(rise, 1.0) : 0;
+        rise = rise > 0 ? min(rise, 1.0) : 0;
         return rise * rise * (3 - 2 * rise);
     }
     // Whether the sphere is so large, or near, that the spot's cone is narrower than it looks.
@@ -232,7 +232,7 @@ class Spot {
         Vec3 way = point_.center() - from.position, ahead = cone_direction(axis_, spread_, u, short_of);
         double along = dot(way, ahead), root = radius * radius - (dot(way, way) - along * along);
         Vec3 weight = root >= 0 && along > 0 ? point_.radiance() * (2 * PI * spread_) : Vec3{};
-        return {ahead, along - std::sqrt(larger(root, 0.0)), weight, 1 / (2 * PI * spread_)};
+        return {ahead, along - std::sqrt(max(root, 0.0)), weight, 1 / (2 * PI * spread_)};
     }
 
     Point point_;
@@ -343,8 +343,8 @@ class Area {
         Vec3 way = center_ - position;
         double before = -dot(way, normal_), squared = dot(way, way), farthest = std::sqrt(squared) + reach_;
         if (!(before > 0)) return 0;
-        double light = larger(dot(normal, way) + reach_, 0.0) * (before + reach_);  // two cosines, as of `risen`
-        double aside = larger(std::sqrt(larger(squared - before * before, 0.0)) - reach_, 0.0);  // of what of it is the least aside
+        double light = max(dot(normal, way) + reach_, 0.0) * (before + reach_);  // two cosines, as of `risen`
+        double aside = max(std::sqrt(max(squared - before * before, 0.0)) - reach_, 0.0);  // of what of it is the least aside
         double most = through_grid(before / std::sqrt(before * before + aside * aside));
         return light * most * (mean(power_) / PI / (farthest * farthest * (squared + reach_ * reach_ / 2)));
     }
@@ -367,7 +367,7 @@ class Area {
 
     template <class T> Mask<T> is_near(Vec3Of<T> way) const {
         if (askew_) return Mask<T>{};
-        double longest = FAR * larger(lengths_[0], lengths_[1]);
+        double longest = FAR * max(lengths_[0], lengths_[1]);
         T squared = dot(way, way);
         Mask<T> close(squared < longest * longest);
         if (ellipse_ || all(close)) return close;

@@ -85,7 +85,7 @@ class Light {
         Vec3 way = middle_ - position;
         double distance = length(way);
         if (!(brought > 0 && distance > 0)) return brought;
-        return brought * larger(mean(emission(position, way / distance, distance)), is_sized() ? LEAST_OF_SIZED : 0);
+        return brought * max(mean(emission(position, way / distance, distance)), is_sized() ? LEAST_OF_SIZED : 0);
     }
     double irradiance() const {
         return std::visit(

@@ -24,20 +24,20 @@ struct LightBounds {
         constexpr double ROUNDING = 1e-12, MOST = 1e100;
         Vec3 way = center() - position, half = (box.high - box.low) * 0.5;
         double squared = dot(way, way), reach = dot(half, half) * (1 + ROUNDING);
-        if (squared <= reach) return reach > 0 ? smaller(intensity / reach, MOST) : 0;
+        if (squared <= reach) return reach > 0 ? min(intensity / reach, MOST) : 0;
         double distance = std::sqrt(squared), cos_box = std::sqrt(1 - reach / squared), sin_box = std::sqrt(reach / squared);
         double off_axis = cosine_of_rest(-dot(axis, way) / distance, cos_normals, sine(cos_normals));
         double off_normal = cosine_of_rest(off_axis, cos_box, sin_box);
         if (off_normal < cos_emission - ROUNDING) return 0;
         double above = dot(normal, way), smooth = dot(shading, way);  // light behind the true surface counts before the smooth one
-        double risen = (through ? larger(std::fabs(above), std::fabs(smooth)) : larger(above, smooth)) / distance;
+        double risen = (through ? max(std::fabs(above), std::fabs(smooth)) : max(above, smooth)) / distance;
         double facing = cosine_of_rest(risen, cos_box, sin_box);
-        return smaller(intensity / squared, MOST) * larger(off_normal, 0.0) * larger(facing, 0.0);
+        return min(intensity / squared, MOST) * max(off_normal, 0.0) * max(facing, 0.0);
     }
     // How much a split costs that leaves these lights together: what they give, over the directions and from the places they may.
     double cost() const {
         Vec3 size = box.high - box.low;
-        double normals = acos(cos_normals), reached = smaller(normals + acos(cos_emission), PI), sin_normals = sine(cos_normals);
+        double normals = acos(cos_normals), reached = min(normals + acos(cos_emission), PI), sin_normals = sine(cos_normals);
         double directions = 2 * PI * (1 - cos_normals) +
                             PI / 2 * (2 * reached * sin_normals - cos(normals - 2 * reached) - 2 * normals * sin_normals + cos_normals);
         return intensity * directions * (size.x * size.y + size.y * size.z + size.z * size.x);
@@ -50,10 +50,10 @@ struct LightBounds {
         }
         box.add(other.box);
         intensity += other.intensity;
-        cos_emission = smaller(cos_emission, other.cos_emission);
+        cos_emission = min(cos_emission, other.cos_emission);
         double own = acos(cos_normals), others = acos(other.cos_normals), apart = acos(std::clamp(dot(axis, other.axis), -1.0, 1.0));
-        if (smaller(apart + others, PI) <= own) return;
-        if (smaller(apart + own, PI) <= others) {
+        if (min(apart + others, PI) <= own) return;
+        if (min(apart + own, PI) <= others) {
             axis = other.axis, cos_normals = other.cos_normals;
             return;
         }
@@ -69,7 +69,7 @@ struct LightBounds {
     }
 
    private:
-    static double sine(double cosine) { return std::sqrt(larger(1 - cosine * cosine, 0.0)); }
+    static double sine(double cosine) { return std::sqrt(max(1 - cosine * cosine, 0.0)); }
     // cos max(a − b, 0).
     static double cosine_of_rest(double cos_a, double cos_b, double sin_b) {
         return cos_a > cos_b ? 1 : cos_a * cos_b + sine(cos_a) * sin_b;

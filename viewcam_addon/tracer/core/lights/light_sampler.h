@@ -146,11 +146,11 @@ class LightSampler {
         if (count_ == 0) return 0;
         if (asks_each() && seen) {
             double estimates[ASKED];
-            for (int i = 0; i < count_; i++) brightest = larger(brightest, estimates[i] = estimate(i, point, through));
+            for (int i = 0; i < count_; i++) brightest = max(brightest, estimates[i] = estimate(i, point, through));
             int chosen = 0;
             for (int i = 0; i < count_; i++) {
                 // One without a size has no noise of its own.
-                double chance = lights_[i].is_sized() ? smaller(estimates[i] / (brightest * WORTH), 1.0) : estimates[i] > 0;
+                double chance = lights_[i].is_sized() ? min(estimates[i] / (brightest * WORTH), 1.0) : estimates[i] > 0;
                 if (u < chance && chance > SMALLEST_CHANCE) choices[chosen++] = {&lights_[i], chance, u, i};
             }
             return chosen;
@@ -168,7 +168,7 @@ class LightSampler {
                 choices[0] = {&lights_[apart_[which]], apart * share, std::clamp((u - before) / share, 0.0, BELOW_1)};
                 return 1;
             }
-            LightTree::Choice found = tree_.choose(point, through, smaller((u - apart) / (1 - apart), BELOW_1));
+            LightTree::Choice found = tree_.choose(point, through, min((u - apart) / (1 - apart), BELOW_1));
             double chance = (1 - apart) * found.chance;
             if (!(chance > SMALLEST_CHANCE)) return 0;
             choices[0] = {&lights_[found.light], chance, found.rest};
@@ -215,7 +215,7 @@ class LightSampler {
     double sky_share(double brightest, RayKind kind) const {
         return environment_->lights(kind) ? PI * mean(environment_->mean_radiance()) / brightest : 0;
     }
-    double sky_chance(double brightest, RayKind kind) const { return smaller(sky_share(brightest, kind) / WORTH, 1.0); }
+    double sky_chance(double brightest, RayKind kind) const { return min(sky_share(brightest, kind) / WORTH, 1.0); }
 
     // The density by solid angle with which a point would have sent a ray to a surface that its scattered ray has met.
     double pdf_li(const Interaction& from, const Interaction& met, Vec3 direction, double distance, bool through) const {
@@ -252,12 +252,12 @@ class LightSampler {
             if (std::optional<LightBounds> bounds = lights_[i].bounds())
                 leaves.push_back({i, *bounds});
             else
-                apart_.push_back(i), irradiance_ += smaller(lights_[i].irradiance(), MOST);
+                apart_.push_back(i), irradiance_ += min(lights_[i].irradiance(), MOST);
         }
         tree_ = LightTree(std::move(leaves), count_);
-        double reached = 0, total = larger(irradiance_, LEAST);
+        double reached = 0, total = max(irradiance_, LEAST);
         for (uint32_t i : apart_)
-            reached_.push_back(reached += 0.5 * smaller(lights_[i].irradiance(), MOST) / total + 0.5 / double(apart_.size()));
+            reached_.push_back(reached += 0.5 * min(lights_[i].irradiance(), MOST) / total + 0.5 / double(apart_.size()));
         if (!reached_.empty()) reached_.back() = 1;
     }
     // That of many lights one at infinity is picked: between one and three quarters, since the tree's part is only a bound, but where
@@ -293,8 +293,8 @@ class LightSampler {
     double chance(const Interaction& point, uint32_t light, bool seen, bool through) const {
         if (asks_each() && seen) {
             double brightest = 0;
-            for (int i = 0; i < count_; i++) brightest = larger(brightest, estimate(i, point, through));
-            return smaller(estimate(light, point, through) / (brightest * WORTH), 1.0);
+            for (int i = 0; i < count_; i++) brightest = max(brightest, estimate(i, point, through));
+            return min(estimate(light, point, through) / (brightest * WORTH), 1.0);
         }
         if (count_ == 1) return 1;
         if (count_ > FEW) {

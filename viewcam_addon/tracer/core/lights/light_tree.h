@@ -48,7 +48,7 @@ class LightTree {
             if (!(total > 0)) return {};
             bool is_first = choice.rest < share;
             choice.chance *= is_first ? share : 1 - share;
-            choice.rest = smaller(is_first ? choice.rest / share : (choice.rest - share) / (1 - share), BELOW_1);
+            choice.rest = min(is_first ? choice.rest / share : (choice.rest - share) / (1 - share), BELOW_1);
             node = is_first ? first : second;
         }
         choice.light = nodes_[node].light;

@@ -65,7 +65,7 @@ class MeshLight {
 
     double estimate(Vec3 position, Vec3 normal) const {
         Vec3 way = center_ - position;
-        double squared = dot(way, way), risen = larger(dot(normal, way) + reach_, 0.0);
+        double squared = dot(way, way), risen = max(dot(normal, way) + reach_, 0.0);
         return risen * (brightness_ / ((squared + reach_ * reach_ / 2) * (std::sqrt(squared) + reach_)));
     }
     LightBounds bounds() const { return {box_, brightness_}; }

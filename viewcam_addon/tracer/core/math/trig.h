@@ -77,7 +77,7 @@ template <class T> inline T asin(T x) {
 }
 inline double acos(double x) {
     if (std::fabs(x) <= 0.5) return PI / 2 - asin(x);
-    double half = detail::asin_of_small(std::sqrt(larger((1 - std::fabs(x)) / 2, 0.0)));
+    double half = detail::asin_of_small(std::sqrt(max((1 - std::fabs(x)) / 2, 0.0)));
     return x > 0 ? 2 * half : PI - 2 * half;
 }
 // 0 of (0, 0).
@@ -87,7 +87,7 @@ inline double atan2(double y, double x) {
                                       -0.05258041554297779, 0.04719395030027433,  -0.04104436265755082, 0.030635704112969498,
                                       -0.01391822929102443};
     constexpr double TAN_OF_AN_EIGHTH = 0.41421356237309503;
-    double across = std::fabs(y), along = std::fabs(x), large = larger(across, along), small = smaller(across, along);
+    double across = std::fabs(y), along = std::fabs(x), large = max(across, along), small = min(across, along);
     if (large == 0) return 0;
     double slope = small / large, start = 0;
     if (slope > TAN_OF_AN_EIGHTH) start = PI / 4, slope = (slope - 1) / (slope + 1);

@@ -8,10 +8,6 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-// Of two numbers; the second where the first is none. The library's fmax is a call.
-inline double larger(double a, double b) { return a > b ? a : b; }
-inline double smaller(double a, double b) { return a < b ? a : b; }
-
 // In line everywhere, as the C library's are not; of something that is no number and b, b.
 inline double min(double a, double b) { return a < b ? a : b; }
 inline double max(double a, double b) { return a > b ? a : b; }
@@ -53,7 +49,9 @@ template <class T> inline Vec3Of<T> cross(Vec3Of<T> a, Vec3Of<T> b) {
 }
 inline double length(Vec3 a) { return std::sqrt(dot(a, a)); }
 inline Vec3 normalize(Vec3 a) { return a / length(a); }
-inline double max_component(Vec3 a) { return larger(a.x, larger(a.y, a.z)); }
+inline double max_component(Vec3 a) { return max(a.x, max(a.y, a.z)); }
+inline Vec3 min(Vec3 a, double b) { return {min(a.x, b), min(a.y, b), min(a.z, b)}; }
+inline Vec3 max(Vec3 a, double b) { return {max(a.x, b), max(a.y, b), max(a.z, b)}; }
 inline Vec3 abs(Vec3 a) { return {std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)}; }
 inline bool is_black(Vec3 rgb) { return rgb.x == 0 && rgb.y == 0 && rgb.z == 0; }
 

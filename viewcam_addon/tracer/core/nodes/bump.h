@@ -21,7 +21,7 @@ struct BumpNode {
         double away = at.footprint() * at.number(filter_width);
         if (!height.varies() || !(away > 0)) return before;
         Vec3 x = along_plane(at.point.normal), y = cross(at.point.normal, x), across_x = cross(y, before), across_y = cross(before, x);
-        double here = at.number(height), scale = at.number(distance) * (inwards ? -1 : 1), much = larger(at.number(strength), 0.0);
+        double here = at.number(height), scale = at.number(distance) * (inwards ? -1 : 1), much = max(at.number(strength), 0.0);
         Vec3 slope = across_x * (at.height_beside(height, x * away) - here) + across_y * (at.height_beside(height, y * away) - here);
         double area = dot(x, across_x);
         Vec3 bumped = before * (std::fabs(area) * away) - slope * (area < 0 ? -scale : scale);

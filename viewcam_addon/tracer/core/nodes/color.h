@@ -6,7 +6,7 @@ namespace viewcam::VIEWCAM_ISA {
 
 // Hue, saturation and value, the hue in turns.
 inline Vec3 hsv_of(Vec3 rgb) {
-    double most = max_component(rgb), range = most - smaller(rgb.x, smaller(rgb.y, rgb.z));
+    double most = max_component(rgb), range = most - min(rgb.x, min(rgb.y, rgb.z));
     if (!(most != 0 && range > 0)) return {0, 0, most};
     double hue = rgb.x == most ? (rgb.y - rgb.z) / range : rgb.y == most ? 2 + (rgb.z - rgb.x) / range : 4 + (rgb.x - rgb.y) / range;
     return {hue < 0 ? hue / 6 + 1 : hue / 6, range / most, most};
@@ -18,12 +18,12 @@ inline Vec3 rgb_of_hsv(Vec3 hsv) {
         double apart = std::fabs(hue - from);
         return hsv.z * (1 - hsv.y * unit_range(apart));
     };
-    return {channel(hue < 3 ? smaller(hue, 1) : larger(hue, 5)), channel(smaller(larger(hue, 1), 3)), channel(smaller(larger(hue, 3), 5))};
+    return {channel(hue < 3 ? min(hue, 1) : max(hue, 5)), channel(min(max(hue, 1), 3)), channel(min(max(hue, 3), 5))};
 }
 
 // Hue, saturation and lightness.
 inline Vec3 hsl_of(Vec3 rgb) {
-    double most = max_component(rgb), least = smaller(rgb.x, smaller(rgb.y, rgb.z)), light = smaller((most + least) / 2, 1), range = most - least;
+    double most = max_component(rgb), least = min(rgb.x, min(rgb.y, rgb.z)), light = min((most + least) / 2, 1), range = most - least;
     if (!(range > 0)) return {0, 0, light};
     return {hsv_of(rgb).x, safe::divide(range, light > 0.5 ? 2 - most - least : most + least), light};
 }
@@ -93,7 +93,7 @@ struct MixColorNode {
     static double dodge(double a, double b, double t) {
         if (a == 0) return 0;
         double left = 1 - t * b;
-        return left <= 0 ? 1 : smaller(a / left, 1.0);
+        return left <= 0 ? 1 : min(a / left, 1.0);
     }
     static double burn(double a, double b, double t) {
         double left = 1 - t + t * b;
@@ -122,13 +122,13 @@ struct MixColorNode {
         };
         static constexpr Named BLENDS[] = {
             {"mix", [](Vec3 a, Vec3 b, double t) { return viewcam::VIEWCAM_ISA::mix(a, b, t); }},
-            {"darken", channels<[](double a, double b, double t) { return a + (smaller(a, b) - a) * t; }>},
-            {"lighten", channels<[](double a, double b, double t) { return a + (larger(a, b) - a) * t; }>},
+            {"darken", channels<[](double a, double b, double t) { return a + (min(a, b) - a) * t; }>},
+            {"lighten", channels<[](double a, double b, double t) { return a + (max(a, b) - a) * t; }>},
             {"multiply", channels<[](double a, double b, double t) { return a + (a * b - a) * t; }>},
             {"add", channels<[](double a, double b, double t) { return a + t * b; }>},
             {"subtract", channels<[](double a, double b, double t) { return a - t * b; }>},
             {"difference", channels<[](double a, double b, double t) { return a + (std::fabs(a - b) - a) * t; }>},
-            {"exclusion", channels<[](double a, double b, double t) { return larger(a + (b - 2 * a * b) * t, 0.0); }>},
+            {"exclusion", channels<[](double a, double b, double t) { return max(a + (b - 2 * a * b) * t, 0.0); }>},
             {"screen", channels<screen>},
             {"overlay", channels<overlay>},
             {"soft_light", channels<soft_light>},
@@ -202,7 +202,7 @@ struct BrightContrastNode {
     explicit BrightContrastNode(const Inputs& in) : color(in["color"]), bright(in["bright"]), contrast(in["contrast"]) {}
     Vec3 eval(const ShadingPoint& at) const {
         double steep = at.number(contrast), more = at.number(bright) - steep / 2;
-        return safe::each([&](double x, double, double) { return larger((1 + steep) * x + more, 0.0); }, at.value(color));
+        return safe::each([&](double x, double, double) { return max((1 + steep) * x + more, 0.0); }, at.value(color));
     }
 };
 
@@ -217,7 +217,7 @@ struct HueSaturationNode {
         Vec3 rgb = at.value(color), hsv = hsv_of(rgb);
         double turned = hsv.x + at.number(hue) + 0.5;
         Vec3 changed = rgb_of_hsv({turned - std::floor(turned), unit_range(hsv.y * at.number(saturation)), hsv.z * at.number(brightness)});
-        return safe::each([&](double x, double, double) { return larger(x, 0.0); }, mix(rgb, changed, at.number(factor)));
+        return safe::each([&](double x, double, double) { return max(x, 0.0); }, mix(rgb, changed, at.number(factor)));
     }
 };
 

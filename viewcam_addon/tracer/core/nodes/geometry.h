@@ -256,7 +256,7 @@ struct FresnelNode {
 
     explicit FresnelNode(const Inputs& in) : ior(in["ior"]), normal(in["normal"]) {}
     Vec3 eval(const ShadingPoint& at) const {
-        return grey(fresnel(std::fabs(dot(at.incoming, at.normal(normal))), at.ratio(larger(at.number(ior), 1e-5))));
+        return grey(fresnel(std::fabs(dot(at.incoming, at.normal(normal))), at.ratio(max(at.number(ior), 1e-5))));
     }
 };
 
@@ -271,11 +271,11 @@ struct LayerWeightNode {
     Vec3 eval(const ShadingPoint& at) const {
         double cosine = std::fabs(dot(at.incoming, at.normal(normal))), blended = at.number(blend);
         if (!facing) {
-            double left = larger(1 - blended, 1e-5);
+            double left = max(1 - blended, 1e-5);
             return grey(fresnel(cosine, at.point.backside ? left : 1 / left));
         }
         if (blended != 0.5) {
-            blended = smaller(larger(blended, 0.0), 1 - 1e-5);
+            blended = min(max(blended, 0.0), 1 - 1e-5);
             cosine = safe::power(cosine, blended < 0.5 ? 2 * blended : 0.5 / (1 - blended));
         }
         return grey(1 - cosine);

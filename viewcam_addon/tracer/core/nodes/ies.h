@@ -37,7 +37,7 @@ struct IESNode {
         Vec3 v = at.value(vector);
         double size = length(v);
         if (!(size > 0 && size < INFINITE)) return {};
-        double rise = acos(smaller(larger(-v.z / size, -1.0), 1.0)), turn = atan2(v.x, v.y) + PI;
+        double rise = acos(min(max(-v.z / size, -1.0), 1.0)), turn = atan2(v.x, v.y) + PI;
         size_t column, row;
         double along_column, along_row;
         if (!between(up, rise, column, along_column) || !between(across, turn, row, along_row)) return {};
@@ -52,7 +52,7 @@ struct IESNode {
         double b = in_row(row), c = in_row(row + 1);
         double beyond = goes_on ? b : 0;  // at either end
         double a = row > 0 ? in_row(row - 1) : beyond, d = row + 2 < across.size() ? in_row(row + 2) : beyond;
-        return grey(larger(cubic(a, b, c, d, along_row), 0.0) * at.number(strength));
+        return grey(max(cubic(a, b, c, d, along_row), 0.0) * at.number(strength));
     }
 
    private:

@@ -10,7 +10,7 @@ namespace safe {
 inline double positive_power(double x, double power) {
     constexpr double MOST = 980;  // of the result's binary logarithm
     if (!(x > 1e-300)) return x < 0 ? 0 : power > 0 ? 0 : power == 0 ? 1 : 1e300;
-    double x_bounded = smaller(x, 1e300), exponent = log2(x_bounded);
+    double x_bounded = min(x, 1e300), exponent = log2(x_bounded);
     if (std::fabs(exponent * power) > MOST) return exponent * power > 0 ? 1e300 : 0;
     return pow(x_bounded, power);
 }
@@ -21,8 +21,8 @@ inline double power(double x, double power) {
     double size = positive_power(-x, power);
     return std::fmod(power, 2) == 0 ? size : -size;
 }
-inline double exponential(double x) { return exp(smaller(x, 680)); }
-inline double logarithm(double x) { return x > 1e-300 ? log(smaller(x, 1e300)) : 0; }
+inline double exponential(double x) { return exp(min(x, 680)); }
+inline double logarithm(double x) { return x > 1e-300 ? log(min(x, 1e300)) : 0; }
 inline double divide(double a, double b) { return b != 0 ? a / b : 0; }
 inline double modulo(double a, double b) { return b != 0 ? std::fmod(a, b) : 0; }
 inline double root(double a) { return a > 0 ? std::sqrt(a) : 0; }
@@ -39,9 +39,9 @@ template <class Function> Vec3 each(Function function, Vec3 a, Vec3 b = {}, Vec3
 
 inline double sign_of(double x) { return x > 0 ? 1 : x < 0 ? -1 : 0; }
 inline double smooth_minimum(double a, double b, double c) {
-    if (c == 0) return smaller(a, b);
-    double h = larger(c - std::fabs(a - b), 0.0) / c;
-    return smaller(a, b) - h * h * h * c / 6;
+    if (c == 0) return min(a, b);
+    double h = max(c - std::fabs(a - b), 0.0) / c;
+    return min(a, b) - h * h * h * c / 6;
 }
 inline double wrapped(double x, double most, double least) {
     double range = most - least;
@@ -67,12 +67,12 @@ inline constexpr NamedOperation OPERATIONS[] = {
     {"inverse_sqrt", [](double a, double, double) { return a > 0 ? 1 / std::sqrt(a) : 0; }},
     {"absolute", [](double a, double, double) { return std::fabs(a); }},
     {"exponent", [](double a, double, double) { return safe::exponential(a); }},
-    {"minimum", [](double a, double b, double) { return smaller(a, b); }},
-    {"maximum", [](double a, double b, double) { return larger(a, b); }},
+    {"minimum", [](double a, double b, double) { return min(a, b); }},
+    {"maximum", [](double a, double b, double) { return max(a, b); }},
     {"less_than", [](double a, double b, double) { return a < b ? 1.0 : 0.0; }},
     {"greater_than", [](double a, double b, double) { return a > b ? 1.0 : 0.0; }},
     {"sign", [](double a, double, double) { return sign_of(a); }},
-    {"compare", [](double a, double b, double c) { return a == b || std::fabs(a - b) <= larger(c, 1e-5) ? 1.0 : 0.0; }},
+    {"compare", [](double a, double b, double c) { return a == b || std::fabs(a - b) <= max(c, 1e-5) ? 1.0 : 0.0; }},
     {"smooth_min", smooth_minimum},
     {"smooth_max", [](double a, double b, double c) { return -smooth_minimum(-a, -b, c); }},
     {"round", [](double a, double, double) { return std::floor(a + 0.5); }},
@@ -92,8 +92,8 @@ inline constexpr NamedOperation OPERATIONS[] = {
     {"sine", [](double a, double, double) { return safe::sine(a); }},
     {"cosine", [](double a, double, double) { return safe::cosine(a); }},
     {"tangent", [](double a, double, double) { return safe::divide(safe::sine(a), safe::cosine(a)); }},
-    {"arcsine", [](double a, double, double) { return asin(smaller(larger(a, -1.0), 1.0)); }},
-    {"arccosine", [](double a, double, double) { return acos(smaller(larger(a, -1.0), 1.0)); }},
+    {"arcsine", [](double a, double, double) { return asin(min(max(a, -1.0), 1.0)); }},
+    {"arccosine", [](double a, double, double) { return acos(min(max(a, -1.0), 1.0)); }},
     {"arctangent", [](double a, double, double) { return atan2(a, 1); }},
     {"arctan2", [](double a, double b, double) { return atan2(a, b); }},
     {"sinh", [](double a, double, double) { return (safe::exponential(a) - safe::exponential(-a)) / 2; }},
@@ -189,7 +189,7 @@ struct MapRange {
             x = unit_range(x), x = x * x * x * (x * (x * 6 - 15) + 10);
         }
         value = low + x * (high - low);
-        return clamp ? larger(smaller(value, larger(low, high)), smaller(low, high)) : value;
+        return clamp ? max(min(value, max(low, high)), min(low, high)) : value;
     }
 };
 struct MapRangeNode : MapRange {
@@ -223,7 +223,7 @@ struct ClampNode {
     Vec3 eval(const ShadingPoint& at) const {
         double low = at.number(least), high = at.number(most);
         if (either_way && low > high) std::swap(low, high);
-        return grey(smaller(larger(at.number(given), low), high));
+        return grey(min(max(at.number(given), low), high));
     }
 };
 

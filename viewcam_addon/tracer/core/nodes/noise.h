@@ -136,14 +136,14 @@ struct Octaves {
             case HYBRID_MULTIFRACTAL: {
                 constexpr double LEAST = 0.001;
                 for (int i = 0; weight > LEAST && i <= whole; i++) {
-                    weight = smaller(weight, 1.0);
+                    weight = min(weight, 1.0);
                     double signal = (signed_noise(p) + offset) * power;
                     value += weight * signal;
                     weight *= gain * signal;
                     finer();
                 }
                 if (rest == 0 || !(weight > LEAST)) return value;
-                return value + rest * smaller(weight, 1.0) * (signed_noise(p) + offset) * power;
+                return value + rest * min(weight, 1.0) * (signed_noise(p) + offset) * power;
             }
             default: {
                 auto ridge = [&] {

@@ -29,7 +29,7 @@ struct NormalMapNode {
             return or_smooth(at.to_world_normal(sum) * side, smooth);
         }
         Vec3 normal = or_smooth((space == OBJECT ? at.to_world_normal(v) : v) * side, smooth);
-        return much == 1 ? normal : or_smooth(smooth + (normal - smooth) * larger(much, 0.0), smooth);
+        return much == 1 ? normal : or_smooth(smooth + (normal - smooth) * max(much, 0.0), smooth);
     }
 
    private:

@@ -31,8 +31,8 @@ struct NoiseNode {
           sum(Octaves::sum_of(in.choice("kind"))), normalize(in.flag("normalize")), color(in.choice("output") == "color") {}
     Vec3 eval(const ShadingPoint& at) const {
         Octaves octaves{sum,
-                        smaller(larger(at.number(detail), 0), 15),
-                        larger(at.number(roughness), 0),
+                        min(max(at.number(detail), 0), 15),
+                        max(at.number(roughness), 0),
                         at.number(lacunarity),
                         at.number(offset),
                         at.number(gain),
@@ -100,14 +100,14 @@ struct GradientNode {
    private:
     double value(Vec3 p) const {
         if (kind == "linear") return p.x;
-        if (kind == "quadratic") return larger(p.x, 0) * larger(p.x, 0);
+        if (kind == "quadratic") return max(p.x, 0) * max(p.x, 0);
         if (kind == "diagonal") return (p.x + p.y) / 2;
         if (kind == "radial") return atan2(p.y, p.x) / (2 * PI) + 0.5;
         if (kind == "easing") {
             double t = unit_range(p.x);
             return t * t * (3 - 2 * t);
         }
-        double inside = larger(0.999999 - length(p), 0);
+        double inside = max(0.999999 - length(p), 0);
         return kind == "spherical" ? inside : inside * inside;
     }
 };
@@ -127,7 +127,7 @@ struct WaveNode {
         Vec3 p = off_the_border(at.value(vector) * at.number(scale));
         double n = 20 * (rings ? ring(p) : band(p)) + at.number(phase), distorted = at.number(distortion);
         if (distorted != 0) {
-            Octaves octaves{Octaves::FBM, smaller(larger(at.number(detail), 0), 15), larger(at.number(detail_roughness), 0)};
+            Octaves octaves{Octaves::FBM, min(max(at.number(detail), 0), 15), max(at.number(detail_roughness), 0)};
             double finer = at.number(detail_scale);
             n += distorted * (2 * octaves.at(Place<3>{p.x * finer, p.y * finer, p.z * finer}) - 1);
         }
@@ -157,7 +157,7 @@ struct MagicNode {
         auto turned = [](double x) { return std::fmod(x, 2 * PI); };
         p = {turned(p.x), turned(p.y), turned(p.z)};
         double by = at.number(distortion), x = sin((p.x + p.y + p.z) * 5), y = cos((-p.x + p.y - p.z) * 5), z = -cos((-p.x - p.y + p.z) * 5);
-        int steps = int(smaller(larger(at.number(depth), 0), 10));
+        int steps = int(min(max(at.number(depth), 0), 10));
         if (steps > 0) x *= by, y *= by, z *= by;
         using safe::cosine, safe::sine;
         for (int step = 1; step <= steps; step++) switch (step) {
@@ -200,7 +200,7 @@ struct BrickNode {
         }
         int32_t brick = whole_number(safe::divide(p.x + moved, wide));
         double x = p.x + moved - wide * brick, y = p.y - high * row;
-        double size = at.number(mortar_size), nearest = smaller(smaller(x, y), smaller(wide - x, high - y)), share = 0;
+        double size = at.number(mortar_size), nearest = min(min(x, y), min(wide - x, high - y)), share = 0;
         if (nearest < size) {
             double smooth = at.number(mortar_smooth), t = smooth == 0 ? 1 : unit_range((1 - nearest / size) / smooth);
             share = t * t * (3 - 2 * t);

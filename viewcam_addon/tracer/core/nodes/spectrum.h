@@ -18,7 +18,7 @@ struct BlackbodyNode {
         Vec3 rgb = kelvin < 800        ? Vec3{5.413294490189271, -0.20319390035873933, -0.0822535242887164}
                    : kelvin >= 12000 ? Vec3{0.8262954810464208, 0.9945080501520986, 1.566307710274283}
                                      : fitted(kelvin);
-        return {larger(rgb.x, 0), larger(rgb.y, 0), larger(rgb.z, 0)};
+        return max(rgb, 0);
     }
 
    private:
@@ -59,7 +59,7 @@ struct WavelengthNode {
         auto i = int(place);
         Vec3 first{OBSERVER[i][0], OBSERVER[i][1], OBSERVER[i][2]}, next{OBSERVER[i + 1][0], OBSERVER[i + 1][1], OBSERVER[i + 1][2]};
         Vec3 rgb = product(FROM_XYZ, mix(first, next, place - i)) / SCALE;
-        return {larger(rgb.x, 0), larger(rgb.y, 0), larger(rgb.z, 0)};
+        return max(rgb, 0);
     }
 
    private:

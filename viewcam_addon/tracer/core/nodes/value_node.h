@@ -101,7 +101,7 @@ struct ValueNodes {
         else
             return false;
     }
-    static double finite(double x) { return x < LARGEST ? larger(x, -LARGEST) : x > 0 ? LARGEST : 0; }
+    static double finite(double x) { return x < LARGEST ? max(x, -LARGEST) : x > 0 ? LARGEST : 0; }
     static Vec3 finite(Vec3 v) { return {finite(v.x), finite(v.y), finite(v.z)}; }
 
     template <size_t I = 1> ValueNode made(std::string_view name, const Inputs& inputs, const std::vector<Texture>& textures) const {

@@ -49,7 +49,7 @@ template <size_t N> struct VoronoiPoints {
         if (N == 1) return std::fabs(v[0]);
         double sum = 0, most = 0;
         for (double x : v) {
-            most = larger(most, std::fabs(x));
+            most = max(most, std::fabs(x));
             sum += metric == EUCLIDEAN ? x * x : metric == MINKOWSKI ? safe::positive_power(std::fabs(x), exponent) : std::fabs(x);
         }
         if (metric == CHEBYCHEV) return most;
@@ -91,7 +91,7 @@ template <size_t N> struct VoronoiPoints {
         constexpr double SAME = 0.0001;  // points are not nearer to each other, squared
         if constexpr (N == 1) {
             double middle = from_place({0})[0], left = from_place({-1})[0], right = from_place({1})[0];
-            return smaller(std::fabs(middle + left), std::fabs(middle + right)) / 2;
+            return min(std::fabs(middle + left), std::fabs(middle + right)) / 2;
         }
         double least = INFINITE, border = INFINITE;
         Place<N> nearest = {};
@@ -102,7 +102,7 @@ template <size_t N> struct VoronoiPoints {
         around<1>([&](const Offset& offset) {
             Place<N> there = from_place(offset), apart, middle;
             for (size_t i = 0; i < N; i++) apart[i] = there[i] - nearest[i], middle[i] = (there[i] + nearest[i]) / 2;
-            if (double squared = dot(apart, apart); squared > SAME) border = smaller(border, dot(middle, apart) / std::sqrt(squared));
+            if (double squared = dot(apart, apart); squared > SAME) border = min(border, dot(middle, apart) / std::sqrt(squared));
         });
         return border;
     }
@@ -121,7 +121,7 @@ template <size_t N> struct VoronoiPoints {
             for (size_t i = 0; i < N; i++) offset[i] += nearest[i];
             Place<N> apart = point(offset);
             for (size_t i = 0; i < N; i++) apart[i] -= middle[i];
-            least = smaller(least, dot(apart, apart));
+            least = min(least, dot(apart, apart));
         });
         return std::sqrt(least) / 2;
     }
@@ -224,7 +224,7 @@ struct VoronoiNode {
             return output == RADIUS ? grey(points.radius()) : Vec3{};
         }
         if (output == RADIUS) return {};
-        double octaves = smaller(larger(at.number(detail), 0), 15), finer = at.number(lacunarity), weaker = unit_range(at.number(roughness));
+        double octaves = min(max(at.number(detail), 0), 15), finer = at.number(lacunarity), weaker = unit_range(at.number(roughness));
         if (feature == DISTANCE_TO_EDGE) return output == DISTANCE ? grey(edges(points, p, octaves, weaker, finer)) : Vec3{};
         typename Points::Found found = sum(points, p, octaves, weaker, finer);
         if (output == DISTANCE) return grey(found.distance);
@@ -279,7 +279,7 @@ struct VoronoiNode {
             }
             double share = i <= octaves ? 1 : octaves - std::floor(octaves);
             most = mix(most, safe::divide(farthest, fine), share * weight);
-            distance = mix(distance, smaller(distance, safe::divide(octave, fine)), share * weight);
+            distance = mix(distance, min(distance, safe::divide(octave, fine)), share * weight);
             fine *= finer, weight *= weaker;
         }
         return normalize ? safe::divide(distance, most) : distance;

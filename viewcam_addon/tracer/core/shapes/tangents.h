@@ -124,7 +124,7 @@ class TangentsOfMesh {
             std::array<float, 3> given = normal(i);
             Vec3 n{given[0], given[1], given[2]};
             Vec3 before = within(place(previous(i)) - place(i), n), after = within(place(next(i)) - place(i), n);
-            double cosine = larger(smaller(dot(before, after), 1.0), -1.0);
+            double cosine = max(min(dot(before, after), 1.0), -1.0);
             sum[root(uint32_t(i))] += within(along_[i / 3], n) * acos(cosine);
         }
         std::vector<float> made(4 * corners_);
