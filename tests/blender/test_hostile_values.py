@@ -68,10 +68,10 @@ def warnings_of(camera_object, scene):
 def use(camera_object, scene, capfd):
     """Everything that an artist may do next. Returns what the panel says first."""
     bpy.context.view_layer.update()
-    said, rows = warnings_of(camera_object, scene), panel.shown(camera_object, scene)
+    said, rows = warnings_of(camera_object, scene), panel.readouts_of(camera_object, scene)
     for sentence in said:
         assert_sentence(sentence)
-    assert said or not any("nan" in text for row in rows for text in (*row.shown, row.exact)), rows
+    assert said or not any("nan" in text for row in rows for text in (*row.texts, row.exact)), rows
     operate(bpy.ops.viewcam.apply_camera, camera_object)
     scene.frame_set(scene.frame_current + 1)
     operate(bpy.ops.viewcam.adopt_camera, camera_object)

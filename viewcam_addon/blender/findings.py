@@ -80,26 +80,26 @@ _SHIFT = Cause("The shift was changed since", frozenset({CENTRE}), APPLY_OR_ADOP
 
 
 def differences(
-    wanted: Pinhole, found: Pinhole, reach: float, length: Callable[[float], str] = "{:.3g}".format
+    wanted: Pinhole, read_back: Pinhole, reach: float, length: Callable[[float], str] = "{:.3g}".format
 ) -> dict[str, str]:
     """The differences beyond what Blender's float32 storage explains: its name → the figures, in words. Pure.
 
     reach : the largest coordinate that went into the camera's location, world units. length : a length in words, with its unit.
     """
     result = {}
-    apart = math.dist(wanted.eye, found.eye)
+    apart = math.dist(wanted.eye, read_back.eye)
     if apart > _LOCATION_ROUNDINGS * _FLOAT32 * reach:
         result[EYE] = f"the eye is {length(apart)} away"
-    turn = np.column_stack(wanted.basis()) - np.column_stack(found.basis())
-    if wanted.mirrored != found.mirrored:
+    turn = np.column_stack(wanted.basis()) - np.column_stack(read_back.basis())
+    if wanted.mirrored != read_back.mirrored:
         result[VIEW] = "the picture is mirrored"
     elif np.abs(turn).max() > LARGEST_TURN:
         angle = 2 * math.asin(min(1.0, float(np.linalg.norm(turn)) / math.sqrt(8)))
         result[VIEW] = f"the view is turned by {math.degrees(angle):.3g}°"
-    if any(abs(a - b) > _LENS_ROUNDINGS * _FLOAT32 * a for a, b in zip(wanted.distance, found.distance, strict=True)):
-        result[DISTANCE] = f"the view plane is {found.distance[0]:.6g} px away and not {wanted.distance[0]:.6g}"
+    if any(abs(a - b) > _LENS_ROUNDINGS * _FLOAT32 * a for a, b in zip(wanted.distance, read_back.distance, strict=True)):
+        result[DISTANCE] = f"the view plane is {read_back.distance[0]:.6g} px away and not {wanted.distance[0]:.6g}"
     allowed = _SHIFT_ROUNDINGS * _FLOAT32 * (max(wanted.width, wanted.height) + max(map(abs, wanted.principal_point)))
-    off_centre = math.dist(wanted.principal_point, found.principal_point)
+    off_centre = math.dist(wanted.principal_point, read_back.principal_point)
     if off_centre > allowed:
         result[CENTRE] = f"the principal point is {off_centre:.3g} px away"
     return result

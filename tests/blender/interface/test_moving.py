@@ -417,7 +417,7 @@ def test_dolly_in_a_menu_asks_for_the_distance_and_does_nothing_before(posed_cam
     operator = moving.VIEWCAM_OT_dolly_camera
     properties = SimpleNamespace(is_property_set=lambda name: False)
     window_manager = SimpleNamespace(invoke_props_dialog=lambda each: asked.append(each.reach) or {"RUNNING_MODAL"})
-    clicked = SimpleNamespace(found=lambda context: posed_camera, properties=properties, reach=0.0)
+    clicked = SimpleNamespace(target_camera=lambda context: posed_camera, properties=properties, reach=0.0)
     assert operator.invoke(clicked, SimpleNamespace(window_manager=window_manager), None) == {"RUNNING_MODAL"}
     assert asked == [math.dist(before.eye, before.look_at)] and stated() == before
 

@@ -35,7 +35,7 @@ from viewcam_addon.labels import files as label_files
 def contents(camera_object, scene):
     bpy.context.view_layer.update()
     warnings = [notice.sentence for notice in panel.notices(camera_object, scene)]
-    return {row.label: " ".join(row.shown) for row in panel.shown(camera_object, scene)}, warnings
+    return {row.label: " ".join(row.texts) for row in panel.readouts_of(camera_object, scene)}, warnings
 
 
 def test_a_camera_that_is_well_shows_its_read_outs_and_no_warning(posed_camera, scene):
@@ -515,7 +515,7 @@ def test_a_notice_is_drawn_in_lines_that_fit_and_with_its_remedy_below(posed_cam
 def test_each_read_out_has_a_button_that_copies_it(posed_camera):
     found = drawn(panel.VIEWCAM_PT_data_readouts)
     buttons = [properties for kind, _, _, _, properties in found if kind == "operator"]
-    assert [button.label for button in buttons] == [row.label for row in panel.shown(posed_camera, bpy.context.scene)]
+    assert [button.label for button in buttons] == [row.label for row in panel.readouts_of(posed_camera, bpy.context.scene)]
     assert buttons[-1].label == "To Look-At" and float(buttons[-1].text) == pytest.approx(10.0499, abs=1e-4)
 
 
@@ -568,7 +568,7 @@ def test_what_is_made_of_pieces_is_translated_before_the_pieces_go_in(posed_came
 
 
 def test_numbers_are_never_translated(posed_camera):
-    rows = {text for row in panel.shown(posed_camera, bpy.context.scene) for text in row.shown}
+    rows = {text for row in panel.readouts_of(posed_camera, bpy.context.scene) for text in row.texts}
     found = drawn(panel.VIEWCAM_PT_data_readouts)
     untranslated = {name for kind, name, look, *_ in found if kind == "label" and look.get("translate") is False}
     assert untranslated == rows

@@ -36,7 +36,7 @@ class Hand:
 
     def __init__(self, camera_object, scene):
         self.operator = SimpleNamespace(
-            found=camera_object,
+            camera_object=camera_object,
             before=kept.state(camera_object),
             drawing=photo_matching.begun(camera_object, bpy.context),
             result=None,
@@ -115,7 +115,7 @@ def test_a_lens_that_is_known_stays_to_the_bit_and_the_viewport_says_so(posed_ca
     assert hand.event("RET") == {"FINISHED"} and posed_camera.virtual_pinhole.distance == 1800
     bpy.context.view_layer.update()
     assert np.allclose(cameras.read(posed_camera, scene).basis(), PHOTO.basis(), atol=1e-6)
-    line = photo_matching.told(hand.operator.result, posed_camera.data.lens)[0]
+    line = photo_matching.summary_of(hand.operator.result, posed_camera.data.lens)[0]
     assert line == "33.75 mm as it was,  d = 1800 px"
 
 
@@ -156,7 +156,7 @@ def test_a_rectangle_of_known_sides_at_the_cursor_gives_all_of_the_camera(posed_
     bpy.context.view_layer.update()
     found = cameras.read(posed_camera, scene)
     assert np.allclose(found.eye, PHOTO.eye, atol=1e-4) and found.distance[0] == pytest.approx(1800, rel=1e-5)
-    told = photo_matching.told(hand.operator.result, posed_camera.data.lens)
+    told = photo_matching.summary_of(hand.operator.result, posed_camera.data.lens)
     assert told[0].startswith("33.75 mm ± ") and "eye ±" in told[1]
 
 

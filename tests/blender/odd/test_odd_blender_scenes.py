@@ -173,7 +173,7 @@ def test_a_smaller_scale_of_units_changes_nothing_but_the_words(posed_camera, sc
 
 def test_feet_change_nothing_but_the_words(posed_camera, scene, odd):
     scene.unit_settings.system, scene.unit_settings.length_unit = "IMPERIAL", "FEET"
-    rows = {row.label: row.shown for row in panel.shown(posed_camera, scene)}
+    rows = {row.label: row.texts for row in panel.readouts_of(posed_camera, scene)}
     assert rows["To Look-At"] == ("32.972'",)  # √(7² + 6² + 4²) m
     odd.check(posed_camera, then=lambda: keep_above(posed_camera, 7))
 

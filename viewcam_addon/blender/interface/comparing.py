@@ -76,10 +76,10 @@ class Outcome:
 
         And of everything, where not all of it is modeled: the artist's own picture, of which the others show stand-ins.
         """
-        found = {name: self._there(file) for name, file in _PICTURES.items()}
+        paths = {name: self._there(file) for name, file in _PICTURES.items()}
         everything = self._there(SIDES["everything"])
         more = {"everything": everything} if everything else {}
-        return more | found if all(found.values()) else {}
+        return more | paths if all(paths.values()) else {}
 
     def is_of(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
         """True if the camera is still the one that was compared."""
@@ -198,8 +198,14 @@ class RunningComparison:
             except (OSError, InputError) as error:
                 return Outcome(*of, None, f"The report can't be kept in {self._keep_in} ({error}): choose another folder")
         drawn = result.get("difference", {})
-        told = result["answer"], result["sentence"], headline(result), tuple(figures(result)), tuple(lacking(result["ledger"]))
-        return Outcome(*of, *told, folder, drawn.get("colours", ""), drawn.get("scale", {}), temporary)
+        verdict = (
+            result["answer"],
+            result["sentence"],
+            headline(result),
+            tuple(figures(result)),
+            tuple(lacking(result["ledger"])),
+        )
+        return Outcome(*of, *verdict, folder, drawn.get("colours", ""), drawn.get("scale", {}), temporary)
 
     def _said(self) -> str:
         return (self.folder / _SAID).read_text(encoding="utf-8", errors="replace")
@@ -390,8 +396,8 @@ def _remove(path: Path) -> None:
 def _percentiles(row: dict[str, Any], unit: str) -> list[tuple[str, str]]:
     """The percentiles of a row of a table that has any, as JSON has it."""
     names = (("Median", "p50"), ("99.9 % within", "p99.9"))
-    found = row["percentiles"]
-    return [(label, f"{plain(found[name]['value'])} {unit}") for label, name in names if name in found]
+    percentiles = row["percentiles"]
+    return [(label, f"{plain(percentiles[name]['value'])} {unit}") for label, name in names if name in percentiles]
 
 
 def _copy_whole(source: str, target: str) -> None:

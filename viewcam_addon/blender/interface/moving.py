@@ -143,11 +143,11 @@ class VIEWCAM_OT_dolly_camera(_Move, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Ask for the distance: at the one that there is nothing would be seen to happen."""
-        found = self.found(context)
-        if found is None or self.properties.is_property_set("reach"):
+        camera_object = self.target_camera(context)
+        if camera_object is None or self.properties.is_property_set("reach"):
             return self.execute(context)
         with contextlib.suppress(InputError):  # which is told where the distance is confirmed
-            pinhole = _pinhole(found, datablocks.scene_of(found))
+            pinhole = _pinhole(camera_object, datablocks.scene_of(camera_object))
             self.reach = math.dist(pinhole.eye, pinhole.look_at)
         return context.window_manager.invoke_props_dialog(self)
 
@@ -221,11 +221,11 @@ class VIEWCAM_OT_drag_camera(_Move, bpy.types.Operator):
         return dragging.moved(pinhole, self.kind, tuple(self.amount))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        found = self.found(context)
+        camera_object = self.target_camera(context)
         try:
-            if found is None:
+            if camera_object is None:
                 raise InputError("there is no camera: select one")
-            self._drag = dragging.Drag(found, datablocks.scene_of(found), self.kind)
+            self._drag = dragging.Drag(camera_object, datablocks.scene_of(camera_object), self.kind)
         except InputError as error:
             self.report({"ERROR"}, datablocks.sentence(error))
             return {"CANCELLED"}

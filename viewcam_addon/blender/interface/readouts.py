@@ -11,10 +11,10 @@ from .. import findings
 
 
 class Readout(NamedTuple):
-    """A row. shown : one text, or three for the vectors. exact : what is copied, with all digits and without units."""
+    """A row. texts : one text, or three for the vectors. exact : what is copied, with all digits and without units."""
 
     label: str
-    shown: tuple[str, ...]
+    texts: tuple[str, ...]
     exact: str
 
 

@@ -56,8 +56,8 @@ def obstacles(
 
 def cameras_of(scene: bpy.types.Scene, own: bpy.types.Object | None) -> dict[str, bpy.types.Object]:
     """The scene's cameras but for the batch's own, by name, sorted."""
-    found = {each.name: each for each in scene.objects if each.type == "CAMERA" and each != own}
-    return dict(sorted(found.items()))
+    cameras = {each.name: each for each in scene.objects if each.type == "CAMERA" and each != own}
+    return dict(sorted(cameras.items()))
 
 
 def camera_of(

@@ -55,7 +55,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
     _read = None  # what it was read for, and the scene
     # Of a viewport: what traces it, what it is asked to show, and what was drawn last as a texture, with its number.
     _live: LiveView | None = None
-    _shown: tuple | None = None
+    _last_asked: tuple | None = None
     _texture: tuple | None = None
 
     def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
@@ -95,13 +95,13 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         lit = settings.level != "GEOMETRY"
         if self._read is None or self._read[0] != lit:
             self._read = lit, export.scene_through(depsgraph, camera, clip, Ledger(), lit)
-            self._shown = None
+            self._last_asked = None
         scene = self._read[1]
         level = least_level(scene)[0] if settings.level == "AUTO" else settings.level.lower()
         asked = camera, clip, level, settings.samples, settings.clay
         self._live = self._live or LiveView()
-        if asked != self._shown:
-            self._shown, scene = asked, replace(scene, camera=camera, clip=clip)
+        if asked != self._last_asked:
+            self._last_asked, scene = asked, replace(scene, camera=camera, clip=clip)
             self._live.show(_of_clay(scene) if settings.clay else scene, level, settings.samples)
         self._draw_picture(self._live, context, depsgraph.scene)
 
