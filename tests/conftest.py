@@ -33,6 +33,8 @@ _LONG = 4 * 3600  # seconds
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
     for item in items:
+        if "bpy" in vars(item.module) or "fresh_blender" in item.fixturenames:
+            item.add_marker(pytest.mark.blender)
         if "benchmarks" in item.path.parts and not item.get_closest_marker("speed"):
             item.add_marker(pytest.mark.exhaustive)  # what measures is not what is shipped
         if "real_blender" in item.path.parts or any(map(item.get_closest_marker, ("exhaustive", "light", "speed"))):
