@@ -394,10 +394,10 @@ def read(figures: Path) -> dict[str, Any]:
         if the file can't be read or has no figures of charts.
     """
     try:
-        told = json.loads(figures.read_text(encoding="utf-8"))
-        for each in told["charts"].values():
+        record = json.loads(figures.read_text(encoding="utf-8"))
+        for each in record["charts"].values():
             Chart.of_figures(each), each["command"], each["machine"]
-        return {"behind": [*told["behind"]], "charts": told["charts"]}
+        return {"behind": [*record["behind"]], "charts": record["charts"]}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(
             f"{figures} has no figures of charts: give what `python -m benchmarks SUBJECT --json` wrote"

@@ -6,11 +6,11 @@ from pathlib import Path
 
 def contents(folder: Path) -> dict[str, object]:
     """Name → what each file holds, documents without their timings."""
-    found = {}
+    result = {}
     for file in sorted(Path(folder).iterdir()):
         data = file.read_bytes()
-        found[file.name] = _without_timings(json.loads(data)) if file.suffix == ".json" else data
-    return found
+        result[file.name] = _without_timings(json.loads(data)) if file.suffix == ".json" else data
+    return result
 
 
 def assert_same(folder: Path, undisturbed: Path) -> None:

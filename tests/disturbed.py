@@ -79,7 +79,7 @@ class Batch:
 
     def until(self, event: str) -> dict | None:
         """Read its events up to the next of this name; None if it ends without."""
-        return next((told for told in map(_event, self.process.stdout) if told.get("event") == event), None)
+        return next((output for output in map(_event, self.process.stdout) if output.get("event") == event), None)
 
     def end(self) -> tuple[int, list[dict]]:
         """Wait for its end: exit status, and the events that were not read."""

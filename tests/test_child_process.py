@@ -26,9 +26,9 @@ def is_there(process):
 
 def wait_until(is_so, seconds=20):
     ends = time.monotonic() + seconds
-    while not (found := is_so()) and time.monotonic() < ends:
+    while not (outcome := is_so()) and time.monotonic() < ends:
         time.sleep(0.02)
-    return found
+    return outcome
 
 
 def test_grandchildren_end_with_the_child(tmp_path):

@@ -77,8 +77,8 @@ def test_what_differs_is_drawn_where_it_is_wanted(tmp_path):
     result = tmp_path / "compare.json"
     assert main(["compare", str(picture), str(picture), "--difference", str(drawn), "--json", str(result)]) == 0
     assert drawn.read_bytes().startswith(b"\x89PNG")
-    told = json.loads(result.read_text())["difference"]
-    assert told["image"] == str(drawn) and "px off" in told["colours"]
+    record = json.loads(result.read_text())["difference"]
+    assert record["image"] == str(drawn) and "px off" in record["colours"]
 
 
 def test_two_cameras_a_pixel_apart_are_not_the_same_picture(tmp_path, capfd):
@@ -105,10 +105,10 @@ def test_what_is_not_modelled_is_named_with_its_share_and_fails_under_strict(tmp
     words += ["--junit", str(tmp_path / "a.xml"), "--report", str(tmp_path / "report")]
     for strict, status in (([], 0), (["--strict"], 3)):
         assert main(words + strict) == status
-        told = json.loads((tmp_path / "a.json").read_text())
-        assert (told["exit_status"], told["answer"], told["passed"]) == (status, "same_but", True)
+        record = json.loads((tmp_path / "a.json").read_text())
+        assert (record["exit_status"], record["answer"], record["passed"]) == (status, "same_but", True)
         seen = (image.read(picture)["Object Index"] == 3).mean()
-        assert told["not_modelled"] == {
+        assert record["not_modelled"] == {
             "count": 1,
             "names": ["Ball"],
             "in_one_place": [],
@@ -385,8 +385,8 @@ def test_the_result_goes_to_standard_output_by_its_name_and_devices_stay(tmp_pat
     """As root, --json /dev/null once left a file in its place."""
     scene = write_scene(tmp_path)
     command = [sys.executable, "-m", "viewcam_addon", "render", scene, tmp_path / "out.exr", "--json"]
-    told = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=True).stdout
-    said, _, result = told.partition("\n")
+    output = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=True).stdout
+    said, _, result = output.partition("\n")
     assert "traced 64 × 48" in said and json.loads(result)["exit_status"] == 0
     subprocess.run([*command, "/dev/null"], capture_output=True, check=True)
     assert Path("/dev/null").is_char_device()
@@ -458,9 +458,9 @@ def test_a_picture_made_elsewhere_is_judged_by_the_channels_that_are_named(tmp_p
     result = tmp_path / "result.json"
     stated = ["position=P.X,P.Y,P.Z", "distance=far", "object-index=id"]
     assert main([*compare, *stated, "--json", str(result), "--report", str(tmp_path / "report")]) == 0
-    found = json.loads(result.read_text())
-    assert [row["name"] for row in found["passes"]] == ["Position", "Position depth", "Depth"]
-    assert "Normal" in found["not_compared"] and (tmp_path / "report" / "index.html").is_file()
+    record = json.loads(result.read_text())
+    assert [row["name"] for row in record["passes"]] == ["Position", "Position depth", "Depth"]
+    assert "Normal" in record["not_compared"] and (tmp_path / "report" / "index.html").is_file()
     assert main([*compare, "distance=far", "--report", str(tmp_path / "depth")]) == 0
     assert main([*compare, "position=P.Y,P.X,P.Z"]) == 1
     assert "no channel 'W': name some of P.X" in fails(capfd, *compare[:-1], "--channels", "depth=W")

@@ -46,8 +46,8 @@ def scene(tmp_path):
 
 def test_each_event_is_a_line_of_json_with_its_time_and_nothing_else_is_on_standard_output(scene, tmp_path, capfd):
     assert main(["render", str(scene), str(tmp_path / "out.exr"), "--log-json"]) == 0
-    said = capfd.readouterr()
-    told = lines_of(said.out)
+    output = capfd.readouterr()
+    told = lines_of(output.out)
     started, message, finished = (event for event in told if event["event"] != "progress")
     assert [event["event"] for event in (started, message, finished)] == ["started", "message", "finished"]
     shares = [event["share"] for event in told if event["event"] == "progress"]
@@ -56,15 +56,15 @@ def test_each_event_is_a_line_of_json_with_its_time_and_nothing_else_is_on_stand
     assert message["text"].startswith("traced 64 × 48 pixels in ")
     assert finished["exit_status"] == 0 and 0 < finished["seconds"] < 600
     assert started["time"] <= message["time"] <= finished["time"] and started["time"].endswith("+00:00")
-    assert said.err == ""
+    assert output.err == ""
 
 
 def test_an_error_is_an_event_and_a_sentence(tmp_path, capfd):
     assert main(["render", str(tmp_path / "none.json"), str(tmp_path / "out.exr"), "--log-json"]) == 2
-    said = capfd.readouterr()
-    _, error, finished = lines_of(said.out)
+    output = capfd.readouterr()
+    _, error, finished = lines_of(output.out)
     assert error["event"] == "error" and finished["exit_status"] == 2
-    assert said.err == f"viewcam render: {error['text']}\n" and "none.json" in error["text"]
+    assert output.err == f"viewcam render: {error['text']}\n" and "none.json" in error["text"]
 
 
 @pytest.mark.parametrize(
@@ -77,14 +77,14 @@ def test_an_error_is_an_event_and_a_sentence(tmp_path, capfd):
 )
 def test_wrong_usage_is_an_event_and_a_sentence_too(capfd, words, command, said):
     assert main([*words, "--log-json"]) == 2
-    told = capfd.readouterr()
-    started, error, finished = lines_of(told.out)
+    output = capfd.readouterr()
+    started, error, finished = lines_of(output.out)
     assert (started["event"], started["command"]) == ("started", command) and "--log-json" in started["words"]
     assert (error["event"], error["command"]) == ("error", command) and said in error["text"], error
     assert (finished["event"], finished["command"], finished["exit_status"]) == ("finished", command, 2)
-    assert told.err == f"{'viewcam ' + command if command else 'viewcam'}: {error['text']}\n"
+    assert output.err == f"{'viewcam ' + command if command else 'viewcam'}: {error['text']}\n"
     assert main(words) == 2
-    assert capfd.readouterr() == ("", told.err), "the sentence is the same without JSON"
+    assert capfd.readouterr() == ("", output.err), "the sentence is the same without JSON"
 
 
 def test_a_check_s_child_processes_tell_as_if_they_were_none(tmp_path, capfd):
@@ -93,17 +93,17 @@ def test_a_check_s_child_processes_tell_as_if_they_were_none(tmp_path, capfd):
 
     words = ["check", str(DEMO_SCENE), "--size", "64x36", "--json", str(tmp_path / "result.json"), "--log-json"]
     status = main(words)
-    said = capfd.readouterr()
-    told = lines_of(said.out)
+    output = capfd.readouterr()
+    told = lines_of(output.out)
     others = [event for event in told if event["event"] != "message"]
-    assert (others[0]["event"], others[-1]["event"]) == ("started", "finished"), said.out
-    assert [event["name"] for event in others if event["event"] == "step"] == ["rendering", "tracing", "comparing"], said.out
-    assert [event["share"] for event in others if event["event"] == "progress"][-1] == 1, said.out
+    assert (others[0]["event"], others[-1]["event"]) == ("started", "finished"), output.out
+    assert [event["name"] for event in others if event["event"] == "step"] == ["rendering", "tracing", "comparing"], output.out
+    assert [event["share"] for event in others if event["event"] == "progress"][-1] == 1, output.out
     assert {event["event"] for event in others[1:-1]} == {"progress", "step"}
     messages = "\n".join(event["text"] for event in told if event["event"] == "message")
     assert "exported and rendered" in messages and "traced 64 × 36" in messages and "objects exported whole" in messages
     assert told[-1]["exit_status"] == status == json.loads((tmp_path / "result.json").read_text())["exit_status"]
-    assert said.err == ""
+    assert output.err == ""
 
 
 def test_events_are_heard_while_libraries_are_silent(capfd):
@@ -118,9 +118,9 @@ def test_what_goes_wrong_with_a_batch_is_said_where_there_is_no_terminal_and_not
     with events.opened(log_json=False) as told:
         for event, fields in BATCH:
             told.tell(event, **fields)
-    said = capfd.readouterr()
-    assert said.out == ""
-    failed, stopping = said.err.splitlines()
+    output = capfd.readouterr()
+    assert output.out == ""
+    failed, stopping = output.err.splitlines()
     assert failed == "viewcam batch: right: the lens is too long, shorten it"
     assert stopping.startswith("viewcam batch: SIGINT: this shot will be finished")
 

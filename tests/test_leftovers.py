@@ -176,9 +176,9 @@ def test_flight_moves_eye_and_look_at_and_the_camera_follows(opened):
     eyes = []
     for frame in range(scene.frame_start, scene.frame_end + 1):
         scene.frame_set(frame)
-        found = cameras.read(camera, scene)
-        assert_same_camera(found, cameras.stated(camera, scene))
-        eyes.append(found.eye)
+        pinhole = cameras.read(camera, scene)
+        assert_same_camera(pinhole, cameras.stated(camera, scene))
+        eyes.append(pinhole.eye)
     steps = np.linalg.norm(np.diff(eyes, axis=0), axis=1)
     assert len(eyes) == 48
     assert steps.min() > 0.1, f"between two frames the eye moves by only {steps.min():.3f} m"

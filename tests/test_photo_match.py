@@ -144,12 +144,12 @@ def seen(points):
 
 def edges(axes="XXYY"):
     """Edges of the camera's picture, two of a box along each of the axes."""
-    found = []
+    result = []
     for number, axis in enumerate(axes):
         start = np.roll([-1.0, 1.0, float(number % 2)], "XYZ".index(axis))
         end = start + 2 * np.eye(3)["XYZ".index(axis)]
-        found.append((axis, *seen([start, end])))
-    return found
+        result.append((axis, *seen([start, end])))
+    return result
 
 
 def is_camera(match, eye=True):

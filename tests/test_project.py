@@ -364,11 +364,11 @@ METHODS = {"numbers", "precision"}
 
 def uses_of_the_property_group(source: str) -> list[str]:
     """The lines where `source` reads `….virtual_pinhole`, or takes or gives a PropertyGroup."""
-    found = []
+    result = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Attribute) and node.attr in ("virtual_pinhole", "PropertyGroup"):
-            found.append(f"{node.lineno}: {ast.unparse(node)}")
-    return found
+            result.append(f"{node.lineno}: {ast.unparse(node)}")
+    return result
 
 
 def test_below_the_interface_nothing_takes_the_property_group():
@@ -425,8 +425,8 @@ def test_what_the_readme_says_viewcam_does_it_does(capsys):
     promised = set(re.findall(r"(?m)(?:`|--command |^ *)viewcam ([a-z]+)", (ROOT / "README.md").read_text(encoding="utf-8")))
     assert {"check", "demo"} <= promised
     for name in sorted(promised):
-        status, said = cli.main([name, "--help"]), capsys.readouterr()
-        assert status == 0 and f"viewcam {name}" in said.out, said.err
+        status, output = cli.main([name, "--help"]), capsys.readouterr()
+        assert status == 0 and f"viewcam {name}" in output.out, output.err
 
 
 def paths_named_in(text: str) -> set[str]:

@@ -61,10 +61,13 @@ def asked(monkeypatch):
 def test_a_failure_is_the_verdict_and_where_the_report_is_and_no_traceback(run, asked, pytester):
     found = run("def test_it(viewcam_check): viewcam_check('blue.blend')", "--viewcam-report", "out")
     found.assert_outcomes(failed=1)
-    told = found.stdout.str()
+    output = found.stdout.str()
     report = pytester.path / "out" / "test_shots.py-test_it"
     assert (
-        VERDICT in told and f"report: {report / 'index.html'}" in told and "Traceback" not in told and "def test_it" not in told
+        VERDICT in output
+        and f"report: {report / 'index.html'}" in output
+        and "Traceback" not in output
+        and "def test_it" not in output
     )
     assert asked == [("check", [str(pytester.path / "blue.blend")], {"report": report})]
 

@@ -60,11 +60,11 @@ def patterns_in(source):
 
 @cache
 def patterns():
-    found = {}
+    result = {}
     for path in sorted(ROOT.rglob("*.py")):
         for line, pattern, is_put in patterns_in(path.read_text("utf-8")):
-            found[f"{path.relative_to(ROOT)}:{line}"] = (pattern, is_put)
-    return found
+            result[f"{path.relative_to(ROOT)}:{line}"] = (pattern, is_put)
+    return result
 
 
 def nodes(parsed):

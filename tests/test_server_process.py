@@ -144,6 +144,6 @@ def test_a_process_that_listens_is_there(echo):
 
 def _until(is_so):
     ends = time.monotonic() + ENDS_WITHIN
-    while not (found := is_so()) and time.monotonic() < ends:
+    while not (outcome := is_so()) and time.monotonic() < ends:
         time.sleep(0.02)
-    return found
+    return outcome

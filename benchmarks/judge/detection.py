@@ -65,7 +65,7 @@ def drawn(blocks: Iterable[Judged]) -> tuple[Chart, ...]:
     """A chart for each family and one for all of them."""
     good, bad = zip(*blocks, strict=True)
     clean = _by_judge(itertools.chain(*good))
-    of_faults = (itertools.chain(*said) for said in zip(*filter(None, bad), strict=True))
+    of_faults = (itertools.chain(*record) for record in zip(*filter(None, bad), strict=True))
     found = dict(zip(FAULTS, map(_by_judge, of_faults), strict=True))
     return tuple(
         _chart(family, {fault: of for fault, of in found.items() if family in ("all", fault.family)}, clean)
@@ -90,14 +90,14 @@ def _by_judge(said: Iterable[Said]) -> dict[str, np.ndarray]:
 
 def _chart(family: str, found: dict[Fault, dict[str, np.ndarray]], clean: dict[str, np.ndarray]) -> Chart:
     curves, at_own_threshold = [], []
-    for judge, said in clean.items():
+    for judge, record in clean.items():
         of_faults = np.concatenate([each[judge] for each in found.values()])
         # So many good pictures are above the threshold, and no more.
-        alarms = [share for share in (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3) if share * len(said) >= 1]
-        limits = [np.sort(said)[::-1][int(share * len(said))] for share in alarms]
+        alarms = [share for share in (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3) if share * len(record) >= 1]
+        limits = [np.sort(record)[::-1][int(share * len(record))] for share in alarms]
         missed = [float(np.mean(of_faults <= limit)) for limit in limits]
         curves.append(Curve(judge, alarms, missed, ours=judge == rivals.OURS))
-        at_own_threshold.append(f"{judge} {np.mean(of_faults > 1):.1%} at {np.mean(said > 1):.2%}")
+        at_own_threshold.append(f"{judge} {np.mean(of_faults > 1):.1%} at {np.mean(record > 1):.2%}")
     share = together(clean[rivals.OURS])
     beside = f" Where a pair is in ours' highest hundredth, so are {share:.1%} of those that share a side."
     trials, seen = ([len(of[judge]) for of in (*found.values(), clean)] for judge in (rivals.OURS, "FLIP"))
@@ -145,11 +145,11 @@ class Block:
         self._lit = [self._light(0, bench.tracer, i) for i in range(SIDE)]
 
     def good(self) -> list[Said]:
-        said = []
+        result = []
         for i, j in itertools.product(range(SIDE), repeat=2):
             of_geometry = self._of_geometry(self._surfaces(self._bench.tracer, self._random(0, i, j)))
-            said.append(self._said(of_geometry, self._lit[i], j, by_all=i == j == 0))
-        return said
+            result.append(self._said(of_geometry, self._lit[i], j, by_all=i == j == 0))
+        return result
 
     def faulty(self, fault: Fault) -> list[Said]:
         number, tracer, said = 1 + FAULTS.index(fault), self._bench.faulty[fault], []

@@ -95,9 +95,9 @@ def reached(method: Method, points: Sequence[Point], target: float) -> Reached |
     if points and points[0].error <= target:
         return Reached(method, points[0].time, False)
     known = [point for point in points if point.error > 0]
-    for one, other in itertools.pairwise(known):
+    for first, other in itertools.pairwise(known):
         if other.error <= target:
-            return Reached(method, _followed(one, other, target), False)
+            return Reached(method, _followed(first, other, target), False)
     if len(known) < 2 or target < known[-1].error / _FURTHEST:
         return None
     if known[-1].error * _STEEP > known[-2].error or known[-1].time <= known[-2].time:
@@ -122,13 +122,13 @@ def times(tracks: Tracks, targets: Iterable[float], reference_error: float) -> d
 
 def standings(times: Mapping[float, tuple[Reached, ...]], wanted: Mapping[float, float | None]) -> tuple[Standing, ...]:
     """One for each error that both sides reach. wanted : error → times as fast."""
-    found = []
+    result = []
     for target, all_reached in times.items():
         ours = _best(each for each in all_reached if each.method.ours)
         rival = _best(each for each in all_reached if each.method.rival)
         if ours and rival:
-            found.append(Standing(target, ours, rival, wanted[target]))
-    return tuple(found)
+            result.append(Standing(target, ours, rival, wanted[target]))
+    return tuple(result)
 
 
 def _best(all_reached: Iterable[Reached]) -> Reached | None:
@@ -143,8 +143,8 @@ def with_point_by_line(points: Sequence[Point], samples: int, error: float) -> l
     """
     if len(points) < 2 or samples <= points[-1].parameter:
         return list(points)
-    one, other = points[-2:]
-    slope = (other.time - one.time) / (other.parameter - one.parameter)
+    first, other = points[-2:]
+    slope = (other.time - first.time) / (other.parameter - first.parameter)
     if slope <= 0:
         return list(points)
     return [*points, Point(samples, [other.time + slope * (samples - other.parameter)], [error])]

@@ -228,11 +228,11 @@ def _seen_on_the_ground(extents: Array, count: int) -> tuple[Curve, ...]:
     lost: dict[str, list[float]] = {}
     for extent in extents:
         random = np.random.default_rng(9)
-        found: dict[str, list[Array]] = {}
+        result: dict[str, list[Array]] = {}
         for _ in range(count):
             for name, triangle in _first_on_the_ground(extent, random):
-                found.setdefault(name, []).append(triangle)
-        for name, triangles in found.items():
+                result.setdefault(name, []).append(triangle)
+        for name, triangles in result.items():
             lost.setdefault(name, []).append(float(np.mean(np.stack(triangles) < _GROUND)))
     return tuple(Curve(name, extents, shares, name == "ours") for name, shares in lost.items())
 

@@ -46,9 +46,9 @@ def test_both_ways_label_the_studio_alike_and_a_camera_that_is_off_is_told(tmp_p
     assert max(labels.compared(shots, tmp_path).values()) <= labels.ON_EDGES
     ours = labels._ours(tmp_path / "ours", shots[0])
     for number, shot in enumerate(shots, 1):
-        told = json.loads((tmp_path / "theirs" / f"{number:04d}.json").read_text())
+        record = json.loads((tmp_path / "theirs" / f"{number:04d}.json").read_text())
         index = labels._ours(tmp_path / "ours", shot)["Object Index"][::-1, :, 0]
-        for each in told:
+        for each in record:
             mask = masks.decoded(each["visible"]["segmentation"])
             assert (mask != (index == each["object_index"])).mean() <= labels.ON_EDGES
     shifted = {name: np.roll(values, 1, axis=1) for name, values in ours.items()}

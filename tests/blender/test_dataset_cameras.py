@@ -27,12 +27,12 @@ def flight(scene, camera_object, tmp_path):
         camera_object.rotation_euler = (1.1, 0.02 * frame, 0.15 * frame)
         camera_object.keyframe_insert("location", frame=frame)
         camera_object.keyframe_insert("rotation_euler", frame=frame)
-    found = []
+    result = []
     for frame in range(1, COUNT + 1):
         scene.frame_set(frame)
-        found.append(Camera(f"{frame}", cameras.read(camera_object, scene), image=f"images/{frame:04d}.png"))
+        result.append(Camera(f"{frame}", cameras.read(camera_object, scene), image=f"images/{frame:04d}.png"))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "flight.blend"))
-    return tmp_path / "flight.blend", found
+    return tmp_path / "flight.blend", result
 
 
 def audited(folder, blend, capsys):

@@ -249,14 +249,14 @@ def test_a_hostile_blender_camera_is_read_or_refused_in_a_sentence(posed_camera,
         setter(posed_camera, parent, value)
         bpy.context.view_layer.update()
         try:
-            found = cameras.read(posed_camera, scene)
+            pinhole = cameras.read(posed_camera, scene)
         except InputError as error:
             assert ": " in str(error) and "\n" not in str(error), error
             if math.isnan(value):
                 assert "not finite" in str(error) or "nan" in str(error), error
         else:
             # Nothing has been lost on the way: Pinhole refuses what is not finite.
-            assert np.isfinite(np.concatenate(found.basis())).all()
+            assert np.isfinite(np.concatenate(pinhole.basis())).all()
         use(posed_camera, scene, capfd)
 
 

@@ -134,7 +134,7 @@ def test_what_an_engine_is_given_is_the_same_to_the_bit_before_and_after_ticking
 
 def again(scene):
     """The frames that were rendered last, as render_positions reads them."""
-    found = {}
+    result = {}
     for frame in range(scene.frame_start, scene.frame_end + 1, scene.frame_step):
         image = bpy.data.images.load(f"{scene.render.filepath}{frame:04d}.exr")
         width, height = image.size
@@ -142,8 +142,8 @@ def again(scene):
         image.colorspace_settings.name = "Non-Color"
         image.pixels.foreach_get(pixels)
         bpy.data.images.remove(image)
-        found[frame] = pixels.reshape(height, width, 4)[..., :3]
-    return found
+        result[frame] = pixels.reshape(height, width, 4)[..., :3]
+    return result
 
 
 @pytest.mark.parametrize("is_ticked", [True, False])

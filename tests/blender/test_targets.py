@@ -276,9 +276,9 @@ def test_the_camera_of_another_scene_is_followed_in_a_render(
 def test_what_cycles_is_compared_with_follows_the_target(watching_camera, scene, moving_target, both_sides):
     hidden_in_renders(moving_target)
     bpy.ops.mesh.primitive_monkey_add(size=6, location=(6, 2, 3))
-    found = both_sides(frame=6)
-    assert found.exported.stated_camera.look_at == (6, 2, 3)
-    found.check()
+    comparison = both_sides(frame=6)
+    assert comparison.exported.stated_camera.look_at == (6, 2, 3)
+    comparison.check()
     assert targets.target_of(watching_camera, "look_at") == moving_target
 
 
@@ -336,8 +336,8 @@ def test_a_keyed_bone_is_followed_in_the_render(posed_camera, scene, rig):
         rig.pose.bones["Hip"].keyframe_insert("location", frame=frame)
     for frame, x in ((11, 2.0), (1, 0.0)):
         scene.frame_set(frame)
-        found = depsgraph.visit(scene, lambda graph: cameras.read(posed_camera.evaluated_get(graph), scene))
-        assert -np.array(found.basis()[2]) == pytest.approx(_unit(np.subtract((x, 0, 3), (7, -6, 5))), abs=1e-6)
+        pinhole = depsgraph.visit(scene, lambda graph: cameras.read(posed_camera.evaluated_get(graph), scene))
+        assert -np.array(pinhole.basis()[2]) == pytest.approx(_unit(np.subtract((x, 0, 3), (7, -6, 5))), abs=1e-6)
 
 
 def _unit(vector):
@@ -482,14 +482,14 @@ def test_a_keyed_vertex_group_is_followed_in_the_render(posed_camera, scene, pat
     for frame, share in ((1, 0.0), (11, 1.0)):
         key.value = share
         key.keyframe_insert("value", frame=frame)
-    found = {}
+    result = {}
     for frame in (11, 1):
         scene.frame_set(frame)
         at = number_of(posed_camera, "look_at")
         seen = depsgraph.visit(scene, lambda graph: cameras.read(posed_camera.evaluated_get(graph), scene))
         assert -np.array(seen.basis()[2]) == pytest.approx(_unit(np.subtract(at, (7, -6, 5))), abs=1e-6)
-        found[frame] = at
-    assert math.dist(found[1], found[11]) > 0.5
+        result[frame] = at
+    assert math.dist(result[1], result[11]) > 0.5
 
 
 @pytest.mark.parametrize("name", ["None", "Empty"])

@@ -341,10 +341,10 @@ def linked(path, name="Camera"):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     with bpy.data.libraries.load(path, link=True) as (_, names):
         names.objects = [name]
-    found = bpy.data.objects[name]
-    bpy.context.scene.collection.objects.link(found)
+    camera_object = bpy.data.objects[name]
+    bpy.context.scene.collection.objects.link(camera_object)
     update()
-    return found
+    return camera_object
 
 
 def test_a_linked_camera_follows_the_target_of_its_library(saved):

@@ -313,8 +313,8 @@ def model(tmp_path):
 
 def test_a_right_model_is_told_to_be_right(model, capsys):
     assert run("audit", model[1]) == 0
-    said = capsys.readouterr().out
-    assert "nothing is wrong" in said and "Sure to e^" in said
+    output = capsys.readouterr().out
+    assert "nothing is wrong" in output and "Sure to e^" in output
 
 
 def test_a_binary_model_says_the_same(model, tmp_path):
@@ -405,8 +405,8 @@ def test_without_evidence_it_says_what_to_give(tmp_path, capfd):
 
 
 def test_an_audit_takes_cameras_as_they_are_read(model):
-    found = cameras.read(model[1])
-    assert audit(found, tracks_through(found)).kind == "none"
+    cameras_read = cameras.read(model[1])
+    assert audit(cameras_read, tracks_through(cameras_read)).kind == "none"
 
 
 def head_of_a_png(width, height):
@@ -446,8 +446,8 @@ def test_no_depth_map_is_waited_for_or_larger_than_a_picture(tmp_path, capfd, na
         whole = (tmp_path / name).read_bytes()
         (tmp_path / name).write_bytes(whole[:70] if name == "cut.npy" else whole.replace(b"(4, 4)", b"(4444444444, 4)"))
     assert run("audit", tmp_path) == 2
-    said = capfd.readouterr().err
-    assert told in said and "bug" not in said and said.count("\n") == 1
+    output = capfd.readouterr().err
+    assert told in output and "bug" not in output and output.count("\n") == 1
 
 
 BENT = {

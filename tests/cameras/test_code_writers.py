@@ -24,8 +24,8 @@ CENTRED = [name for name in SQUARE if CAMERAS[name].principal_point == (CAMERAS[
 
 def called(text):
     """The calls of a code: name without "set" → its numbers."""
-    found = re.findall(r"[sS]et_?(\w+)\(([^()]*)\)", text)
-    return {name: ast.literal_eval(f"({numbers},)") for name, numbers in found}
+    match = re.findall(r"[sS]et_?(\w+)\(([^()]*)\)", text)
+    return {name: ast.literal_eval(f"({numbers},)") for name, numbers in match}
 
 
 def seen_by_vtk(text, points):

@@ -191,8 +191,8 @@ VALUES = st.fixed_dictionaries(
 def test_whatever_values_stand_beside_the_numbers_the_numbers_are_read(form, values):
     said = {"height": 360, **values}
     text = re.sub(r"\{[^{}]*\"up\"[^{}]*\}", lambda _: json.dumps(said), cameras.write([camera("plain")], form))
-    (found,) = cameras.read(text, options=GIVEN)
-    assert math.dist(found.pinhole.eye, camera("plain").pinhole.eye) < 1e-14 * 64
+    (cameras_read,) = cameras.read(text, options=GIVEN)
+    assert math.dist(cameras_read.pinhole.eye, camera("plain").pinhole.eye) < 1e-14 * 64
 
 
 @pytest.mark.parametrize("eye", [1e307, 5e307, 1.7e308])
@@ -374,8 +374,8 @@ def test_names_and_sentences_are_lines_of_characters_that_show():
     name = "a\nb\0c\x1b[2J\ud83d"
     document = json.loads(cameras.write([camera("plain")], "gltf"))
     document["nodes"][0]["name"] = name
-    (found,) = cameras.read(json.dumps(document))
-    assert found.name == r"a\nb\x00c\x1b[2J\ud83d"
+    (cameras_read,) = cameras.read(json.dumps(document))
+    assert cameras_read.name == r"a\nb\x00c\x1b[2J\ud83d"
     document["cameras"][0]["perspective"]["yfov"] = 4
     with pytest.raises(InputError) as refused:
         cameras.read(json.dumps(document))

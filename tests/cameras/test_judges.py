@@ -164,10 +164,10 @@ def test_ros_camera_info_as_pyyaml_reads_it_has_our_intrinsics(tmp_path, name):
 def test_bop_projects_as_its_format_says_and_comes_back(name):
     pinhole = CAMERAS[name]
     text = cameras.write([of(name)], "bop", Options(scale=0.001))
-    said = json.loads(text)["0"]
+    record = json.loads(text)["0"]
     points = points_before(pinhole)
-    local = points * 1000 @ np.array(said["cam_R_w2c"]).reshape(3, 3).T + said["cam_t_w2c"]
-    seen = local @ np.array(said["cam_K"]).reshape(3, 3).T
+    local = points * 1000 @ np.array(record["cam_R_w2c"]).reshape(3, 3).T + record["cam_t_w2c"]
+    seen = local @ np.array(record["cam_K"]).reshape(3, 3).T
     judged(pinhole, seen[:, 0] / seen[:, 2] + 0.5, seen[:, 1] / seen[:, 2] + 0.5, points)
     (back,) = cameras.read(text, options=Options(scale=0.001, size=(pinhole.width, pinhole.height)))
     same_picture(back, pinhole)
@@ -179,10 +179,10 @@ def test_transforms_as_nerfstudios_rays_go_pass_through_our_pixels(name):
     """Its formula, in NumPy: ((column + 0.5 − cx)/fl_x, −(row + 0.5 − cy)/fl_y, −1) turned by the matrix."""
     pinhole = CAMERAS[name]
     text = cameras.write([of(name)], "transforms")
-    said = json.loads(text)
-    matrix = np.array(said["frames"][0]["transform_matrix"])
+    record = json.loads(text)
+    matrix = np.array(record["frames"][0]["transform_matrix"])
     column, row = np.array([0, 17, pinhole.width - 1]), np.array([0, 33, pinhole.height - 1])
-    local = np.c_[(column + 0.5 - said["cx"]) / said["fl_x"], -(row + 0.5 - said["cy"]) / said["fl_y"], -np.ones(3)]
+    local = np.c_[(column + 0.5 - record["cx"]) / record["fl_x"], -(row + 0.5 - record["cy"]) / record["fl_y"], -np.ones(3)]
     rays = local @ matrix[:3, :3].T
     ours = pinhole.ray_directions(column, pinhole.height - 1 - row)
     assert np.abs(rays / np.linalg.norm(rays, axis=1)[:, None] - ours).max() < 1e-14

@@ -145,15 +145,15 @@ def given(make, folder) -> Path | str:
 
 @pytest.mark.parametrize("make", MIXED)
 def test_one_camera_that_is_no_pinhole_keeps_none_of_the_others_back(tmp_path, make):
-    found = cameras.read(given(make, tmp_path), options=GIVEN)
-    assert [camera.name for camera in found] == ["good"]
-    (note,) = (note for note in found[0].notes if note.startswith("Left out"))
+    cameras_read = cameras.read(given(make, tmp_path), options=GIVEN)
+    assert [camera.name for camera in cameras_read] == ["good"]
+    (note,) = (note for note in cameras_read[0].notes if note.startswith("Left out"))
     assert re.search("bad", note) and re.search("pinhole", note), note
-    assert cameras.choose(found, "good") is found[0]
+    assert cameras.choose(cameras_read, "good") is cameras_read[0]
     with pytest.raises(InputError, match="pinhole"):  # and not: there is no such camera
-        cameras.choose(found, "bad")
+        cameras.choose(cameras_read, "bad")
     with pytest.raises(InputError, match="name one of 'good'"):
-        cameras.choose(found, "nobody")
+        cameras.choose(cameras_read, "nobody")
 
 
 def test_where_all_are_no_pinholes_the_first_is_named():

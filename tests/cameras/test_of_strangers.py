@@ -174,9 +174,9 @@ def test_a_scene_of_three_js_editor_has_its_windows_camera_and_its_own():
     matrices = ([*(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0), 0, 0, z, 1] for z in (3, 7))
     first, second = ({**lens, "name": f"{index}", "matrix": matrix} for index, matrix in enumerate(matrices))
     document = {"metadata": {}, "camera": {"object": first}, "scene": {"object": {"type": "Scene", "children": [second]}}}
-    found = cameras.read(json.dumps(document), options=VGA)
-    assert [camera.pinhole.eye[2] for camera in found] == [3, 7]
-    assert all(math.isclose(camera.pinhole.distance[1], 240, rel_tol=4 * 2**-53) for camera in found)
+    cameras_read = cameras.read(json.dumps(document), options=VGA)
+    assert [camera.pinhole.eye[2] for camera in cameras_read] == [3, 7]
+    assert all(math.isclose(camera.pinhole.distance[1], 240, rel_tol=4 * 2**-53) for camera in cameras_read)
 
 
 def test_a_stray_sign_before_pbrts_first_statement_hides_nothing_of_it():

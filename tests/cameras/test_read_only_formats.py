@@ -404,9 +404,9 @@ def test_record3ds_intrinsics_may_be_another_for_each_picture():
     poses = [[0, 0, 0, 1, index, 0, 0] for index in range(2)]
     record = {"poses": poses, "K": [700, 0, 0, 0, 700, 0, 320, 240, 1], "w": 640, "h": 480}
     record["perFrameIntrinsicCoeffs"] = [[710, 720, 310, 250], [800, 810, 300, 260]]
-    found = [camera.pinhole for camera in cameras.read(json.dumps(record))]
-    assert [pinhole.distance for pinhole in found] == [(710, 720), (800, 810)]
-    assert [pinhole.principal_point for pinhole in found] == [(310, 480 - 250), (300, 480 - 260)]  # from below
+    cameras_read = [camera.pinhole for camera in cameras.read(json.dumps(record))]
+    assert [pinhole.distance for pinhole in cameras_read] == [(710, 720), (800, 810)]
+    assert [pinhole.principal_point for pinhole in cameras_read] == [(310, 480 - 250), (300, 480 - 260)]  # from below
     with pytest.raises(InputError, match="perFrameIntrinsicCoeffs"):
         cameras.read(json.dumps(record | {"perFrameIntrinsicCoeffs": [[710, 720, 310, 250]]}))
 
@@ -532,9 +532,9 @@ def test_a_camera_of_usd_stands_at_every_time_that_has_a_sample(tmp_path):
         uniform token[] xformOpOrder = ["xformOp:translate"]
     }}"""
     (tmp_path / "a.usda").write_text(text)
-    found = cameras.read(tmp_path / "a.usda", options=Options(size=(640, 480)))
+    cameras_read = cameras.read(tmp_path / "a.usda", options=Options(size=(640, 480)))
     meters = 0.01  # a unit of a stage that says none
-    assert [camera.pinhole.eye for camera in found] == [pytest.approx((meters * x, 0, 0), rel=1e-15) for x in (1, 2, 3)]
+    assert [camera.pinhole.eye for camera in cameras_read] == [pytest.approx((meters * x, 0, 0), rel=1e-15) for x in (1, 2, 3)]
 
 
 @pytest.mark.parametrize("pointer", ["/nodes/1/translation", "/cameras/0/perspective/yfov"])

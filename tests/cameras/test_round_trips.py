@@ -54,7 +54,7 @@ def pinholes(draw):
     middle = (width / 2, height / 2)
     point = draw(st.one_of(st.none(), st.tuples(*[st.floats(-0.5, 1.5)] * 2)))
     reach = draw(st.floats(0.01, 100))
-    found = Pinhole(
+    pinhole = Pinhole(
         eye,
         tuple(a + reach * b for a, b in zip(eye, view, strict=True)),
         up,
@@ -64,8 +64,8 @@ def pinholes(draw):
         middle if point is None else (point[0] * width, point[1] * height),
         draw(st.booleans()),
     )
-    assume(found.sine_to_up > 1e-3)
-    return found
+    assume(pinhole.sine_to_up > 1e-3)
+    return pinhole
 
 
 def fitting(pinhole, form):
@@ -106,10 +106,10 @@ def test_it_comes_back_as_the_same_camera(tmp_path_factory, form, pinhole, axes,
     size = max(have.width, have.height)
     # An angle θ of half the picture is told to unit · θ, which is d/W + W/d times that of the distance.
     bent = 1 + max(pinhole.distance) / min(pinhole.width, pinhole.height) if form in ANGLES else 1
-    for one, other in zip(have.distance, pinhole.distance, strict=True):
-        assert abs(one - other) <= 16 * bent * unit * other, f"d is {one!r} and was {other!r}"
-    for one, other in zip(have.principal_point, pinhole.principal_point, strict=True):
-        assert abs(one - other) <= 16 * unit * max(abs(other), size), f"c is {one!r} and was {other!r}"
+    for first, other in zip(have.distance, pinhole.distance, strict=True):
+        assert abs(first - other) <= 16 * bent * unit * other, f"d is {first!r} and was {other!r}"
+    for first, other in zip(have.principal_point, pinhole.principal_point, strict=True):
+        assert abs(first - other) <= 16 * unit * max(abs(other), size), f"c is {first!r} and was {other!r}"
     if form in NO_POSE:
         return
     # The look-at point is near, and eye and look-at are rounded each where the scale is applied, and where it is taken off.
@@ -173,17 +173,17 @@ def test_values_that_are_not_those_of_the_numbers_beside_them_do_not_count(tmp_p
     path = tmp_path / f"a{suffix}" if (suffix := cameras.FORMATS[form].SUFFIX) else tmp_path
     options = Options(size=(640, 360))
     wrong = json.dumps(own.document(dataclasses.replace(CAMERAS["plain"], **OTHERS[other])))
-    found = []
-    for said in (None, "{}", wrong):
+    result = []
+    for record in (None, "{}", wrong):
         cameras.save([Camera("a", CAMERAS["plain"])], path, form)
-        if said is not None:
+        if record is not None:
             file = path if suffix else path / {"colmap": "images.txt", "colmap_binary": "virtual_pinhole.txt"}[form]
-            text, count = re.subn(r"\{[^{}]*\"up\"[^{}]*\}", said, file.read_text())
+            text, count = re.subn(r"\{[^{}]*\"up\"[^{}]*\}", record, file.read_text())
             assert count == 1
             file.write_text(text)
         (camera,) = cameras.read(path, options=options)
-        found.append(camera.pinhole)
-    exact, own_numbers, edited = found
+        result.append(camera.pinhole)
+    exact, own_numbers, edited = result
     assert exact == CAMERAS["plain"] and edited == own_numbers
 
 
@@ -194,9 +194,9 @@ def test_where_somebody_changed_the_matrix_it_counts_and_not_the_values_of_which
     text = (tmp_path / file).read_text()
     assert "virtual_pinhole" in text and cameras.read(path)[0].pinhole == CAMERAS["plain"]
     if form == "transforms":
-        said = json.loads(text)
-        said["frames"][0]["transform_matrix"][0][3] += 1
-        (tmp_path / file).write_text(json.dumps(said))
+        record = json.loads(text)
+        record["frames"][0]["transform_matrix"][0][3] += 1
+        (tmp_path / file).write_text(json.dumps(record))
     else:
         *head, number, _, _ = text.split("\n")
         words = number.split(" ")
@@ -311,11 +311,11 @@ def test_a_folder_with_files_of_others_says_which_were_not_read(tmp_path):
     cameras.save([Camera(name, CAMERAS["plain"]) for name in ("left", "right")], tmp_path, "ros")
     (tmp_path / "settings.yaml").write_text("rate: 30\n")
     (tmp_path / "omni.yml").write_text((tmp_path / "left.yaml").read_text().replace("plumb_bob", "omni"))
-    found = cameras.read(tmp_path)
-    assert [camera.name for camera in found] == ["left", "right"]
-    assert all(any("settings.yaml" in note for note in camera.notes) for camera in found)
-    assert all(any("omni" in note for note in camera.notes) for camera in found)
-    assert cameras.read(tmp_path, format="ros") == found
+    cameras_read = cameras.read(tmp_path)
+    assert [camera.name for camera in cameras_read] == ["left", "right"]
+    assert all(any("settings.yaml" in note for note in camera.notes) for camera in cameras_read)
+    assert all(any("omni" in note for note in camera.notes) for camera in cameras_read)
+    assert cameras.read(tmp_path, format="ros") == cameras_read
 
 
 @pytest.mark.parametrize("form", ["transforms", "colmap", "gltf", "usd", "opencv", "ros"])
@@ -348,14 +348,14 @@ def test_a_world_is_leveled_by_its_cameras_as_nerfstudio_does(tilt):
         Camera(f"{i}", Pinhole(tuple(eye), tuple(turn.apply((0, 0, 1))), tilt, 600, 640, 360))
         for i, eye in enumerate(turn.apply(eyes))
     ]
-    found = cameras.read(cameras.write(made, "transforms"), options=Options(up_from="cameras"))
-    ups = np.mean([camera.pinhole.picture_axes()[1] for camera in found], axis=0)
+    cameras_read = cameras.read(cameras.write(made, "transforms"), options=Options(up_from="cameras"))
+    ups = np.mean([camera.pinhole.picture_axes()[1] for camera in cameras_read], axis=0)
     assert ups / np.linalg.norm(ups) == pytest.approx((0, 0, 1), abs=1e-14)
-    assert [camera.pinhole.eye[2] for camera in found] == pytest.approx([3.0] * 8, abs=1e-13)
-    between = [np.linalg.norm(np.subtract(a.pinhole.eye, b.pinhole.eye)) for a, b in itertools.pairwise(found)]
+    assert [camera.pinhole.eye[2] for camera in cameras_read] == pytest.approx([3.0] * 8, abs=1e-13)
+    between = [np.linalg.norm(np.subtract(a.pinhole.eye, b.pinhole.eye)) for a, b in itertools.pairwise(cameras_read)]
     assert between == pytest.approx(np.linalg.norm(np.diff(eyes, axis=0), axis=1), rel=1e-13), "no world is stretched"
     degrees = np.degrees(np.arccos(tilt[2] / np.linalg.norm(tilt)))
-    assert all(any(f"turned by {degrees:.4g}°" in note for note in camera.notes) for camera in found)
+    assert all(any(f"turned by {degrees:.4g}°" in note for note in camera.notes) for camera in cameras_read)
 
 
 def test_cameras_whose_ups_cancel_out_level_nothing():

@@ -216,11 +216,11 @@ def test_each_line_of_the_page_is_the_same_camera():
     lines = page.split("```text\n")[1].split("```")[0].splitlines()
     assert len(lines) >= 7
     for line in lines:
-        found = read(line)
-        assert pose(found.pinhole) == POSE, line
+        reread = read(line)
+        assert pose(reread.pinhole) == POSE, line
         # Sixteen digits of an angle, its tangent, a quotient.
-        assert found.pinhole.distance == pytest.approx((960, 960), rel=1e-14), line
-        assert found.notes == () and not found.pinhole.mirrored, line
+        assert reread.pinhole.distance == pytest.approx((960, 960), rel=1e-14), line
+        assert reread.notes == () and not reread.pinhole.mirrored, line
 
 
 PIECES = "eye|=|(|)|{|}|<|>|1|-|.|e9|nan|inf|\"|'|look_at|LookAt |camera {|<lookat |/>|up|,| |\n|#|/*|//|<!--|d=|fov|axis|[|]|:"
@@ -243,11 +243,11 @@ PIECES = [
 @given(st.lists(st.sampled_from(PIECES), max_size=40).map("".join) | st.text(max_size=60))
 def test_any_text_is_read_or_refused_in_a_sentence(text):
     try:
-        found = cameras.read(text, options=Options(size=(640, 360), base=BASE))
+        cameras_read = cameras.read(text, options=Options(size=(640, 360), base=BASE))
     except InputError as error:
         assert str(error)
     else:
-        assert all(isinstance(camera.pinhole, Pinhole) for camera in found)
+        assert all(isinstance(camera.pinhole, Pinhole) for camera in cameras_read)
 
 
 LENGTH = 250_000

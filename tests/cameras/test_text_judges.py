@@ -186,11 +186,11 @@ def test_several_sensors_are_several_cameras():
         f'<sensor type="{kind}" id="{name}"><transform name="to_world">{TRANSFORMS["lookat"]}</transform></sensor>'
         for kind, name in (("perspective", "left"), ("thinlens", "blurred"), ("perspective", "right"))
     )
-    found = cameras.read(text + "</scene>", options=Options(size=(640, 480)))
-    assert [camera.name for camera in found] == ["left", "right"]
-    assert "blurred" in found[0].notes[-1]
+    cameras_read = cameras.read(text + "</scene>", options=Options(size=(640, 480)))
+    assert [camera.name for camera in cameras_read] == ["left", "right"]
+    assert "blurred" in cameras_read[0].notes[-1]
     with pytest.raises(InputError, match="name one of 'left', 'right'"):
-        cameras.choose(found)
+        cameras.choose(cameras_read)
 
 
 @pytest.mark.parametrize(
@@ -498,11 +498,11 @@ def glm_places(glm, view, projection, size, points):
 def test_glm_sees_through_the_matrices_that_we_write_as_we_do(name):
     glm = pytest.importorskip("glm")
     pinhole = CAMERAS[name]
-    said = {}
-    exec(cameras.write([of(name)], "matrices"), {"np": np}, said)
-    view, projection = (glm.dmat4(*said[key].T.ravel().tolist()) for key in ("view", "projection"))
+    result = {}
+    exec(cameras.write([of(name)], "matrices"), {"np": np}, result)
+    view, projection = (glm.dmat4(*result[key].T.ravel().tolist()) for key in ("view", "projection"))
     points = points_before(pinhole)
-    judged(pinhole, *glm_places(glm, view, projection, said["size"], points), points)
+    judged(pinhole, *glm_places(glm, view, projection, result["size"], points), points)
 
 
 @pytest.mark.parametrize("hand", ["RH", "LH"])
@@ -793,8 +793,8 @@ def test_a_film_of_pbrt_without_its_size_has_the_size_that_is_asked_for():
 def test_an_angle_below_pi_is_taken_as_what_the_options_say():
     text = "lookfrom = vec3(1,2,3); lookat = vec3(0,0,0); vup = vec3(0,1,0); vfov = 0.7"
     for unit, angle in (("radians", 0.7), ("degrees", math.radians(0.7))):
-        found = cameras.read(text, options=dataclasses.replace(GL, angle_unit=unit))[0].pinhole
-        assert found.distance[1] == pytest.approx(180 / math.tan(angle / 2))
+        cameras_read = cameras.read(text, options=dataclasses.replace(GL, angle_unit=unit))[0].pinhole
+        assert cameras_read.distance[1] == pytest.approx(180 / math.tan(angle / 2))
 
 
 # ---- engines
@@ -816,16 +816,17 @@ def test_unitys_matrices_show_its_left_handed_world_as_the_pinhole_shows_ours():
     import json
 
     pinhole = CAMERAS["shifted_and_not_square"]
-    (said,) = json.loads(cameras.write([of("shifted_and_not_square")], "unity"))["cameras"]
+    (record,) = json.loads(cameras.write([of("shifted_and_not_square")], "unity"))["cameras"]
     points = points_before(pinhole)
     clip = (
-        np.c_[points * [1, 1, -1], np.ones(len(points))] @ (np.array(said["projectionMatrix"]) @ said["worldToCameraMatrix"]).T
+        np.c_[points * [1, 1, -1], np.ones(len(points))]
+        @ (np.array(record["projectionMatrix"]) @ record["worldToCameraMatrix"]).T
     )
     column, row = (clip[:, 0] / clip[:, 3] + 1) / 2 * pinhole.width, (1 - clip[:, 1] / clip[:, 3]) / 2 * pinhole.height
     judged(pinhole, column, row, points)
-    rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_quat(said["rotation"]).as_matrix()
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_quat(record["rotation"]).as_matrix()
     assert np.diag([1, 1, -1]) @ rotation[:, 2] == pytest.approx(-pinhole.basis()[2], abs=1e-15)
-    assert "fieldOfView" not in said
+    assert "fieldOfView" not in record
 
 
 def test_what_a_field_of_view_can_not_say_unreal_refuses():

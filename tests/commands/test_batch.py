@@ -192,12 +192,12 @@ def test_what_can_not_be_known_is_said_and_resume_known_renders_it_anew(tmp_path
 
 def test_every_event_of_a_batch_is_a_line(tmp_path, capfd):
     said = batch(capfd, CORNELL, "--orbit", "2", "--out", tmp_path / "out", *SMALL, "--log-json")
-    told = [json.loads(line) for line in said.out.splitlines()]
+    record = [json.loads(line) for line in said.out.splitlines()]
     shot = ["shot_started", "shot_done"]
-    assert [event["event"] for event in told] == [
+    assert [event["event"] for event in record] == [
         *("started", "batch_started", *shot, *shot, "batch_finished", "message", "finished")
     ]
-    assert told[3]["shot"] == "orbit_000" and Path(told[3]["image"]) == tmp_path / "out" / "orbit_000.exr"
+    assert record[3]["shot"] == "orbit_000" and Path(record[3]["image"]) == tmp_path / "out" / "orbit_000.exr"
     assert said.err == ""
 
 

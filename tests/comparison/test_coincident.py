@@ -95,20 +95,20 @@ def honest():
 
 def test_pixels_that_show_surfaces_in_one_place_are_taken_out_and_the_rest_is_the_same(reference, honest, coincident):
     assert not radiance.compare(reference, honest, CAMERA).passed
-    found = radiance.compare(reference, honest, CAMERA, make_coincident=lambda: coincident)
-    assert found.passed, "\n".join(found.lines())
-    assert found.taken_out.pairs.keys() == {("Carpet", "Floor")}
-    assert 0.05 < found.taken_out.pixels.mean() < 0.3
-    assert f"the {found.taken_out.count:,} pixels that show surfaces in one place" in found.sentence
-    assert found.to_json()["in_one_place"]["pairs"] == [{"objects": ["Carpet", "Floor"]}]
+    comparison = radiance.compare(reference, honest, CAMERA, make_coincident=lambda: coincident)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert comparison.taken_out.pairs.keys() == {("Carpet", "Floor")}
+    assert 0.05 < comparison.taken_out.pixels.mean() < 0.3
+    assert f"the {comparison.taken_out.count:,} pixels that show surfaces in one place" in comparison.sentence
+    assert comparison.to_json()["in_one_place"]["pairs"] == [{"objects": ["Carpet", "Floor"]}]
 
 
 def test_nothing_is_taken_out_where_the_pictures_are_the_same(reference):
     def never():
         raise AssertionError("nobody has to ask")
 
-    found = radiance.compare(reference, pictures(a_scene()), CAMERA, make_coincident=never)
-    assert found.passed and not found.taken_out.pairs
+    comparison = radiance.compare(reference, pictures(a_scene()), CAMERA, make_coincident=never)
+    assert comparison.passed and not comparison.taken_out.pairs
 
 
 def test_nothing_is_taken_out_where_no_two_surfaces_are_in_one_place(honest):
@@ -128,8 +128,8 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_sabotage_is_found_in_the_rest(reference, coincident, fault):
-    found = radiance.compare(reference, as_cycles(1, **FAULTS[fault]), CAMERA, make_coincident=lambda: coincident)
-    assert not found.passed and found.taken_out.count, "\n".join(found.lines())
+    comparison = radiance.compare(reference, as_cycles(1, **FAULTS[fault]), CAMERA, make_coincident=lambda: coincident)
+    assert not comparison.passed and comparison.taken_out.count, "\n".join(comparison.lines())
 
 
 def test_the_light_by_surfaces_in_one_place_is_what_all_of_them_scatter(coincident):

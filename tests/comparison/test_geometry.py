@@ -77,12 +77,12 @@ def test_the_result_is_plain_json_and_says_what_the_lines_say(paper_scene):
     comparison = compare(
         paper_scene.picture(), paper_scene.rendered(), paper_scene.pinhole, paper_scene.surfaces_at, paper_scene.pinhole
     )
-    told = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
-    assert told["passed"] and told["passes"][0]["name"] == "Position"
-    assert told["passes"][0]["count"] == comparison.rows[0].count
-    assert told["conversion"]["largest"] < 1e-9  # float64 rounding of 320 px
+    record = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
+    assert record["passed"] and record["passes"][0]["name"] == "Position"
+    assert record["passes"][0]["count"] == comparison.rows[0].count
+    assert record["conversion"]["largest"] < 1e-9  # float64 rounding of 320 px
     lines = comparison.lines()
-    assert lines[-1] == told["sentence"]
+    assert lines[-1] == record["sentence"]
     assert all(any(line.startswith(row.name) for line in lines) for row in comparison.rows)
     assert max(map(len, lines[:-1])) < 150
 

@@ -146,10 +146,10 @@ def test_a_softer_picture_is_said_to_be_softer():
 
 
 def test_the_json_is_plain_and_says_what_the_sentence_says(same):
-    told = json.loads(json.dumps(same.to_json(), allow_nan=False))
-    assert told["passed"] is True and told["sentence"] == same.sentence
-    assert told["quantities"][0]["name"] == "Combined" and len(told["quantities"][0]["hypothesis_tests"]) == 5
-    assert told["samples"] == {"reference": 256, "test": 256} and told["equal"] == ["Alpha"]
+    record = json.loads(json.dumps(same.to_json(), allow_nan=False))
+    assert record["passed"] is True and record["sentence"] == same.sentence
+    assert record["quantities"][0]["name"] == "Combined" and len(record["quantities"][0]["hypothesis_tests"]) == 5
+    assert record["samples"] == {"reference": 256, "test": 256} and record["equal"] == ["Alpha"]
 
 
 def test_the_maps_are_pictures_of_the_same_size(same):

@@ -26,10 +26,10 @@ def sides(reference, tests, name):
 
 def test_the_test_is_the_mean_of_its_pictures_and_its_spread_the_variance_of_that():
     tests = [picture() for _ in range(6)]
-    found = sides(picture(Variance=drawn(3)), tests, "Combined")
+    widgets = sides(picture(Variance=drawn(3)), tests, "Combined")
     stack = np.stack([image["Combined"][..., :3] for image in tests]).astype(np.float64)
-    assert found.test == pytest.approx(stack.mean(axis=0), rel=1e-12)
-    assert found.spread == pytest.approx(stack.var(axis=0, ddof=1) / 6, rel=1e-9)
+    assert widgets.test == pytest.approx(stack.mean(axis=0), rel=1e-12)
+    assert widgets.spread == pytest.approx(stack.var(axis=0, ddof=1) / 6, rel=1e-9)
 
 
 def test_one_picture_tells_nothing_of_its_noise():

@@ -298,7 +298,7 @@ def sidecar() -> Feed:
 
     wanted = [Job("one", camera="Camera"), Job("two", camera="Camera")]
     settings = {shot.name: settings_hash(shot, {}) for shot in wanted}
-    made: dict[str, bytes] = {}
+    result: dict[str, bytes] = {}
 
     def batch(folder: Path) -> Folder:
         place = Folder(folder)
@@ -310,14 +310,14 @@ def sidecar() -> Feed:
         return place
 
     def feed(chance: random.Random, folder: Path) -> None:
-        if not made:
-            made.update({path.name: path.read_bytes() for path in batch(folder / "whole").path.iterdir() if path.is_file()})
+        if not result:
+            result.update({path.name: path.read_bytes() for path in batch(folder / "whole").path.iterdir() if path.is_file()})
         changed = folder / "changed"
         changed.mkdir()
-        for name, data in made.items():
+        for name, data in result.items():
             (changed / name).write_bytes(data)
         name = chance.choice(("one.json", "two.json", "summary.json"))
-        document = json.loads(made[name])
+        document = json.loads(result[name])
         (changed / name).write_bytes(mutants.of_json(document, SCENE | document, chance))
         try:
             dataset.write(batch(changed), wanted, settings, "png")
@@ -395,18 +395,20 @@ def cameras_of(name: str) -> Feed:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
-                found = cameras.read(path, options=options)
+                cameras_read = cameras.read(path, options=options)
         except InputError as error:
             _judge_caused(error)
             return
-        for camera in found:
+        for camera in cameras_read:
             for line in (camera.name, *camera.notes):
                 if len(line) > LONGEST or not all(map(str.isprintable, line.split(" "))):
                     raise Said(f"a name or note is no line of a few characters that show: {line[:200]!r}")
             if camera.lens is not None:
                 camera.lens.folds(camera.lens.undistort(CORNERS))
         try:
-            cameras.write([Camera(f"{i}", each.pinhole) for i, each in enumerate(found[:3])], chance.choice(cameras.writable()))
+            cameras.write(
+                [Camera(f"{i}", each.pinhole) for i, each in enumerate(cameras_read[:3])], chance.choice(cameras.writable())
+            )
         except InputError as error:
             _judge_caused(error)
 

@@ -26,25 +26,25 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="address space i
 
 def failures(kind: str, count: int, folder: Path) -> list[str]:
     """Feed mutants 0 to count − 1; what is wrong with each. Where one ends the process, another goes on after it."""
-    found: list[str] = []
+    result: list[str] = []
     first = 0
     while first < count:
         words = [sys.executable, TARGETS, kind, str(first), str(count - first), folder]
         ran = subprocess.run(words, capture_output=True, text=True)
-        found += (f"{kind} {told['mutant']}: {told['said']}" for told in map(json.loads, ran.stdout.splitlines()))
+        result += (f"{kind} {output['mutant']}: {output['said']}" for output in map(json.loads, ran.stdout.splitlines()))
         current = folder / "current"
         reached = current.read_text() if current.exists() else "nothing"
         if ran.returncode == 0:
             break
         if kind == "blend" and reached.isdecimal() and -ran.returncode in CRASHES:
-            found += as_a_user_sees(folder / f"blend-{reached}")
+            result += as_a_user_sees(folder / f"blend-{reached}")
         else:
-            found.append(f"{kind} {reached}: ended with status {ran.returncode}: {ran.stderr[-1000:]}")
+            result.append(f"{kind} {reached}: ended with status {ran.returncode}: {ran.stderr[-1000:]}")
         if not reached.isdecimal():
             break
         first = int(reached) + 1
         current.unlink()
-    return found
+    return result
 
 
 def as_a_user_sees(mutant: Path) -> list[str]:

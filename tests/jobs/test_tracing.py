@@ -84,8 +84,8 @@ class Comparer(Tracing):
     """The process, asked for pictures of geometry alone."""
 
     def verdict(self, scene, image, camera, clip, stated=None):
-        found = self.compare(scene, [image], Job(level="geometry"), camera, clip, stated, may_be_empty=True)
-        return {"passed": found["passed"], "verdict": found["sentence"], "figures": found["figures"]}
+        comparison = self.compare(scene, [image], Job(level="geometry"), camera, clip, stated, may_be_empty=True)
+        return {"passed": comparison["passed"], "verdict": comparison["sentence"], "figures": comparison["figures"]}
 
 
 @pytest.fixture(scope="module")

@@ -82,9 +82,9 @@ def test_each_pixels_point_projects_to_the_pixels_centre_from_the_world_and_from
 
 
 def test_our_reader_of_bop_finds_the_cameras_again(written):
-    found = cameras.read(written.out / "scene_camera.json", options=cameras.Options(scale=0.001, size=(64, 48)))
+    cameras_read = cameras.read(written.out / "scene_camera.json", options=cameras.Options(scale=0.001, size=(64, 48)))
     points = np.array([(0.3, 0.1, 0.2), (-3.0, 4, 1), (2.0, -1, 0.5)])
-    for labels, camera in zip(written.labels, found, strict=True):
+    for labels, camera in zip(written.labels, cameras_read, strict=True):
         expected, got = (np.array(each.project(points)) for each in (labels.image.camera, camera.pinhole))
         assert np.abs(got - expected).max() <= 1e-11
 
@@ -127,12 +127,12 @@ def box(mask):
 def test_what_has_one_name_box_and_scale_is_one_object_in_all_pictures(written):
     assert [each["name"] for each in written.objects.values()] == ["Askew", "Ball", "Ball", "Cube", "Cube", "Floor"]
     names = [{each["id"]: each["name"] for each in labels.instances} for labels in written.labels]
-    found = {}
+    result = {}
     for i, poses in written.scene_gt.items():
         for each in poses:
             key = (names[int(i)][each["instance_id"]], each["instance_id"])
-            found.setdefault(key, set()).add(each["obj_id"])
-    numbers = {key: sorted(each) for key, each in found.items()}
+            result.setdefault(key, set()).add(each["obj_id"])
+    numbers = {key: sorted(each) for key, each in result.items()}
     assert [each for (name, _), each in numbers.items() if name == "Ball"] == [[2, 3]], "the ball is smaller in one picture"
     assert sorted(each for (name, _), each in numbers.items() if name == "Cube") == [[4], [5]]
     assert [each for (name, _), each in numbers.items() if name == "Cube.001"] == [[4]]
@@ -163,10 +163,10 @@ def test_what_is_lacking_is_one_sentence_and_leaves_no_folder(tmp_path, capfd, l
     camera = replace(CAMERA, mirrored=labels == "mirrored")
     path = files.write(tmp_path / "a.exr", vp.label(room(camera), LABELS if isinstance(labels, str) else labels))[-1]
     if labels == "spoilt":
-        told = json.loads(path.read_text())
-        told["instances"][0]["amodal"]["segmentation"]["counts"].append(5)
+        record = json.loads(path.read_text())
+        record["instances"][0]["amodal"]["segmentation"]["counts"].append(5)
         with written_whole(path) as temporary:
-            temporary.write_text(json.dumps(told))
+            temporary.write_text(json.dumps(record))
     before = sorted(path.name for path in tmp_path.iterdir())
     assert main(["labels", str(tmp_path), str(tmp_path / "out"), "--to", "bop"]) == 2
     (line,) = capfd.readouterr().err.strip().splitlines()

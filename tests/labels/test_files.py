@@ -40,10 +40,10 @@ def written(tmp_path_factory):
 
 def test_the_exr_has_every_pass_to_the_last_bit(written):
     labels, folder = written
-    found = image.read(folder / "shot.labels.exr")
-    assert set(found.passes) == set(labels.image.passes) and found.camera == labels.image.camera
+    read_image = image.read(folder / "shot.labels.exr")
+    assert set(read_image.passes) == set(labels.image.passes) and read_image.camera == labels.image.camera
     for name, values in labels.image.passes.items():
-        np.testing.assert_array_equal(found[name], values)
+        np.testing.assert_array_equal(read_image[name], values)
 
 
 def test_the_passes_of_each_label_are_those_that_are_told_beforehand(written):
@@ -103,10 +103,10 @@ def test_depth_that_sixteen_bits_can_not_hold_is_none_and_never_another_depth():
 def test_pycocotools_finds_the_same_masks_areas_and_boxes(written):
     coco = pytest.importorskip("pycocotools.mask")
     labels, folder = written
-    told = json.loads((folder / "shot.labels.json").read_text())
+    record = json.loads((folder / "shot.labels.json").read_text())
     ids = labels.image["Instance"][::-1, :, 0]
-    assert told["instances"] == labels.instances and len(told["instances"]) == 4
-    for each in told["instances"]:
+    assert record["instances"] == labels.instances and len(record["instances"]) == 4
+    for each in record["instances"]:
         for kind in ("visible", "amodal"):
             packed = coco.frPyObjects(each[kind]["segmentation"], *each[kind]["segmentation"]["size"])
             assert coco.area(packed) == each[kind]["area"]
@@ -155,13 +155,13 @@ def test_what_is_wrong_is_one_sentence_before_anything_is_written(tmp_path, capf
 def pictures(tmp_path_factory):
     """The labels of three pictures by name, and their folder. In the last one the ball hides behind a cube."""
     folder = tmp_path_factory.mktemp("shots")
-    found = {}
+    result = {}
     for name, ball in (("a", moved(z=0.7)), ("b", moved(1, 0.4, 0.7)), ("c", moved(0.1, 2, 0.8, scale=0.3))):
         scene = room(ball=ball)
         cube = replace(scene.objects[2], name="Cube.001", matrix=np.array([moved(-2, 0, 0.4, 0.2, 0.4)]))
-        found[name] = vp.label(replace(scene, objects=(*scene.objects, cube)), ("masks", "amodal"))
-        files.write(folder / f"{name}.exr", found[name])
-    return found, folder
+        result[name] = vp.label(replace(scene, objects=(*scene.objects, cube)), ("masks", "amodal"))
+        files.write(folder / f"{name}.exr", result[name])
+    return result, folder
 
 
 def run(*words):
@@ -199,15 +199,15 @@ def test_segments_are_those_of_the_colours_of_the_pictures(pictures, tmp_path):
     cv2 = pytest.importorskip("cv2")
     _, folder = pictures
     assert run(folder, tmp_path / "panoptic.json", "--to", "panoptic") == 0
-    told = json.loads((tmp_path / "panoptic.json").read_text())
-    assert [each["image_id"] for each in told["annotations"]] == [each["id"] for each in told["images"]] == [1, 2, 3]
-    for annotation in told["annotations"]:
+    record = json.loads((tmp_path / "panoptic.json").read_text())
+    assert [each["image_id"] for each in record["annotations"]] == [each["id"] for each in record["images"]] == [1, 2, 3]
+    for annotation in record["annotations"]:
         blue_green_red = cv2.imread(str(folder / annotation["file_name"])).astype(int)
         numbers, areas = np.unique(blue_green_red @ [256**2, 256, 1], return_counts=True)
         segments = {each["id"]: each["area"] for each in annotation["segments_info"]}
         assert segments == {n: area for n, area in zip(numbers.tolist(), areas.tolist(), strict=True) if n}
-    colours = [tuple(each["color"]) for each in told["categories"]]
-    assert len(set(colours)) == len(colours) and all(each["isthing"] == 1 for each in told["categories"])
+    colours = [tuple(each["color"]) for each in record["categories"]]
+    assert len(set(colours)) == len(colours) and all(each["isthing"] == 1 for each in record["categories"])
 
 
 @pytest.mark.parametrize("kind", ["coco", "panoptic"])
@@ -216,8 +216,8 @@ def test_a_picture_beside_its_labels_is_the_one_that_is_named(tmp_path, kind):
         files.write(tmp_path / f"{name}.exr", vp.label(room(), ("masks",)))
     (tmp_path / "b.png").write_bytes(encoded(np.zeros((48, 64, 3), np.uint8)))
     assert run(tmp_path, tmp_path / "all.json", "--to", kind) == 0
-    told = json.loads((tmp_path / "all.json").read_text())
-    assert [each["file_name"] for each in told["images"]] == ["a.exr", "b.png"]
+    record = json.loads((tmp_path / "all.json").read_text())
+    assert [each["file_name"] for each in record["images"]] == ["a.exr", "b.png"]
 
 
 def test_an_instance_has_one_id_in_all_pictures(pictures, tmp_path):
@@ -273,12 +273,12 @@ def test_what_can_not_be_gathered_is_one_sentence_and_nothing_is_written(tmp_pat
         files.write(folder / "a.exr", vp.label(room(CAMERA), ("masks",)))
     elif isinstance(content, dict):
         told_in = files.write(folder / "a.exr", vp.label(room(CAMERA), ("depth", "masks", "amodal")))[-1]
-        told = json.loads(told_in.read_text())
-        instance = next(each for each in told["instances"] if each["visible"])
+        record = json.loads(told_in.read_text())
+        instance = next(each for each in record["instances"] if each["visible"])
         for key, value in content.items():
-            owners = (told, instance, instance["visible"], instance["visible"]["segmentation"])
+            owners = (record, instance, instance["visible"], instance["visible"]["segmentation"])
             next(owner for owner in owners if key in owner)[key] = value
-        told_in.write_text(json.dumps(told))
+        told_in.write_text(json.dumps(record))
     elif content:
         (folder / "a.labels.json").write_text(content)
     assert run(folder, tmp_path / "out.json", *words) == 2

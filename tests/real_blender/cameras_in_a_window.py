@@ -112,13 +112,13 @@ def import_fspy():
     yield from until(lambda: len(bpy.data.cameras) == len(before["cameras"]) + 1, "the import")
     yield from settle()
     (name,) = set(bpy.data.objects.keys()) - set(before["objects"])
-    found = bpy.data.objects[name]
-    np.testing.assert_allclose(np.array(found.matrix_world), matrix, atol=17 * 2**-24 * 8)
-    np.testing.assert_allclose(found.data.lens, lens, rtol=4 * 2**-24)
-    (background,) = found.data.background_images
+    camera_object = bpy.data.objects[name]
+    np.testing.assert_allclose(np.array(camera_object.matrix_world), matrix, atol=17 * 2**-24 * 8)
+    np.testing.assert_allclose(camera_object.data.lens, lens, rtol=4 * 2**-24)
+    (background,) = camera_object.data.background_images
     assert tuple(background.image.size) == (960, 540) and background.image.packed_file, "the picture does not come along"
     view, _ = region(*VIEWPORT)
-    scene.camera, background.alpha, background.display_depth = found, 1.0, "FRONT"
+    scene.camera, background.alpha, background.display_depth = camera_object, 1.0, "FRONT"
     view.spaces.active.region_3d.view_perspective = "CAMERA"
     yield from picture("fspy")
     view.spaces.active.region_3d.view_perspective = "PERSP"

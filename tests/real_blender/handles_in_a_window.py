@@ -303,20 +303,20 @@ def is_drawn(point):
     """Steps that end with whether the view plane's frame is drawn there: blue, where everything else is gray."""
     import gpu
 
-    found = []
+    result = []
 
     def look():
         at = location_3d_to_region_2d(bpy.context.region, bpy.context.region_data, Vector(point))
         pixels = gpu.state.active_framebuffer_get().read_color(round(at.x) - 1, round(at.y) - 1, 3, 3, 4, 0, "FLOAT")
         pixels.dimensions = 9 * 4
-        found.append(np.array(pixels).reshape(-1, 4))
+        result.append(np.array(pixels).reshape(-1, 4))
 
     handler = bpy.types.SpaceView3D.draw_handler_add(look, (), "WINDOW", "POST_PIXEL")
     region("VIEW_3D", "WINDOW")[0].tag_redraw()
-    while not found:
+    while not result:
         yield
     bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
-    return bool((found[-1][:, 2] - found[-1][:, 0] > 0.25).any())
+    return bool((result[-1][:, 2] - result[-1][:, 0] > 0.25).any())
 
 
 def hide_the_diagram():

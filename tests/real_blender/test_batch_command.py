@@ -30,11 +30,11 @@ def test_what_stands_in_braces_is_an_event_and_the_last_tells_the_status(real_bl
     (tmp_path / "file").touch()
     (tmp_path / "orbit_001.png").symlink_to(tmp_path / "file" / "picture.png")  # which is no folder
     done = batch(real_blender, *ORBIT, tmp_path, "--log-json")
-    told = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
-    events = [event["event"] for event in told]
+    output = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    events = [event["event"] for event in output]
     assert events[:2] == ["started", "batch_started"] and events[-1] == "finished", done.stdout
     assert events.count("shot_done") == 2 and events.count("shot_failed") == 1
-    assert told[-1]["exit_status"] == done.returncode == 4
+    assert output[-1]["exit_status"] == done.returncode == 4
 
 
 @pytest.mark.parametrize(
@@ -135,8 +135,8 @@ def test_frames_of_a_batch_are_those_of_f(real_blender, tmp_path, name, engine):
     check(real_blender.run("-b", blend, "-o", tmp_path / "f_###", "-f", "{},{}".format(*frames)))
     shots = tmp_path / "shots.csv"
     camera = "import bpy; print('CAMERA', bpy.context.scene.camera.name)"
-    said = real_blender.run("-b", blend, "--python-expr", camera).stdout
-    (camera,) = [line.removeprefix("CAMERA ") for line in said.splitlines() if line.startswith("CAMERA ")]
+    output = real_blender.run("-b", blend, "--python-expr", camera).stdout
+    (camera,) = [line.removeprefix("CAMERA ") for line in output.splitlines() if line.startswith("CAMERA ")]
     # Backwards and once more: what is kept from one frame is in the way of another, if it is.
     rows = [f"{place}_{frame:03},{camera},{frame}" for place, frame in enumerate((*frames, frames[0]))]
     shots.write_text("\n".join(["name,camera,frame", *rows]))

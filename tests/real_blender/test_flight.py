@@ -27,9 +27,9 @@ WITHOUT_ADDON = (
 def run(blender, *arguments):
     """Run the script, or Blender itself, and fail with what it says."""
     outcome = blender.run("-b", "--factory-startup", "--python-exit-code", "9", *arguments)
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "Traceback" not in said, said
-    return said
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "Traceback" not in output, output
+    return output
 
 
 @pytest.fixture(scope="module")

@@ -330,11 +330,11 @@ def pictures(tracer):
 
 def differing(kept, fresh):
     """The number of pixels that differ in each pass of both pictures, where any do."""
-    found = {}
-    for one, other in zip(kept, fresh, strict=True):
-        counts = {name: int((one[name] != other[name]).any(axis=-1).sum()) for name in one}
-        found |= {name: count for name, count in counts.items() if count}
-    return found
+    result = {}
+    for first, other in zip(kept, fresh, strict=True):
+        counts = {name: int((first[name] != other[name]).any(axis=-1).sum()) for name in first}
+        result |= {name: count for name, count in counts.items() if count}
+    return result
 
 
 def copied(scene):
@@ -458,6 +458,11 @@ def test_a_keeper_hands_each_scene_what_the_one_before_had(scene):
 def test_scenes_are_the_same_by_content(scene):
     assert same_things(scene, copied(scene))
     assert same((1.0, None, "a"), (1.0, None, "a"))
-    for one, other in (((1,), (1, 2)), (1, True), (np.zeros(3), np.zeros(3, np.float32)), ({"a": 1, "b": 2}, {"b": 2, "a": 1})):
-        assert not same(one, other), f"{one!r} is taken for {other!r}"
+    for first, other in (
+        ((1,), (1, 2)),
+        (1, True),
+        (np.zeros(3), np.zeros(3, np.float32)),
+        ({"a": 1, "b": 2}, {"b": 2, "a": 1}),
+    ):
+        assert not same(first, other), f"{first!r} is taken for {other!r}"
     assert isinstance(scene.geometries["geometry 0"], Mesh)

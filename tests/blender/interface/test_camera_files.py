@@ -51,13 +51,13 @@ def counts():
 
 
 def test_a_folder_of_cameras_becomes_one_collection_and_each_sees_what_the_file_says(scene, tmp_path):
-    made = around(7)
-    formats.save(made, tmp_path / "sparse", "colmap")
+    cameras_around = around(7)
+    formats.save(cameras_around, tmp_path / "sparse", "colmap")
     assert import_(tmp_path / "sparse", set_size=True) == {"FINISHED"}
     objects = bpy.data.collections["sparse"].objects
-    assert [each.name for each in objects] == [camera.name for camera in made]
+    assert [each.name for each in objects] == [camera.name for camera in cameras_around]
     assert (scene.render.resolution_x, scene.render.resolution_y) == (640, 360)
-    for block, camera in zip(objects, made, strict=True):
+    for block, camera in zip(objects, cameras_around, strict=True):
         assert block.virtual_pinhole.enabled
         assert_same(cameras.read(block, scene), camera.pinhole)
     assert scene.camera == objects[0]
@@ -125,9 +125,9 @@ def test_an_fspy_project_brings_its_picture(scene, tmp_path):
     block = bpy.data.objects["house"]
     (background,) = block.data.background_images
     assert tuple(background.image.size) == (8, 4) and background.image.packed_file and block.data.show_background_images
-    found = cameras.read(block, scene)
-    assert found.distance == pytest.approx((6, 6), rel=2.0**-22) and found.eye == pytest.approx((0, -5, 2))
-    assert found.principal_point == pytest.approx((4.4, 1.8), abs=1e-5)
+    pinhole = cameras.read(block, scene)
+    assert pinhole.distance == pytest.approx((6, 6), rel=2.0**-22) and pinhole.eye == pytest.approx((0, -5, 2))
+    assert pinhole.principal_point == pytest.approx((4.4, 1.8), abs=1e-5)
 
 
 @pytest.fixture
@@ -148,10 +148,10 @@ def test_a_trajectory_is_one_camera_that_flies_at_its_times(scene, trajectory):
     plane = formats.camera.ViewPlane((700, 700), (frame[0] / 2, frame[1] / 2), *frame)
     for at, wanted in zip((1, 13, 49), formats.read(trajectory, options=Options(view_plane=plane)), strict=True):
         scene.frame_set(at)
-        found = cameras.read(block, scene)
-        assert np.subtract(found.basis(), wanted.pinhole.basis()) == pytest.approx(0, abs=2.0**-21)
-        assert found.eye == pytest.approx(wanted.pinhole.eye, abs=2.0**-22)
-        assert found.distance == pytest.approx((700, 700), rel=2.0**-22)
+        pinhole = cameras.read(block, scene)
+        assert np.subtract(pinhole.basis(), wanted.pinhole.basis()) == pytest.approx(0, abs=2.0**-21)
+        assert pinhole.eye == pytest.approx(wanted.pinhole.eye, abs=2.0**-22)
+        assert pinhole.distance == pytest.approx((700, 700), rel=2.0**-22)
 
 
 def test_a_trajectory_without_a_lens_sees_as_the_scenes_camera_or_asks(posed_camera, scene, trajectory, capfd):
@@ -181,8 +181,8 @@ def test_what_can_not_be_imported_is_one_sentence_and_leaves_nothing(scene, tmp_
 
 
 def test_a_camera_beyond_blenders_numbers_leaves_nothing_of_the_others(scene, tmp_path):
-    made = [*around(2), Camera("far", Pinhole((1e39, 0, 0), (0, 0, 0), (0, 0, 1), 600, 640, 360))]
-    formats.save(made, tmp_path / "some", "sidecar")
+    cameras_around = [*around(2), Camera("far", Pinhole((1e39, 0, 0), (0, 0, 0), (0, 0, 1), 600, 640, 360))]
+    formats.save(cameras_around, tmp_path / "some", "sidecar")
     before = counts(), scene.camera, scene.render.resolution_x
     with pytest.raises(RuntimeError, match=r"(?i)camera 'far'.*beyond Blender"):
         import_(tmp_path / "some", set_size=True)
@@ -191,11 +191,13 @@ def test_a_camera_beyond_blenders_numbers_leaves_nothing_of_the_others(scene, tm
 
 @pytest.mark.parametrize("format", ["transforms", "colmap", "colmap_binary", "sidecar", "gltf", "opencv", "pbrt"])
 def test_what_is_exported_is_imported_as_the_same_cameras(scene, add_camera, tmp_path, format):
-    made = around(1 if format in ("opencv", "pbrt") else 3)
+    cameras_around = around(1 if format in ("opencv", "pbrt") else 3)
     if format == "gltf":  # it has no shift
-        made = [Camera(each.name, Pinhole(each.pinhole.eye, (0, 0, 1), (0, 0, 1), 600, 640, 360)) for each in made]
+        cameras_around = [
+            Camera(each.name, Pinhole(each.pinhole.eye, (0, 0, 1), (0, 0, 1), 600, 640, 360)) for each in cameras_around
+        ]
     scene.render.resolution_x, scene.render.resolution_y = 640, 360
-    for camera in made:
+    for camera in cameras_around:
         cameras.apply(add_camera(camera.name), camera.pinhole, scene)
     before = list(bpy.data.objects)
     path = tmp_path / "written"
@@ -203,8 +205,8 @@ def test_what_is_exported_is_imported_as_the_same_cameras(scene, add_camera, tmp
     (written,) = tmp_path.iterdir()
     import_(written, axes="y_up", scale=0.01)
     objects = [each for each in bpy.data.objects if each not in before]
-    assert len(objects) == len(made)
-    for block, camera in zip(objects, made, strict=True):
+    assert len(objects) == len(cameras_around)
+    for block, camera in zip(objects, cameras_around, strict=True):
         assert_same(cameras.read(block, scene), camera.pinhole)
 
 

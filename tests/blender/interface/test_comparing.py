@@ -80,19 +80,19 @@ def stand_in(monkeypatch, seen):
 
 def wait_for(what, seconds=100):
     ends = time.monotonic() + seconds
-    while not (found := what()) and time.monotonic() < ends:
+    while not (outcome := what()) and time.monotonic() < ends:
         time.sleep(0.02)
-    assert found, "it does not come about"
-    return found
+    assert outcome, "it does not come about"
+    return outcome
 
 
 def processes_of(folder):
     """The processes whose command line names the folder; one that has ended has none."""
-    found = []
+    result = []
     for process in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
-            found += [process.name] if str(folder).encode() in (process / "cmdline").read_bytes() else []
-    return found
+            result += [process.name] if str(folder).encode() in (process / "cmdline").read_bytes() else []
+    return result
 
 
 def values_of(block):
@@ -101,16 +101,16 @@ def values_of(block):
     def plain(value):
         return tuple(map(plain, value)) if hasattr(value, "__len__") and not isinstance(value, str | bytes | set) else value
 
-    found = {}
+    result = {}
     for prop in block.bl_rna.properties:
         value = getattr(block, prop.identifier, None)
         if prop.type == "POINTER":
-            found[prop.identifier] = value and getattr(value, "name", "")
+            result[prop.identifier] = value and getattr(value, "name", "")
         elif prop.type == "COLLECTION":
-            found[prop.identifier] = len(value)
+            result[prop.identifier] = len(value)
         elif prop.identifier != "rna_type":
-            found[prop.identifier] = repr(plain(value))
-    return found
+            result[prop.identifier] = repr(plain(value))
+    return result
 
 
 def state(scene):

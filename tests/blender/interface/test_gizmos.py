@@ -36,13 +36,13 @@ def steps(monkeypatch):
 def everything(camera_object):
     """All that Blender stores of the camera and its values; floats bit by bit."""
     bpy.context.view_layer.update()
-    found = {}
+    result = {}
     for block in (camera_object, camera_object.data, camera_object.virtual_pinhole):
         for each in block.bl_rna.properties:
             if each.type in ("FLOAT", "INT", "BOOLEAN", "STRING"):
                 value = getattr(block, each.identifier)
-                found[block.bl_rna.identifier, each.identifier] = value if each.type == "STRING" else np.array(value).tobytes()
-    return found
+                result[block.bl_rna.identifier, each.identifier] = value if each.type == "STRING" else np.array(value).tobytes()
+    return result
 
 
 def told(camera_object, scene):

@@ -448,10 +448,10 @@ def test_a_drag_moves_visibly_there_and_back_and_cancelling_restores_every_bit(p
 def test_a_dolly_zoom_keeps_the_size_at_the_look_at_point(posed_camera, scene):
     drag = dragging.Drag(posed_camera, scene, dragging.DOLLY_ZOOM)
     drag.move(120, 0)
-    found = cameras.stated(posed_camera, scene)
-    reach = math.dist(found.eye, found.look_at)
+    pinhole = cameras.stated(posed_camera, scene)
+    reach = math.dist(pinhole.eye, pinhole.look_at)
     assert reach < 0.7 * REACH
-    assert found.distance[0] / reach == pytest.approx(1500 / REACH, rel=1e-12)
+    assert pinhole.distance[0] / reach == pytest.approx(1500 / REACH, rel=1e-12)
 
 
 def test_a_truck_carries_the_look_at_point_along_under_the_mouse(posed_camera, scene):
@@ -465,12 +465,12 @@ def test_a_typed_number_counts_instead_of_the_mouse(posed_camera, scene):
     drag = dragging.Drag(posed_camera, scene, dragging.DOLLY)
     drag.move(500, 0)
     drag.type("2.5")
-    found = cameras.stated(posed_camera, scene)
-    assert math.dist(found.eye, found.look_at) == pytest.approx(REACH + 2.5, rel=1e-12)
+    pinhole = cameras.stated(posed_camera, scene)
+    assert math.dist(pinhole.eye, pinhole.look_at) == pytest.approx(REACH + 2.5, rel=1e-12)
     drag.type("-")
-    assert math.dist(cameras.stated(posed_camera, scene).eye, found.look_at) < REACH
+    assert math.dist(cameras.stated(posed_camera, scene).eye, pinhole.look_at) < REACH
     drag.type("-99")
-    assert math.dist(cameras.stated(posed_camera, scene).eye, found.look_at) < REACH, "beyond the look-at point it waits"
+    assert math.dist(cameras.stated(posed_camera, scene).eye, pinhole.look_at) < REACH, "beyond the look-at point it waits"
 
 
 def test_what_follows_an_object_is_not_dragged_away_from_it(posed_camera, scene, empty):
@@ -483,8 +483,8 @@ def test_what_follows_an_object_is_not_dragged_away_from_it(posed_camera, scene,
 
 def test_the_operator_does_the_same_by_numbers(posed_camera, scene):
     assert bpy.ops.viewcam.drag_camera(kind="DOLLY", amount=(1.0, 0.0)) == {"FINISHED"}
-    found = cameras.stated(posed_camera, scene)
-    assert math.dist(found.eye, found.look_at) == pytest.approx(REACH + 1)
+    pinhole = cameras.stated(posed_camera, scene)
+    assert math.dist(pinhole.eye, pinhole.look_at) == pytest.approx(REACH + 1)
 
 
 # --- Selection
@@ -499,8 +499,8 @@ def points(posed_camera):
 
     def sorted_points():
         bpy.context.view_layer.update()
-        found = selection.points(bpy.context, posed_camera)
-        return found[np.lexsort(found.round(3).T[::-1])]
+        positions = selection.points(bpy.context, posed_camera)
+        return positions[np.lexsort(positions.round(3).T[::-1])]
 
     return sorted_points
 
@@ -522,9 +522,9 @@ def test_modifiers_and_constraints_count(points, empty):
     array = cube.modifiers.new("Array", "ARRAY")
     array.use_relative_offset, array.use_constant_offset, array.constant_offset_displace = False, True, (10, 0, 0)
     cube.constraints.new("COPY_LOCATION").target = empty("There", (0, 0, 100))
-    found = points()
-    assert len(found) == 16
-    np.testing.assert_allclose(selection.bounds_centre(found), (5, 0, 100), atol=200 * 2**-24)
+    positions = points()
+    assert len(positions) == 16
+    np.testing.assert_allclose(selection.bounds_centre(positions), (5, 0, 100), atol=200 * 2**-24)
 
 
 def test_the_instances_of_a_collection_count(points, scene):
@@ -544,15 +544,15 @@ def test_the_instances_of_a_collection_count(points, scene):
 def test_curves_surfaces_and_text_are_what_is_drawn(points, kind):
     room, name = kind.split(".")
     getattr(getattr(bpy.ops, room), f"{name}_add")(location=(0, 0, 7))
-    found = points()
-    assert len(found) > 8 and np.abs(found - (0, 0, 7)).max() < 3
+    positions = points()
+    assert len(positions) > 8 and np.abs(positions - (0, 0, 7)).max() < 3
 
 
 def test_metaballs_are_what_is_drawn(points):
     bpy.ops.object.metaball_add(type="BALL", location=(0, 0, 7))
-    found = points()
-    assert len(found) > 20
-    np.testing.assert_allclose(selection.bounds_centre(found), (0, 0, 7), atol=0.1)
+    positions = points()
+    assert len(positions) > 20
+    np.testing.assert_allclose(selection.bounds_centre(positions), (0, 0, 7), atol=0.1)
 
 
 def test_what_has_no_geometry_is_its_origin(points, empty, add_lamp):
@@ -676,29 +676,29 @@ def region_of(area):
 
 
 def test_the_view_of_the_viewport_on_paper(area, scene):
-    found = viewport.pinhole_of(area, LIKE, scene)
+    pinhole = viewport.pinhole_of(area, LIKE, scene)
     # sqrt(½) in float32, and the quaternion is normalized in float32 again.
-    np.testing.assert_allclose(found.eye, (0, -5, 2), atol=8 * 4 * 2**-24)
-    assert found.look_at == (0, 3, 2) and found.up == (0, 0, 1)
-    assert (found.width, found.height, found.principal_point) == (1920, 1080, (960, 540))
+    np.testing.assert_allclose(pinhole.eye, (0, -5, 2), atol=8 * 4 * 2**-24)
+    assert pinhole.look_at == (0, 3, 2) and pinhole.up == (0, 0, 1)
+    assert (pinhole.width, pinhole.height, pinhole.principal_point) == (1920, 1080, (960, 540))
 
 
 @pytest.mark.parametrize("size", [(1920, 1080), (1080, 1920), (1000, 1000), (4000, 100)])
 @pytest.mark.parametrize("ratio", [1.0, 1.5])
 def test_the_picture_shows_all_that_the_viewport_shows_and_no_more_than_it_must(area, scene, size, ratio):
     like = dataclasses.replace(LIKE, width=size[0], height=size[1], distance=(1, ratio), principal_point=None)
-    found, region = viewport.pinhole_of(area, like, scene), region_of(area)
-    assert found.distance[1] == ratio * found.distance[0]
+    pinhole, region = viewport.pinhole_of(area, like, scene), region_of(area)
+    assert pinhole.distance[1] == ratio * pinhole.distance[0]
     larger = max(region.width, region.height)
     shown = np.array([region.width / larger, region.height / larger])  # tangents: 45° to the larger side
-    pictured = np.array(size) / 2 / found.distance
+    pictured = np.array(size) / 2 / pinhole.distance
     assert (pictured / shown).min() == pytest.approx(1, rel=1e-15)
 
 
 def test_a_tilted_view_takes_its_own_up(area, scene):
     area.spaces.active.region_3d.view_rotation = (0.5, 0.5, 0.5, 0.5)
-    found = viewport.pinhole_of(area, LIKE, scene)
-    np.testing.assert_allclose(np.array(found.basis()), [(0, 1, 0), (0, 0, 1), (1, 0, 0)], atol=8 * 2**-24)
+    pinhole = viewport.pinhole_of(area, LIKE, scene)
+    np.testing.assert_allclose(np.array(pinhole.basis()), [(0, 1, 0), (0, 0, 1), (1, 0, 0)], atol=8 * 2**-24)
     area.spaces.active.region_3d.view_rotation = (1, 0, 0, 0)
     assert viewport.pinhole_of(area, LIKE, scene).up == (0, 1, 0)
 
@@ -724,9 +724,13 @@ def test_a_view_through_a_camera_is_that_camera(area, scene, posed_camera):
     posed_camera.data.shift_x = 0.1
     bpy.context.view_layer.update()
     area.spaces.active.region_3d.view_perspective = "CAMERA"
-    found, expected = viewport.pinhole_of(area, LIKE, scene), cameras.read(posed_camera, scene)
-    assert (found.eye, found.distance, found.principal_point) == (expected.eye, expected.distance, expected.principal_point)
-    np.testing.assert_allclose(found.look_at, (0, 0, 1), atol=1e-5)  # the values' distance along the camera's axis
+    pinhole, expected = viewport.pinhole_of(area, LIKE, scene), cameras.read(posed_camera, scene)
+    assert (pinhole.eye, pinhole.distance, pinhole.principal_point) == (
+        expected.eye,
+        expected.distance,
+        expected.principal_point,
+    )
+    np.testing.assert_allclose(pinhole.look_at, (0, 0, 1), atol=1e-5)  # the values' distance along the camera's axis
 
 
 def test_a_viewport_with_a_camera_of_its_own_looks_through_that(area, scene, posed_camera, add_camera):

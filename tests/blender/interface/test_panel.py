@@ -283,10 +283,10 @@ def test_nothing_but_a_dot_takes_room_from_the_lens(posed_camera):
     """Of "112.5 mm" a sidebar as Blender opens it would show "112.5 m"."""
     for unit in [item.identifier for item in fields()["lens_unit"].enum_items]:
         posed_camera.virtual_pinhole.lens_unit = unit
-        found = drawn(panel.VIEWCAM_PT_sidebar, 292)
+        widgets = drawn(panel.VIEWCAM_PT_sidebar, 292)
         name = SHOWN[posed_camera.virtual_pinhole.lens_unit]
-        (row,) = (layout for kind, other, _, layout, _ in found if (kind, other) == ("prop", name))
-        assert [each[:2] for each in found if each[3] is row] == [("prop", name), ("decorator", name)]
+        (row,) = (layout for kind, other, _, layout, _ in widgets if (kind, other) == ("prop", name))
+        assert [each[:2] for each in widgets if each[3] is row] == [("prop", name), ("decorator", name)]
 
 
 BLENDERS = {
@@ -320,16 +320,16 @@ def test_the_lens_in_pixels_is_dragged_about_as_far_as_in_millimeters(fresh_blen
 
 def test_no_label_of_the_panel_reads_as_the_subjects_distance(posed_camera):
     """The lens is one, whatever its unit; a distance, to an artist, is that of what he looks at."""
-    said = []
+    result = []
     for unit in [item.identifier for item in fields()["lens_unit"].enum_items]:
         posed_camera.virtual_pinhole.lens_unit = unit
         panels = (panel.VIEWCAM_PT_sidebar, panel.VIEWCAM_PT_sidebar_options, panel.VIEWCAM_PT_sidebar_move)
         for kind, name, look, *_ in [row for each in panels for row in drawn(each)]:
-            said.append(look.get("text") or name)
+            result.append(look.get("text") or name)
             if kind == "prop" and name in fields():
-                said += [fields()[name].name, *(item.name for item in getattr(fields()[name], "enum_items", ()))]
-    assert {"Lens", "mm", "px", "Resize Keeps", "Lens in Pixels", "Selection"} <= set(said)
-    assert "Distance" not in said
+                result += [fields()[name].name, *(item.name for item in getattr(fields()[name], "enum_items", ()))]
+    assert {"Lens", "mm", "px", "Resize Keeps", "Lens in Pixels", "Selection"} <= set(result)
+    assert "Distance" not in result
 
 
 def test_the_box_does_not_tick_where_the_camera_is_no_pinhole(posed_camera):
@@ -372,9 +372,11 @@ def test_in_the_narrowest_sidebar_no_name_stands_beside_its_field(posed_camera, 
 
 def keyed_by_a_dot(each, width):
     """The fields that Blender or the panel draws a dot beside."""
-    found = drawn(each, width)
-    columns = {name for kind, name, _, at, _ in found if kind == "prop" and at.use_property_split and at.use_property_decorate}
-    return columns | {name for kind, name, *_ in found if kind == "decorator"}
+    widgets = drawn(each, width)
+    columns = {
+        name for kind, name, _, at, _ in widgets if kind == "prop" and at.use_property_split and at.use_property_decorate
+    }
+    return columns | {name for kind, name, *_ in widgets if kind == "decorator"}
 
 
 @pytest.mark.parametrize("each", [panel.VIEWCAM_PT_data, panel.VIEWCAM_PT_sidebar])
@@ -401,23 +403,25 @@ def test_a_camera_that_is_not_enabled_shows_its_own_values_greyed_and_one_button
     posed_camera.virtual_pinhole.enabled = False
     posed_camera.location, posed_camera.rotation_euler, posed_camera.data.lens = (0, -8, -1e-8), (math.pi / 2, 0, 0), 50
     bpy.context.view_layer.update()
-    found = drawn(panel.VIEWCAM_PT_sidebar)
-    texts = [look.get("text", name) for kind, name, look, layout, _ in found if kind == "label" and not layout.is_all("active")]
+    widgets = drawn(panel.VIEWCAM_PT_sidebar)
+    texts = [
+        look.get("text", name) for kind, name, look, layout, _ in widgets if kind == "label" and not layout.is_all("active")
+    ]
     assert texts[:4] == ["Camera", "0", "-8 m", "0"], texts
     assert "50 mm" in texts and "0°" in texts and not any(text.startswith("-0") for text in texts)
-    offered = {name: look for kind, name, look, layout, _ in found if kind == "prop" and layout.is_all("active")}
+    offered = {name: look for kind, name, look, layout, _ in widgets if kind == "prop" and layout.is_all("active")}
     assert list(offered) == ["name", "enabled"] and offered["enabled"] == {"text": "Use", "toggle": True}
 
 
 def test_what_a_constraint_or_a_driver_places_is_read_only_with_a_word_why(posed_camera, empty):
     def locked():
         bpy.context.view_layer.update()
-        found = properties_drawn(panel.VIEWCAM_PT_data) | properties_drawn(panel.VIEWCAM_PT_data_options)
-        return [name for name, layout in found.items() if not layout.is_all("enabled")]
+        widgets = properties_drawn(panel.VIEWCAM_PT_data) | properties_drawn(panel.VIEWCAM_PT_data_options)
+        return [name for name, layout in widgets.items() if not layout.is_all("enabled")]
 
     def words():
-        found = drawn(panel.VIEWCAM_PT_data)
-        return [look.get("text", name) for kind, name, look, *_ in found if kind == "label" and look.get("icon") == "LOCKED"]
+        widgets = drawn(panel.VIEWCAM_PT_data)
+        return [look.get("text", name) for kind, name, look, *_ in widgets if kind == "label" and look.get("icon") == "LOCKED"]
 
     constraint = posed_camera.constraints.new("TRACK_TO")
     assert locked() == [], "a constraint without a target places nothing"
@@ -459,8 +463,8 @@ def test_of_an_override_it_is_said_why_lens_and_roll_are_grey(posed_camera, tmp_
     bpy.context.scene.camera = override
 
     def words():
-        found = drawn(panel.VIEWCAM_PT_data)
-        return [look.get("text", name) for kind, name, look, *_ in found if kind == "label" and look.get("icon") == "LOCKED"]
+        widgets = drawn(panel.VIEWCAM_PT_data)
+        return [look.get("text", name) for kind, name, look, *_ in widgets if kind == "label" and look.get("icon") == "LOCKED"]
 
     assert words() == ["Override: edit in px", "Override: edit Up"]
     override.virtual_pinhole.lens_unit = "PIXELS"
@@ -504,17 +508,19 @@ def test_apply_again_is_not_offered_where_it_mends_nothing(posed_camera, scene):
 
 def test_a_notice_is_drawn_in_lines_that_fit_and_with_its_remedy_below(posed_camera):
     posed_camera.virtual_pinhole.eye = (0, 0, 5)
-    found = drawn(panel.VIEWCAM_PT_sidebar, 200)
-    lines = [(name, look["icon"]) for kind, name, look, *_ in found if kind == "label" and "icon" in look]
+    widgets = drawn(panel.VIEWCAM_PT_sidebar, 200)
+    lines = [(name, look["icon"]) for kind, name, look, *_ in widgets if kind == "label" and "icon" in look]
     assert " ".join(line for line, _ in lines).startswith("The view is parallel to up")
     assert [icon for _, icon in lines] == ["ERROR"] + ["BLANK1"] * (len(lines) - 1) and len(lines) > 2
-    (remedy,) = (each for each in found if each[:2] == ("operator", "viewcam.choose_up"))
-    assert remedy[4].camera == "Camera" and found.index(remedy) < [each[1] for each in found].index("eye"), "it is at the top"
+    (remedy,) = (each for each in widgets if each[:2] == ("operator", "viewcam.choose_up"))
+    assert remedy[4].camera == "Camera" and widgets.index(remedy) < [each[1] for each in widgets].index("eye"), (
+        "it is at the top"
+    )
 
 
 def test_each_read_out_has_a_button_that_copies_it(posed_camera):
-    found = drawn(panel.VIEWCAM_PT_data_readouts)
-    buttons = [properties for kind, _, _, _, properties in found if kind == "operator"]
+    widgets = drawn(panel.VIEWCAM_PT_data_readouts)
+    buttons = [properties for kind, _, _, _, properties in widgets if kind == "operator"]
     assert [button.label for button in buttons] == [row.label for row in panel.readouts_of(posed_camera, bpy.context.scene)]
     assert buttons[-1].label == "To Look-At" and float(buttons[-1].text) == pytest.approx(10.0499, abs=1e-4)
 
@@ -562,15 +568,15 @@ GERMAN = {
 def test_what_is_made_of_pieces_is_translated_before_the_pieces_go_in(posed_camera, monkeypatch):
     posed_camera.virtual_pinhole.eye = (0, 0, 5)
     monkeypatch.setattr(panel, "iface", lambda text: GERMAN.get(text, text))
-    found = drawn(panel.VIEWCAM_PT_data)
-    assert {"text": "Oben wird (1, 0, 0)", "translate": False} in [each[2] for each in found]
-    assert ("label", "Senkrecht", {"icon": "ERROR", "translate": False}) in [each[:3] for each in found]
+    widgets = drawn(panel.VIEWCAM_PT_data)
+    assert {"text": "Oben wird (1, 0, 0)", "translate": False} in [each[2] for each in widgets]
+    assert ("label", "Senkrecht", {"icon": "ERROR", "translate": False}) in [each[:3] for each in widgets]
 
 
 def test_numbers_are_never_translated(posed_camera):
     rows = {text for row in panel.readouts_of(posed_camera, bpy.context.scene) for text in row.texts}
-    found = drawn(panel.VIEWCAM_PT_data_readouts)
-    untranslated = {name for kind, name, look, *_ in found if kind == "label" and look.get("translate") is False}
+    widgets = drawn(panel.VIEWCAM_PT_data_readouts)
+    untranslated = {name for kind, name, look, *_ in widgets if kind == "label" and look.get("translate") is False}
     assert untranslated == rows
 
 
@@ -591,7 +597,7 @@ AMERICAN_TOO = ("raise", "otherwise", "precise", "noise", "exercise", "advise", 
 
 def test_everything_that_blender_shows_is_spelled_as_blender_spells():
     """Labels and tooltips of all operators, panels and properties, and those of what may be chosen."""
-    found = {}
+    result = {}
     for name in dir(bpy.types):
         kind = getattr(bpy.types, name, None)
         if not getattr(kind, "__module__", "").startswith("viewcam_addon"):
@@ -601,8 +607,8 @@ def test_everything_that_blender_shows_is_spelled_as_blender_spells():
             said += [each.name, each.description]
             said += [text for item in getattr(each, "enum_items", ()) for text in (item.name, item.description)]
         words = {word for text in said for word in re.findall(r"[^\W_]+", text or "") if BRITISH.search(word)}
-        found |= {name: wrong} if (wrong := {word for word in words if word.lower() not in AMERICAN_TOO}) else {}
-    assert found == {}
+        result |= {name: wrong} if (wrong := {word for word in words if word.lower() not in AMERICAN_TOO}) else {}
+    assert result == {}
 
 
 def test_a_british_word_would_be_found():

@@ -88,22 +88,22 @@ def contents(folder):
 
 def children_of(process):
     """The numbers of the processes that this one has started and that still run."""
-    found = []
+    result = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
             state, parent = path.read_text().rpartition(")")[2].split()[:2]
         except OSError:
             continue
         if int(parent) == process and state != "Z":
-            found.append(int(path.parent.name))
-    return found
+            result.append(int(path.parent.name))
+    return result
 
 
 def until(is_so):
     ends = time.monotonic() + WAITS
-    while not (found := is_so()) and time.monotonic() < ends:
+    while not (outcome := is_so()) and time.monotonic() < ends:
         time.sleep(0.05)
-    return found
+    return outcome
 
 
 class Batch:

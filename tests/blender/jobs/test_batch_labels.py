@@ -142,8 +142,8 @@ def test_pictures_are_the_same_bytes_with_and_without_labels_and_the_scene_is_as
     shoot(tmp_path / "without", shots, Outputs())
     for shot in shots:
         for ending in ("exr", "png"):
-            one, other = ((tmp_path / kind / f"{shot.name}.{ending}").read_bytes() for kind in ("with", "without"))
-            assert one == other, f"{shot.name}.{ending}"
+            first, other = ((tmp_path / kind / f"{shot.name}.{ending}").read_bytes() for kind in ("with", "without"))
+            assert first == other, f"{shot.name}.{ending}"
     assert (stage.frame_current, stage.camera.name) == (1, "Camera")
 
 

@@ -165,15 +165,15 @@ def test_two_files_of_one_name_that_swap_their_contents_are_other_files(open_fil
 
 
 def test_so_are_two_that_swap_them_outside_of_the_files_folder(open_file, picture, tmp_path_factory):
-    one, other = (tmp_path_factory.mktemp("outside") / "wall.png" for _ in range(2))
-    picture(one, 0.25)
+    first, other = (tmp_path_factory.mktemp("outside") / "wall.png" for _ in range(2))
+    picture(first, 0.25)
     picture(other, 0.5)
-    load(one)
+    load(first)
     load(other)
     before = open_file()
     assert [name for name, _ in before["linked"]] == ["wall.png", "wall.png"]
-    kept = one.read_bytes()
-    one.write_bytes(other.read_bytes())
+    kept = first.read_bytes()
+    first.write_bytes(other.read_bytes())
     other.write_bytes(kept)
     assert origins.made_from() != before
 

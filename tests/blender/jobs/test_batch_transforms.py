@@ -273,8 +273,10 @@ def test_a_part_of_a_batch_writes_no_dataset_and_the_rest_of_it_does(stage, batc
 
 def test_a_name_with_a_space_is_refused_before_anything_is_rendered(stage, batch, tmp_path, capfd):
     assert batch(stage(), [SHOTS[0] | {"name": "front left"}], *QUICK) == 2
-    said = capfd.readouterr().err
-    assert "a COLMAP model can't name a picture with a space, as front left.png: rename it" in said and said.count("\n") == 1
+    output = capfd.readouterr().err
+    assert (
+        "a COLMAP model can't name a picture with a space, as front left.png: rename it" in output and output.count("\n") == 1
+    )
     assert not list(tmp_path.glob("out/*.*"))
 
 

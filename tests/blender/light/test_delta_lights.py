@@ -99,7 +99,7 @@ def test_area_lamps_of_any_spread(pictures, add_lamp, shape):
         lamp.location, lamp.data.energy = (*rng.uniform(-1, 1, 2), rng.uniform(3, 6)), rng.uniform(1, 900)
         lamp.rotation_euler, lamp.data.spread = rng.uniform(-0.3, 0.3, 3), rng.uniform(0.7, 3)
 
-    told = []
+    result = []
     for each in pictures(arrange, scenes=4):
         (area,) = each.exported.lamps
         ways = render(each.exported, threads=2)["Position"].astype(np.float64) - area.matrix[:3, 3]
@@ -111,8 +111,8 @@ def test_area_lamps_of_any_spread(pictures, add_lamp, shape):
         assert ((ours > 0) != (theirs > 0)).mean() < 1e-3
         lit = (ours > 0) & (theirs > 0)
         assert lit.sum() > 300, "that would tell nothing"
-        told.append(np.abs(ours - theirs)[lit] / full[lit])
-    p50, p99 = np.percentile(np.concatenate(told), [50, 99])
+        result.append(np.abs(ours - theirs)[lit] / full[lit])
+    p50, p99 = np.percentile(np.concatenate(result), [50, 99])
     assert p50 <= SPREAD[0] and p99 <= SPREAD[1], (p50, p99)
 
 

@@ -72,8 +72,8 @@ def test_cycles_shows_the_same_of_linked_surfaces(pictures, panel, painted, link
     differs = 0
     for sides in pictures(scenes=3):
         assert bool(told(sides.exported)) == ("INCLUDE" in links.get("blocker_collection", {}).values())
-        found = off(sides.exported, sides.traced, sides.cycles[0])
-        assert (np.array(found) <= (most, p50, p99)).all(), found
+        hits = off(sides.exported, sides.traced, sides.cycles[0])
+        assert (np.array(hits) <= (most, p50, p99)).all(), hits
         plain = render.render(unlinked(sides.exported), "direct", 1, threads=2)
         differs += any(np.array(off(sides.exported, plain, sides.cycles[0])) > (10 * most, p50, p99))
     assert differs >= 2  # what is linked is seen: without, it is found
@@ -122,8 +122,8 @@ def test_near_by_samples_of_light_and_scattered_rays_make_the_same_as_in_cycles(
     (sides,) = pictures(samples=64, count=4, scenes=1, level="path")
     reference = Image(sides.traced, sides.exported.camera, {"samples": "256", "albedo tables": "yes"})
     tests = [Image(passes, sides.exported.camera) for passes in sides.cycles]
-    found = radiance.compare(reference, tests, sides.exported.camera, 64)
-    assert found.passed, found.sentence
+    comparison = radiance.compare(reference, tests, sides.exported.camera, 64)
+    assert comparison.passed, comparison.sentence
     wrong = replace(reference, passes=render.render(unlinked(sides.exported), "path", 256, threads=2))
     assert not radiance.compare(wrong, tests, sides.exported.camera, 64).passed, "and without links, it would differ"
 
@@ -139,8 +139,8 @@ def test_scattered_rays_find_a_lamp_past_what_is_no_blocker_as_in_cycles(picture
     (sides,) = pictures(samples=64, count=4, scenes=1, level="path")
     reference = Image(sides.traced, sides.exported.camera, {"samples": "256", "albedo tables": "yes"})
     tests = [Image(passes, sides.exported.camera) for passes in sides.cycles]
-    found = radiance.compare(reference, tests, sides.exported.camera, 64)
-    assert found.passed and not told(sides.exported), found.sentence
+    comparison = radiance.compare(reference, tests, sides.exported.camera, 64)
+    assert comparison.passed and not told(sides.exported), comparison.sentence
     other = replace(sides.exported, lamps=tuple(replace(each, blockers=None) for each in sides.exported.lamps))
     wrong = replace(reference, passes=render.render(other, "path", 256, threads=2))
     assert not radiance.compare(wrong, tests, sides.exported.camera, 64).passed

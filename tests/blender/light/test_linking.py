@@ -23,8 +23,8 @@ def lamp(stage, add_lamp):
 
 def linked(request="direct"):
     exported = jobs.export(Job(level=request))
-    told = {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
-    return exported.lamps[0].receivers, exported.lamps[0].blockers, told
+    reasons = {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
+    return exported.lamps[0].receivers, exported.lamps[0].blockers, reasons
 
 
 @pytest.mark.parametrize(

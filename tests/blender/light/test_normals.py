@@ -133,10 +133,10 @@ def shown(scene, camera, add_lamp, set_world, read_passes, tmp_path):
         path = tmp_path / "normals.exr"
         exported = jobs.both_sides(Job(threads=2, level=level, samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-        (theirs,) = read_passes([path])
-        ours = render.render(exported, level, 1, threads=2)
-        one, other = (each["Combined"][..., :3].astype(np.float64) for each in (ours, theirs))
-        return one, other, ours["Object Index"][..., 0]
+        (cycles_passes,) = read_passes([path])
+        traced = render.render(exported, level, 1, threads=2)
+        first, other = (each["Combined"][..., :3].astype(np.float64) for each in (traced, cycles_passes))
+        return first, other, traced["Object Index"][..., 0]
 
     return show
 
@@ -154,12 +154,12 @@ def patches(shown, strewn, painted):
             shades = block.data.color_attributes.new("Shades", "FLOAT_COLOR", "CORNER")
             shades.data.foreach_set("color", rng.uniform(0, 1, 4 * len(block.data.loops)))
         ours, theirs, numbers = shown(144)
-        found = []
+        result = []
         for number in range(1, len(cases) + 1):
             here = numbers == number
             assert here.sum() > 60 and theirs[here].max() > 0.01, (cases[number - 1], here.sum(), theirs[here].max())
-            found.append(np.abs(ours - theirs)[here].max(axis=1) / theirs[here].max())
-        return found
+            result.append(np.abs(ours - theirs)[here].max(axis=1) / theirs[here].max())
+        return result
 
     return show
 

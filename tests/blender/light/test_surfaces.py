@@ -55,13 +55,13 @@ def image(fresh_blender):
     """image(space, opacity, **options) → an image of 5 × 3 random pixels."""
 
     def make(space="sRGB", opacity=1.0, **options):
-        made = bpy.data.images.new("Checks", 5, 3, **options)
-        made.colorspace_settings.name = space
+        block = bpy.data.images.new("Checks", 5, 3, **options)
+        block.colorspace_settings.name = space
         pixels = np.random.default_rng(1).random((15, 4), np.float32)
         pixels[:, 3] = opacity
-        made.pixels.foreach_set(pixels.ravel())
-        made.update()
-        return made
+        block.pixels.foreach_set(pixels.ravel())
+        block.update()
+        return block
 
     return make
 
@@ -141,11 +141,11 @@ def test_images_of_bytes_and_floats(pictures, floor, image, interpolation, space
 @pytest.mark.parametrize("kind", ["PNG", "OPEN_EXR", "HDR"])
 @pytest.mark.parametrize("opacity", [1.0, 0.5])
 def test_images_from_files(pictures, floor, image, tmp_path, kind, opacity, packed):
-    made = image("sRGB" if kind == "PNG" else "Non-Color", opacity, float_buffer=kind != "PNG", alpha=True)
-    made.filepath_raw, made.file_format = str(tmp_path / "file"), kind
-    made.save()
+    block = image("sRGB" if kind == "PNG" else "Non-Color", opacity, float_buffer=kind != "PNG", alpha=True)
+    block.filepath_raw, block.file_format = str(tmp_path / "file"), kind
+    block.save()
     loaded = bpy.data.images.load(str(tmp_path / "file"))
-    loaded.colorspace_settings.name = made.colorspace_settings.name
+    loaded.colorspace_settings.name = block.colorspace_settings.name
     if packed:
         loaded.pack()
     texture(floor, loaded, "Linear")

@@ -85,9 +85,9 @@ def _is_shown(kind, context, drawn):
 def no_traceback(capfd):
     """Whatever is done, nothing that a handler or a callback raises stands in the console."""
     yield
-    said = "".join(capfd.readouterr())
-    print(said)
-    assert "Traceback" not in said
+    output = "".join(capfd.readouterr())
+    print(output)
+    assert "Traceback" not in output
 
 
 @dataclasses.dataclass(frozen=True)

@@ -30,11 +30,11 @@ def monkey(scene, camera_object):
 @pytest.fixture
 def material(monkey):
     """The monkey's material: a Principled surface, and nothing else."""
-    made = bpy.data.materials.new("Skin")
-    if not made.node_tree:  # new materials have one from 5.0 on
-        made.use_nodes = True
-    monkey.data.materials.append(made)
-    return made
+    material = bpy.data.materials.new("Skin")
+    if not material.node_tree:  # new materials have one from 5.0 on
+        material.use_nodes = True
+    monkey.data.materials.append(material)
+    return material
 
 
 def add_node(material, kind, output, socket, node="Material Output"):
@@ -131,8 +131,8 @@ def test_a_box_of_fog_is_left_out_on_both_sides(monkey, material, both_sides):
     box.data.materials.append(fog)
     sides = both_sides()
     sides.check()
-    told = {entry.object: (entry.status, entry.reason) for entry in sides.exported.ledger}
-    assert told[box.name] == ("skipped", "material 'Fog' is a volume without a surface, which is not modelled")
+    reasons = {entry.object: (entry.status, entry.reason) for entry in sides.exported.ledger}
+    assert reasons[box.name] == ("skipped", "material 'Fog' is a volume without a surface, which is not modelled")
     assert [placed.name for placed in sides.exported.objects] == [monkey.name]
     assert fog.node_tree.nodes.get("Transparent BSDF") is None
 
@@ -161,9 +161,9 @@ def test_a_lamp_shines_through_a_box_of_fog_on_both_sides(monkey, material, add_
     make_volume_only(fog)
     bpy.context.object.data.materials.append(fog)
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=16), [tmp_path / "lit.exr"])
-    (theirs,) = read_passes([tmp_path / "lit.exr"])
-    ours = render.render(exported, "direct", 16, threads=2)
-    means = [passes["Combined"][..., :3].mean() for passes in (ours, theirs)]
+    (cycles_passes,) = read_passes([tmp_path / "lit.exr"])
+    traced = render.render(exported, "direct", 16, threads=2)
+    means = [passes["Combined"][..., :3].mean() for passes in (traced, cycles_passes)]
     assert means[0] > 0.05 and means[0] == pytest.approx(means[1], rel=0.05), means  # 16 samples of 1,024 pixels
 
 
@@ -543,9 +543,9 @@ def test_whichever_surface_cycles_had_shown_would_have_been_right_and_no_third_o
     def compared(test):
         return geometry.compare(Image(sides.traced), Image(test), camera, tracer.surfaces_at)
 
-    found = compared(other)
-    assert found.passed and set(found.in_one_place.pairs()) == {pair}, "\n".join(found.lines())
-    row, column = found.in_one_place.rows[0], found.in_one_place.columns[0]
+    comparison = compared(other)
+    assert comparison.passed and set(comparison.in_one_place.pairs()) == {pair}, "\n".join(comparison.lines())
+    row, column = comparison.in_one_place.rows[0], comparison.in_one_place.columns[0]
     wrong = {**other, "Material Index": other["Material Index"].copy()}
     wrong["Material Index"][row, column] += 7
     assert not compared(wrong).passed
@@ -583,8 +583,8 @@ def test_things_of_a_pixel_are_the_same_picture(both_sides, sheet, add, mesh_fro
     off = {name: values.copy() for name, values in sides.cycles.items()}
     off["UV"].reshape(-1, off["UV"].shape[-1])[shown, :2] += np.float32(apart)
     tracer = render.Tracer(sides.exported, 2)
-    found = geometry.compare(Image(sides.traced), Image(off), sides.exported.camera, tracer.surfaces_at)
-    assert not found.passed, "\n".join(found.lines())
+    comparison = geometry.compare(Image(sides.traced), Image(off), sides.exported.camera, tracer.surfaces_at)
+    assert not comparison.passed, "\n".join(comparison.lines())
     flipped = replace(Image(sides.cycles), passes={**sides.cycles, "Normal": sides.cycles["Normal"].copy()})
     flipped["Normal"].reshape(-1, 3)[shown[len(shown) // 2]] *= -1
     assert not geometry.compare(Image(sides.traced), flipped, sides.exported.camera, tracer.surfaces_at).passed

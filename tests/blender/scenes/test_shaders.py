@@ -132,11 +132,11 @@ VALUES = [
 
 @pytest.mark.parametrize("value", VALUES)
 def test_the_stand_in_of_a_value_is_read_as_that_value(diffuse, image, value):
-    made = Material(surface=node("emission", color=value, strength=2.0))
+    material = Material(surface=node("emission", color=value, strength=2.0))
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made, {"Checks": image}))
+        materials.stand_in(overrides, diffuse, shaders.Reading(material, {"Checks": image}))
         read = exactly(diffuse)
-    assert read == made
+    assert read == material
 
 
 def test_every_node_that_makes_values_is_made_for_blender():
@@ -148,22 +148,22 @@ def test_every_node_that_makes_values_is_made_for_blender():
 
 def test_an_ies_text_is_made_for_blender_and_gone_with_the_stand_in(diffuse):
     text = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 100\n0 90\n0\n100 50\n"
-    made = Material(surface=node("emission", color=node("ies", text=text, strength=0.5)))
+    material = Material(surface=node("emission", color=node("ies", text=text, strength=0.5)))
     before = len(bpy.data.texts)
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made))
+        materials.stand_in(overrides, diffuse, shaders.Reading(material))
         read = shaders.read(diffuse)
         assert len(bpy.data.texts) == before + 1
-    assert not read.reasons and read.material == made and len(bpy.data.texts) == before
+    assert not read.reasons and read.material == material and len(bpy.data.texts) == before
 
 
 def test_a_displacement_is_read_as_the_height_that_it_is_made_of(diffuse):
     """And as what it is made into along the normal, where it is a Vector Displacement, or goes along other axes."""
     height = node("noise", vector=node("texture_coordinate"), scale=3.0)
-    made = Material(diffuse=Colour(RED), displacement=height)
+    material = Material(diffuse=Colour(RED), displacement=height)
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made))
-        assert exactly(diffuse) == made
+        materials.stand_in(overrides, diffuse, shaders.Reading(material))
+        assert exactly(diffuse) == material
         raised = next(each for each in diffuse.node_tree.nodes if each.type == "DISPLACEMENT")
         raised.space, raised.inputs["Midlevel"].default_value, raised.inputs["Scale"].default_value = "OBJECT", 0.5, 0.25
         found = exactly(diffuse).displacement
@@ -187,9 +187,9 @@ def test_curves_are_drawn_that_have_the_table_again(diffuse, image, kind, extrap
     table.pixels.foreach_set(np.append(wanted, np.ones((1, 257, 1), np.float32), axis=2).ravel())
     settings = {"table": Colour((1.0, 1.0, 1.0), "Table"), "least": -0.25, "most": 1.5, "extrapolate": extrapolate}
     value = node(kind, **{CURVES[kind]: CHECKS}, factor=0.75, **settings)
-    made = Material(surface=node("emission", color=value))
+    material = Material(surface=node("emission", color=value))
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made, {"Checks": image, "Table": table}))
+        materials.stand_in(overrides, diffuse, shaders.Reading(material, {"Checks": image, "Table": table}))
         read = shaders.read(diffuse)
     found = read.material.surface["color"]
     assert not read.reasons and {**dict(found.inputs), "table": None} == {**dict(value.inputs), "table": None}
@@ -457,9 +457,9 @@ def test_a_value_is_a_grey_and_a_colour_has_a_luminance(make_material):
 
 @pytest.fixture
 def image(fresh_blender):
-    made = bpy.data.images.new("Checks", 4, 2)
-    made.pixels.foreach_set([0.5, 0.25, 1.0, 1.0] * 8)
-    return made
+    block = bpy.data.images.new("Checks", 4, 2)
+    block.pixels.foreach_set([0.5, 0.25, 1.0, 1.0] * 8)
+    return block
 
 
 def test_an_image_and_the_meshs_colours_are_factors(diffuse, image):
@@ -513,7 +513,7 @@ def test_without_nodes_or_without_an_output_the_viewports_colour_counts(diffuse)
 
 def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image):
     """What Cycles is shown is what the tracer is given, or the shader below would be another."""
-    made = Material(
+    material = Material(
         diffuse=Colour(RED),
         emission=Colour((1.0, 2.0, 3.0)),
         mirror=Colour(GREEN),
@@ -523,21 +523,21 @@ def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image
     )
     before = [node.name for node in diffuse.node_tree.nodes]
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made))
-        assert exactly(diffuse) == made
+        materials.stand_in(overrides, diffuse, shaders.Reading(material))
+        assert exactly(diffuse) == material
     assert [node.name for node in diffuse.node_tree.nodes] == before
     assert exactly(diffuse) == Material(diffuse=Colour(RED))
 
 
 def test_products_of_colours_are_read_as_what_they_stand_for(diffuse, image):
-    made = Material(
+    material = Material(
         diffuse=Colour((0.5, 0.25, 0.0), image.name_full, closest=True, vertex=True),
         emission=Colour((4.0, 2.0, 1.0), vertex=True),
         mirror=Colour((0.5, 0.5, 0.5), image.name_full),
     )
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made, {image.name_full: image}))
-        assert exactly(diffuse) == made
+        materials.stand_in(overrides, diffuse, shaders.Reading(material, {image.name_full: image}))
+        assert exactly(diffuse) == material
 
 
 def test_the_plain_material_is_the_tracers(fresh_blender):

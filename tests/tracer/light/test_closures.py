@@ -123,14 +123,14 @@ def test_light_goes_both_ways_alike(name):
     if shader.type == "metallic":
         shader = node("metallic", **dict(shader.inputs) | {"distribution": "ggx"})
     rng = np.random.default_rng(3)
-    one, other = (rng.normal(size=(3, COUNT)) for _ in range(2))
-    for each in (one, other):
+    first, other = (rng.normal(size=(3, COUNT)) for _ in range(2))
+    for each in (first, other):
         each[2] = np.abs(each[2]) + 0.05
         each /= np.linalg.norm(each, axis=0)
     forth, back = (
         np.stack([ScatteredBy(shader, -seen[:, i], lit[:, i], np.zeros((3, 1))).light[:, 0] for i in range(COUNT)], axis=1)
         / lit[2]
-        for seen, lit in ((one, other), (other, one))
+        for seen, lit in ((first, other), (other, first))
     )
     np.testing.assert_allclose(forth, back, rtol=1e-12)
 

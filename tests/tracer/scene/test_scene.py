@@ -157,8 +157,8 @@ def test_glass_that_only_reflects_needs_paths(scene):
 
 
 def test_materials_that_nothing_shows_do_not_count(scene):
-    made = scene(Material(emission=WHITE))
-    unused = replace(made, materials=made.materials | {"Mirror": Material(mirror=WHITE)})
+    material = scene(Material(emission=WHITE))
+    unused = replace(material, materials=material.materials | {"Mirror": Material(mirror=WHITE)})
     assert least_level(unused)[0] == "direct"
 
 

@@ -31,8 +31,8 @@ def test_a_crowded_scene_anywhere_in_the_world_is_compared_to_a_thousandth_of_a_
     sides = check()
     assert sides.exported.origin == tuple(np.add(place, (6.2, -7.3, 4.123456789)))
     assert sides.exported.camera.eye == (0, 0, 0) and sides.exported.stated_camera.eye == (0, 0, 0)
-    shown = set(np.unique(sides.cycles["Object Index"]))
-    assert len(shown) >= 7, f"only the objects {shown} are in the picture"
+    present = set(np.unique(sides.cycles["Object Index"]))
+    assert len(present) >= 7, f"only the objects {present} are in the picture"
 
 
 @pytest.mark.parametrize("place", [UTM, ECEF], ids=["UTM", "ECEF"])
@@ -269,8 +269,8 @@ def test_the_command_as_its_users_type_it(look, scene, tmp_path, capfd, add_map)
     words = ["check", str(path), "--threads", "2", "--json", str(result)]
     main(words)
     plain = json.loads(result.read_text())
-    told = capfd.readouterr().out
-    assert plain["far_from_origin"]["error"] > 0.5 and plain["far_from_origin"]["sentence"] in told
+    output = capfd.readouterr().out
+    assert plain["far_from_origin"]["error"] > 0.5 and plain["far_from_origin"]["sentence"] in output
     assert main([*words, "--recenter"]) == 0
     recentred = json.loads(result.read_text())
     assert recentred["far_from_origin"] is None and recentred["origin"] == np.add(ECEF, (6.2, -7.3, 4.123456789)).tolist()
@@ -304,7 +304,7 @@ def test_materials_that_ask_where_they_are_are_the_same_on_both_sides_and_told(
         cube.pass_index = number
     add_lamp("SUN", rotation=(0.3, 0.4, 0), angle=0.0)
     exported = jobs.both_sides(Job(level="direct", samples=1, recenter=True, threads=2), [tmp_path / "0.exr"])
-    (theirs,) = (passes["Diffuse Color"] for passes in read_passes([tmp_path / "0.exr"]))
-    ours = render(exported, "direct", 1, threads=2)["Diffuse Color"]
-    assert np.percentile(np.abs(ours - theirs), 99.5) <= 1e-6 and theirs.max() > 0.01
+    (cycles_passes,) = (passes["Diffuse Color"] for passes in read_passes([tmp_path / "0.exr"]))
+    traced = render(exported, "direct", 1, threads=2)["Diffuse Color"]
+    assert np.percentile(np.abs(traced - cycles_passes), 99.5) <= 1e-6 and cycles_passes.max() > 0.01
     assert {entry.status for entry in exported.ledger if entry.object in ("Left", "Right")} == {status}
