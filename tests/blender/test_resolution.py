@@ -271,13 +271,13 @@ def plain(add_camera, scene):
 @pytest.fixture
 def square(plain, add_camera, scene):
     """A camera with one, which is not the scene's."""
-    found = add_camera("Square")
+    square_camera = add_camera("Square")
     scene.camera = plain
-    found.virtual_pinhole_picture.use = True
+    square_camera.virtual_pinhole_picture.use = True
     for name, value in SQUARE.items():
-        setattr(found.virtual_pinhole_picture, name, value)
+        setattr(square_camera.virtual_pinhole_picture, name, value)
     bpy.context.view_layer.update()
-    return found
+    return square_camera
 
 
 def activate(camera_object, scene):

@@ -289,8 +289,8 @@ def test_an_eye_on_a_keyed_location_and_a_look_at_target_go_together(rigged, sce
     camera_object.virtual_pinhole.look_at_target = empty("Target", (0, 1, 2))
     for frame, (matrix, lens) in zip(FRAMES, before, strict=True):
         scene.frame_set(frame)
-        found, now = stands(camera_object)
-        assert [row[3] for row in found] == [row[3] for row in matrix] and now == lens, f"frame {frame}"
+        eye, now = stands(camera_object)
+        assert [row[3] for row in eye] == [row[3] for row in matrix] and now == lens, f"frame {frame}"
         column, row, _ = cameras.read(camera_object, scene).project(np.array([0, 1, 2.0]))
         assert math.dist((column, row), (960, 540)) < 2e-3, f"frame {frame}"
         assert differences(camera_object, scene) == {}, f"frame {frame}"

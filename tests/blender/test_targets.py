@@ -436,17 +436,17 @@ def test_a_vertex_group_is_followed_where_blenders_own_constraints_have_it(
     follow(posed_camera, point, patch)
     assert number_of(posed_camera, point) == pytest.approx((1, 2, 3), abs=1e-6)
     setattr(posed_camera.virtual_pinhole, f"{point}_group", "Some")
-    found = [number_of(posed_camera, point)]
-    assert found[0] == pytest.approx(where_blender_has_it(), abs=1e-6)
-    assert math.dist(found[0], (1, 2, 3)) > 0.1
+    numbers = [number_of(posed_camera, point)]
+    assert numbers[0] == pytest.approx(where_blender_has_it(), abs=1e-6)
+    assert math.dist(numbers[0], (1, 2, 3)) > 0.1
     change = deform(patch, empty)
     patch.hide_viewport = is_hidden
     for share in (0.25, 1.0):
         change(share)
         update()
-        found.append(number_of(posed_camera, point))
-        assert found[-1] == pytest.approx(where_blender_has_it(), abs=1e-6)  # sums of few numbers below 8, in float32 there
-        assert math.dist(*found[-2:]) > 1e-3, "the group has not moved, and nothing is tried"
+        numbers.append(number_of(posed_camera, point))
+        assert numbers[-1] == pytest.approx(where_blender_has_it(), abs=1e-6)  # sums of few numbers below 8, in float32 there
+        assert math.dist(*numbers[-2:]) > 1e-3, "the group has not moved, and nothing is tried"
         assert is_where_stated(posed_camera, scene)
     patch.location.x = 4
     update()

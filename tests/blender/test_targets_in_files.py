@@ -81,9 +81,9 @@ def test_a_target_that_the_camera_moves_is_not_followed_and_the_panel_says_why(
         update()
     assert posed_camera.virtual_pinhole.numbers() == before
     assert is_where_stated(posed_camera, scene)
-    (said,) = targets.warnings(posed_camera)
+    (warning,) = targets.warnings(posed_camera)
     words = point.replace("_", "-")
-    assert said == f"The {words} target 'Target' {sentence}, and is not followed: choose another, or clear it"
+    assert warning == f"The {words} target 'Target' {sentence}, and is not followed: choose another, or clear it"
     assert capfd.readouterr().err == ""
 
 

@@ -34,13 +34,13 @@ class Ear:
     """A listener that keeps each event that it is told."""
 
     def __init__(self):
-        self.told = []
+        self.events = []
 
     def tell(self, event, **fields):
-        self.told.append((event, fields))
+        self.events.append((event, fields))
 
     def all(self, event):
-        return [fields for name, fields in self.told if name == event]
+        return [fields for name, fields in self.events if name == event]
 
 
 def shots(*names):
@@ -120,7 +120,7 @@ def test_what_is_killed_in_the_midst_of_a_shot_loses_nothing(stand_in, machines,
     worker = int(Path(f"/proc/{blender}/stat").read_text().rpartition(")")[2].split()[1])
     os.kill(worker if victim == "worker" else blender, signal.SIGKILL)
     batch.join(60)
-    assert outcome and outcome[0].exit_status == 0, ear.told
+    assert outcome and outcome[0].exit_status == 0, ear.events
     assert outcome[0].counts["done"] == 6 and not ear.all("shot_failed")
     assert processes.until(lambda: not processes.run(blender)), "the killed worker's Blender goes on"
     assert len([words for words in stand_in.diary("render") if words[1] == "slow_one"]) == 2
@@ -145,7 +145,7 @@ def test_a_worker_that_is_stopped_holds_no_batch_up_with_a_time_limit_or_without
         batch.join(60)
         with contextlib.suppress(ProcessLookupError):  # Dask has ended it
             os.kill(worker, signal.SIGKILL)
-    assert outcome and outcome[0].counts["done"] == 4 and not ear.all("shot_failed"), ear.told
+    assert outcome and outcome[0].counts["done"] == 4 and not ear.all("shot_failed"), ear.events
     assert len({words[-1] for words in stand_in.diary("render") if words[1] == "slow_one"}) == 2
 
 

@@ -30,12 +30,12 @@ def import_(path, **options):
     return bpy.ops.viewcam.import_cameras(filepath=str(path), **options)
 
 
-def assert_same(found, wanted, points=((0, 0, 0), (1, 2, 1), (-2, 1, 2))):
+def assert_same(actual, wanted, points=((0, 0, 0), (1, 2, 1), (-2, 1, 2))):
     """The picture of both, within what float32 makes of a pose, a lens and a shift."""
-    assert (found.width, found.height, found.mirrored) == (wanted.width, wanted.height, wanted.mirrored)
-    ours, theirs = (np.array(each.project(np.array(points, dtype=float)))[:2] for each in (found, wanted))
+    assert (actual.width, actual.height, actual.mirrored) == (wanted.width, wanted.height, wanted.mirrored)
+    projected, expected = (np.array(each.project(np.array(points, dtype=float)))[:2] for each in (actual, wanted))
     # 24 bits of coordinates up to 10 seen from 5, times a distance of 600 pixels, a few roundings.
-    assert np.abs(ours - theirs).max() < 16 * 600 * 2.0**-24 * 2
+    assert np.abs(projected - expected).max() < 16 * 600 * 2.0**-24 * 2
 
 
 def write_picture(path, size=(8, 4)):
@@ -73,10 +73,10 @@ def test_without_being_asked_the_scene_keeps_size_and_camera_and_is_told_what_di
 def test_a_mirrored_camera_has_a_negative_scale_unless_it_is_left(scene, tmp_path, capfd):
     formats.save(around(1, mirrored=True), tmp_path / "one.json", "text")
     import_(tmp_path / "one.json", set_size=True)
-    found = scene.camera
-    assert found.scale[0] < 0 and cameras.read(found, scene).mirrored
+    camera_object = scene.camera
+    assert camera_object.scale[0] < 0 and cameras.read(camera_object, scene).mirrored
     import_(tmp_path / "one.json", unmirrored=True)
-    (other,) = [each for each in bpy.data.objects if each != found]
+    (other,) = [each for each in bpy.data.objects if each != camera_object]
     assert not cameras.read(other, scene).mirrored
     assert "is mirrored, and was taken without that" in capfd.readouterr().out
 
@@ -87,8 +87,8 @@ def test_pictures_are_backgrounds_where_they_are_found_and_told_where_not(scene,
     for i in (0, 2):
         write_picture(tmp_path / "images" / f"view_{i:03}.png")
     import_(tmp_path / "sparse" / "0")
-    shown = [[each.image.name for each in block.data.background_images] for block in bpy.data.collections["0"].objects]
-    assert shown == [["view_000.png"], [], ["view_002.png"]]
+    image_names = [[each.image.name for each in block.data.background_images] for block in bpy.data.collections["0"].objects]
+    assert image_names == [["view_000.png"], [], ["view_002.png"]]
     assert "1 of 3 pictures were not found" in capfd.readouterr().out
 
 
@@ -109,8 +109,8 @@ def test_polycams_picture_is_found_from_whichever_folder_is_imported(tmp_path):
     (folder / "123.jpg").touch()
     (camera,) = around(1)
     camera = Camera(camera.name, camera.pinhole, image="keyframes/images/123.jpg")
-    for given in (tmp_path, tmp_path / "keyframes", tmp_path / "keyframes" / "cameras"):
-        assert naming.picture_of(camera, given) == folder / "123.jpg"
+    for path in (tmp_path, tmp_path / "keyframes", tmp_path / "keyframes" / "cameras"):
+        assert naming.picture_of(camera, path) == folder / "123.jpg"
 
 
 def test_an_fspy_project_brings_its_picture(scene, tmp_path):
@@ -264,10 +264,10 @@ def test_a_photograph_is_shown_without_its_lens_and_fits_the_scene_to_its_corner
     assert import_(tmp_path, set_size=True) == {"FINISHED"}
     (block,) = bpy.data.collections[tmp_path.name].objects
     (background,) = block.data.background_images
-    shown = background.image
-    width, height = shown.size
-    assert width / height == pytest.approx(640 / 360, rel=1e-4) and shown.packed_file
-    pixels = np.array(shown.pixels[:]).reshape(height, width, 4)[::-1, :, 0]
+    background_image = background.image
+    width, height = background_image.size
+    assert width / height == pytest.approx(640 / 360, rel=1e-4) and background_image.packed_file
+    pixels = np.array(background_image.pixels[:]).reshape(height, width, 4)[::-1, :, 0]
     across, down = np.meshgrid((np.arange(width) + 0.5) * 640 / width, (np.arange(height) + 0.5) * 360 / height)
     errors = []
     for x, y in zip(column, row, strict=True):

@@ -279,11 +279,11 @@ def test_what_a_format_can_not_say_is_one_sentence(posed_camera):
 def test_pixels_of_another_aspect_are_told_and_set_if_that_is_asked_for(posed_camera, scene, capfd):
     text = SHIFTED.replace('"distance": 600', '"distance": [600, 450]').replace("640", "1920").replace("360", "1080")
     paste(text)
-    said = "The camera is for 1920 × 1080 pixels of aspect 0.75 and the scene renders 1920 × 1080 of aspect 1"
-    assert said in capfd.readouterr().out
+    message = "The camera is for 1920 × 1080 pixels of aspect 0.75 and the scene renders 1920 × 1080 of aspect 1"
+    assert message in capfd.readouterr().out
     assert cameras.read(posed_camera, scene).distance == pytest.approx((600, 600), rel=2.0**-22)
     paste(text, set_size=True)
-    assert said not in capfd.readouterr().out
+    assert message not in capfd.readouterr().out
     assert scene.render.pixel_aspect_y / scene.render.pixel_aspect_x == pytest.approx(4 / 3, rel=2.0**-23)
     assert cameras.read(posed_camera, scene).distance == pytest.approx((600, 450), rel=2.0**-22)
 

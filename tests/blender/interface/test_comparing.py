@@ -120,8 +120,8 @@ def state(scene):
     blocks += [camera_object, camera_object.data, camera_object.virtual_pinhole]
     collections = [prop.identifier for prop in bpy.data.bl_rna.properties if prop.type == "COLLECTION"]
     counts = {name: len(getattr(bpy.data, name)) for name in collections}
-    found = {f"{type(block).__name__} {name}": value for block in blocks for name, value in values_of(block).items()}
-    return found | counts | {"file": bpy.data.filepath, "dirty": bpy.data.is_dirty}
+    result = {f"{type(block).__name__} {name}": value for block in blocks for name, value in values_of(block).items()}
+    return result | counts | {"file": bpy.data.filepath, "dirty": bpy.data.is_dirty}
 
 
 def changed(before, after):
@@ -132,14 +132,14 @@ def changed(before, after):
 def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
     seen.objects["Suzanne"].location.x = 0.25  # an edit that nobody has saved
     before = state(seen)
-    comparison, told = comparing.RunningComparison(seen.camera, seen), []
+    comparison, lines = comparing.RunningComparison(seen.camera, seen), []
     while (outcome := comparison.poll()) is None:
-        told.append(comparison.progress())
+        lines.append(comparison.progress())
         time.sleep(0.01)
     assert changed(before, state(seen)) == {}
     assert outcome.answer == SAME and outcome.verdict.startswith("The same picture: over "), outcome.verdict
-    assert [share for share, _ in told] == sorted(share for share, _ in told) and told[0][0] == 0
-    assert told[0][1] == "Rendering with Cycles" and told[-1][1] == "Comparing"
+    assert [share for share, _ in lines] == sorted(share for share, _ in lines) and lines[0][0] == 0
+    assert lines[0][1] == "Rendering with Cycles" and lines[-1][1] == "Comparing"
     rows = dict(outcome.rows)
     assert rows["Median"].endswith(" px") and "Mismatches" in rows and rows["Modelled"] == "1 of 1 objects"
     assert outcome.report.is_file() and all(path.is_file() for path in outcome.pictures.values()) and outcome.colours
@@ -215,13 +215,13 @@ def test_cancelled_while_it_renders_it_leaves_no_process_and_no_file(seen):
 
 def test_its_steps_tell_how_far_it_is(stand_in):
     comparison = stand_in()
-    told = [comparison.progress()]
+    lines = [comparison.progress()]
     for steps, name in ((1, "cycles.exr"), (2, "scene.json"), (3, "reference.exr")):
         comparison.let(steps)
         wait_for((comparison.folder / "report" / name).exists)
-        told.append(comparison.progress())
+        lines.append(comparison.progress())
     words = ["Rendering with Cycles", "Rendering with Cycles", "Tracing", "Comparing"]
-    assert told == list(zip((0, 0, 1 / 3, 2 / 3), words, strict=True))
+    assert lines == list(zip((0, 0, 1 / 3, 2 / 3), words, strict=True))
     assert comparison.poll() is None
     comparison.let(8)
     outcome = wait_for(comparison.poll)
@@ -232,12 +232,12 @@ def test_its_steps_tell_how_far_it_is(stand_in):
 def test_light_is_rendered_in_pictures_that_are_counted(stand_in):
     comparison = stand_in(level="path", samples=64)
     assert comparison.progress() == (0, "Rendering with Cycles, 1 of 8")
-    with open(comparison.folder / "said.txt", "a", encoding="utf-8") as said:
-        said.write('{"event": "step", "name": "rendering", "number": 4, "of": 8}\n')
-        said.flush()
+    with open(comparison.folder / "said.txt", "a", encoding="utf-8") as log:
+        log.write('{"event": "step", "name": "rendering", "number": 4, "of": 8}\n')
+        log.flush()
         assert comparison.progress() == (3 / 10, "Rendering with Cycles, 4 of 8")
-        said.write('{"event": "step", "name": "tracing"}\n{"event": "progress", "share": 0.25}\n{"event": "pro')
-        said.flush()
+        log.write('{"event": "step", "name": "tracing"}\n{"event": "progress", "share": 0.25}\n{"event": "pro')
+        log.flush()
         assert comparison.progress() == (8.25 / 10, "Tracing"), "half a line is on its way"
     comparison.cancel()
 
@@ -316,7 +316,7 @@ def test_a_child_that_dies_is_told_with_its_last_words(monkeypatch, seen):
 
 
 @pytest.mark.parametrize(
-    ("said", "status", "sentence"),
+    ("output", "status", "sentence"),
     [
         ('traced\n{"event": "error", "text": "out.exr can\'t be written"}\nleft\n', 2, "Out.exr can't be written"),
         ('{"event": "error", "text": "l.json: one problem", "problems": ["shot 1: no EEVEE"]}', 2, "Shot 1: no EEVEE"),
@@ -325,8 +325,8 @@ def test_a_child_that_dies_is_told_with_its_last_words(monkeypatch, seen):
         ("first\n\n last \n", -9, "The process that compares was ended by signal 9 after saying: last"),
     ],
 )
-def test_the_sentence_is_the_childs_own_where_it_has_one(said, status, sentence):
-    assert comparing.failure(said, status) == sentence
+def test_the_sentence_is_the_childs_own_where_it_has_one(output, status, sentence):
+    assert comparing.failure(output, status) == sentence
 
 
 @pytest.mark.parametrize(
@@ -408,5 +408,5 @@ def test_the_copy_finds_what_the_file_finds_and_the_file_keeps_its_ways(seen, tm
     assert sorted(each.name for each in tmp_path.iterdir()) == ["elsewhere", "picture.png", "scene.blend"]
     bpy.ops.wm.open_mainfile(filepath=str(folder / "copy.blend"))
     assert bpy.data.objects["Suzanne"].location.x == 3
-    found = bpy.data.images["Picture"].filepath
-    assert os.path.samefile(bpy.path.abspath(found), tmp_path / "picture.png")
+    image_path = bpy.data.images["Picture"].filepath
+    assert os.path.samefile(bpy.path.abspath(image_path), tmp_path / "picture.png")

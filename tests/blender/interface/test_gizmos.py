@@ -45,7 +45,7 @@ def everything(camera_object):
     return result
 
 
-def told(camera_object, scene):
+def check_messages(camera_object, scene):
     return cameras.check(camera_object, cameras.stated(camera_object, scene), scene)
 
 
@@ -54,7 +54,7 @@ def test_a_dragged_point_is_where_the_handle_is(posed_camera, scene, steps, name
     assert gizmos.place(posed_camera, name) == tuple(getattr(posed_camera.virtual_pinhole, name))
     gizmos.drag(posed_camera, name, ELSEWHERE)
     assert tuple(getattr(posed_camera.virtual_pinhole, name)) == gizmos.place(posed_camera, name) == ELSEWHERE
-    assert told(posed_camera, scene) == []
+    assert check_messages(posed_camera, scene) == []
 
 
 def test_a_dragged_up_points_to_the_handle_and_keeps_its_length(posed_camera, scene, steps):
@@ -65,7 +65,7 @@ def test_a_dragged_up_points_to_the_handle_and_keeps_its_length(posed_camera, sc
     arrow = np.subtract(ELSEWHERE, eye)
     # float32: three components, each rounded by 2⁻²⁴ of its size.
     np.testing.assert_allclose(up, 2.5 * arrow / np.linalg.norm(arrow), rtol=2**-24)
-    assert told(posed_camera, scene) == []
+    assert check_messages(posed_camera, scene) == []
     tip = gizmos.place(posed_camera, "up")
     assert math.dist(tip, eye) == pytest.approx(math.dist(diagram.up_tip(*group.numbers()[:2], (0, 0, 1), group.plane_at), eye))
 
@@ -171,7 +171,7 @@ def test_values_that_make_no_camera_can_be_dragged_apart(posed_camera, scene, st
     group.look_at = group.eye
     assert gizmos.place(posed_camera, "up") is None
     gizmos.drag(posed_camera, "look_at", ELSEWHERE)
-    assert told(posed_camera, scene) == []
+    assert check_messages(posed_camera, scene) == []
 
 
 def test_there_are_no_handles_where_there_is_no_viewport(posed_camera):

@@ -690,9 +690,9 @@ def test_the_picture_shows_all_that_the_viewport_shows_and_no_more_than_it_must(
     pinhole, region = viewport.pinhole_of(area, like, scene), region_of(area)
     assert pinhole.distance[1] == ratio * pinhole.distance[0]
     larger = max(region.width, region.height)
-    shown = np.array([region.width / larger, region.height / larger])  # tangents: 45° to the larger side
+    half_angles = np.array([region.width / larger, region.height / larger])  # tangents: 45° to the larger side
     pictured = np.array(size) / 2 / pinhole.distance
-    assert (pictured / shown).min() == pytest.approx(1, rel=1e-15)
+    assert (pictured / half_angles).min() == pytest.approx(1, rel=1e-15)
 
 
 def test_a_tilted_view_takes_its_own_up(area, scene):

@@ -125,11 +125,11 @@ def test_an_up_in_doubt_comes_with_a_better_one_and_a_certain_one_does_not(posed
 
 
 def test_the_camera_datas_panel_stays_away_from_the_data_of_a_lamp(posed_camera):
-    shown = [
+    rows = [
         panel.VIEWCAM_PT_data.poll(SimpleNamespace(camera=data, active_object=posed_camera))
         for data in (posed_camera.data, None)
     ]
-    assert shown == [True, False]
+    assert rows == [True, False]
 
 
 class Layout:
@@ -306,9 +306,9 @@ def fields():
 @pytest.mark.parametrize("name", BLENDERS)
 def test_a_field_is_dragged_and_shown_as_blenders_own_of_its_kind(fresh_blender, name):
     """A drag goes by the step, and the digits are the precision: as in the field beside which an artist learned it."""
-    owner, theirs = BLENDERS[name]
-    ours, theirs = fields()[name], owner.bl_rna.properties[theirs]
-    assert (ours.step, ours.precision, ours.unit) == (theirs.step, theirs.precision, theirs.unit)
+    owner, blender_name = BLENDERS[name]
+    own, blender_name = fields()[name], owner.bl_rna.properties[blender_name]
+    assert (own.step, own.precision, own.unit) == (blender_name.step, blender_name.precision, blender_name.unit)
 
 
 def test_the_lens_in_pixels_is_dragged_about_as_far_as_in_millimeters(fresh_blender):
@@ -357,7 +357,7 @@ def test_in_the_narrowest_sidebar_no_name_stands_beside_its_field(posed_camera, 
     scene.collection.objects.link(block)
     posed_camera.virtual_pinhole.look_at_target = block
     wide, narrow = (drawn(panel.VIEWCAM_PT_sidebar, width) for width in (300, NARROWEST))
-    fields = [[each[1] for each in found if each[0].startswith("prop")] for found in (wide, narrow)]
+    fields = [[each[1] for each in widgets if each[0].startswith("prop")] for widgets in (wide, narrow)]
     assert sorted(fields[0]) == sorted(fields[1]), "a field is missing"
     assert ("label", "Roll") in [each[:2] for each in wide]
     lacking = {"ENUM", "POINTER", "STRING"}  # what has no room for its name inside
@@ -384,8 +384,8 @@ def test_what_can_be_keyed_has_its_dot_however_narrow_the_panel_is(posed_camera,
     for posed_camera.virtual_pinhole.pole in ("CANONICAL", "HOLD"):
         for posed_camera.virtual_pinhole.lens_unit in ("MILLIMETERS", "PIXELS"):
             for part, least in ((each, {"eye", "look_at", "up"}), (panel.VIEWCAM_PT_sidebar_options, {"zoom"})):
-                shown = {name for kind, name, *_ in drawn(part) if kind == "prop" and name != "name"}
-                keyed = {name for name in shown if fields()[name].is_animatable}
+                names = {name for kind, name, *_ in drawn(part) if kind == "prop" and name != "name"}
+                keyed = {name for name in names if fields()[name].is_animatable}
                 assert least <= keyed
                 for width in (300, 249, NARROWEST):
                     assert keyed <= keyed_by_a_dot(part, width), f"at {width} pixels"
@@ -526,8 +526,8 @@ def test_each_read_out_has_a_button_that_copies_it(posed_camera):
 
 
 def test_the_tooltip_of_a_copy_button_shows_what_is_copied():
-    said = SimpleNamespace(label="u", text="(1.0, 0.0, 0.0)")
-    described = clipboard.VIEWCAM_OT_copy_readout.description(bpy.context, said)
+    button = SimpleNamespace(label="u", text="(1.0, 0.0, 0.0)")
+    described = clipboard.VIEWCAM_OT_copy_readout.description(bpy.context, button)
     assert described == f"{clipboard.VIEWCAM_OT_copy_readout.bl_description}: (1.0, 0.0, 0.0)"
     assert bpy.ops.viewcam.copy_readout(label="u", text="(1.0, 0.0, 0.0)") == {"FINISHED"}
 
@@ -602,11 +602,11 @@ def test_everything_that_blender_shows_is_spelled_as_blender_spells():
         kind = getattr(bpy.types, name, None)
         if not getattr(kind, "__module__", "").startswith("viewcam_addon"):
             continue
-        said = [getattr(kind, key, "") for key in ("bl_label", "bl_description")]
+        texts = [getattr(kind, key, "") for key in ("bl_label", "bl_description")]
         for each in kind.bl_rna.properties:
-            said += [each.name, each.description]
-            said += [text for item in getattr(each, "enum_items", ()) for text in (item.name, item.description)]
-        words = {word for text in said for word in re.findall(r"[^\W_]+", text or "") if BRITISH.search(word)}
+            texts += [each.name, each.description]
+            texts += [text for item in getattr(each, "enum_items", ()) for text in (item.name, item.description)]
+        words = {word for text in texts for word in re.findall(r"[^\W_]+", text or "") if BRITISH.search(word)}
         result |= {name: wrong} if (wrong := {word for word in words if word.lower() not in AMERICAN_TOO}) else {}
     assert result == {}
 
@@ -629,12 +629,12 @@ written = json.loads(pathlib.Path(sys.argv[1]).read_text())
 
 @pytest.fixture
 def settings(fresh_blender, tmp_path):
-    found = bpy.context.window_manager.virtual_pinhole_labels
-    found.folder = str(tmp_path / "out")
-    yield found
+    group = bpy.context.window_manager.virtual_pinhole_labels
+    group.folder = str(tmp_path / "out")
+    yield group
     labels.background.end()
     for name in ("kinds", "depth_steps", "folder"):
-        found.property_unset(name)
+        group.property_unset(name)
 
 
 @pytest.fixture
@@ -719,13 +719,13 @@ def test_nothing_is_left_of_it_without_the_add_on(registered_addon):
 @pytest.mark.exhaustive
 def test_the_files_that_the_panel_shows_are_those_that_are_written(settings, monkey):
     settings.kinds = {kind.upper() for kind in KINDS}
-    shown = labels.file_names(bpy.context.scene.camera, settings.chosen())
+    file_names = labels.file_names(bpy.context.scene.camera, settings.chosen())
     assert bpy.ops.viewcam.write_labels() == {"FINISHED"}
     folder, _ = labels.background.latest
     of_the_batch = {"summary.json", "contact-sheet.html"}
-    assert {path.name for path in folder.glob("[!.]*")} - of_the_batch == set(shown)
-    told = label_files.read(folder / shown[-1])
-    assert "Suzanne" in {each["name"] for each in told["instances"]} and told["lost"] == {"forward": [], "backward": []}
+    assert {path.name for path in folder.glob("[!.]*")} - of_the_batch == set(file_names)
+    document = label_files.read(folder / file_names[-1])
+    assert "Suzanne" in {each["name"] for each in document["instances"]} and document["lost"] == {"forward": [], "backward": []}
 
 
 # --- The render engine's panels, and those of Blender that it takes over: all gone with the add-on
@@ -794,8 +794,8 @@ def test_what_the_lamps_panel_shows_is_there_and_named_once(scene, kind):
 def test_passes_in_the_panel_are_those_that_the_tracer_computes(scene):
     layer = scene.view_layers[0]
     assert not [name for name in SETTINGS.values() if not hasattr(layer, name)]
-    shown = {name for names in (render_panels.GEOMETRY_PASSES, render_panels.LIGHT_PASSES) for name in names}
-    assert set(SETTINGS) <= shown
+    pass_names = {name for names in (render_panels.GEOMETRY_PASSES, render_panels.LIGHT_PASSES) for name in names}
+    assert set(SETTINGS) <= pass_names
 
 
 # --- Operators

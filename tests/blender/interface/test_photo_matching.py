@@ -26,9 +26,9 @@ def seen(*points):
 @pytest.fixture
 def settings(fresh_blender):
     yield fresh_blender.context.window_manager.virtual_pinhole_match
-    found = fresh_blender.context.window_manager.virtual_pinhole_match
+    group = fresh_blender.context.window_manager.virtual_pinhole_match
     for name in ("kind", "axes", "sides", "precision", "is_lens_known", "length"):
-        found.property_unset(name)
+        group.property_unset(name)
 
 
 class Hand:
@@ -156,8 +156,8 @@ def test_a_rectangle_of_known_sides_at_the_cursor_gives_all_of_the_camera(posed_
     bpy.context.view_layer.update()
     pinhole = cameras.read(posed_camera, scene)
     assert np.allclose(pinhole.eye, PHOTO.eye, atol=1e-4) and pinhole.distance[0] == pytest.approx(1800, rel=1e-5)
-    told = photo_matching.summary_of(hand.operator.result, posed_camera.data.lens)
-    assert told[0].startswith("33.75 mm ± ") and "eye ±" in told[1]
+    lines = photo_matching.summary_of(hand.operator.result, posed_camera.data.lens)
+    assert lines[0].startswith("33.75 mm ± ") and "eye ±" in lines[1]
 
 
 def test_objects_of_known_place_are_dragged_to_where_the_picture_shows_them(posed_camera, scene, settings, empty):

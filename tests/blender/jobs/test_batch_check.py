@@ -235,9 +235,11 @@ def test_verdicts_are_to_the_last_digit_those_of_a_batch_that_is_resumed(stage, 
 def test_a_check_gives_back_all_that_it_changes(stage, batch):
     def state():
         owners = [stage.render, stage.cycles, stage.render.image_settings, bpy.context.view_layer, stage.camera.data.dof]
-        told = [{prop.identifier: str(getattr(owner, prop.identifier)) for prop in owner.bl_rna.properties} for owner in owners]
+        properties = [
+            {prop.identifier: str(getattr(owner, prop.identifier)) for prop in owner.bl_rna.properties} for owner in owners
+        ]
         indices = [block.pass_index for blocks in (bpy.data.objects, bpy.data.materials) for block in blocks]
-        return told, indices, stage.camera.name, len(bpy.data.scenes), len(bpy.data.materials)
+        return properties, indices, stage.camera.name, len(bpy.data.scenes), len(bpy.data.materials)
 
     before = state()
     batch(LEFT)
@@ -305,8 +307,8 @@ def test_a_render_border_is_checked_as_the_picture_has_it(stage, batch, crop):
 
 def test_a_mirrored_camera_of_the_file_passes_as_what_it_is(stage, batch):
     stage.camera.scale = (-1, 1, 1)
-    said, _, _ = batch(Job("mirrored", camera="Camera"))["mirrored"]
-    assert said["camera"]["mirrored"] and said["check"]["passed"], said["check"]
+    record, _, _ = batch(Job("mirrored", camera="Camera"))["mirrored"]
+    assert record["camera"]["mirrored"] and record["check"]["passed"], record["check"]
 
 
 def test_a_picture_of_a_few_pixels_passes(stage, batch):
@@ -319,8 +321,8 @@ def test_what_both_sides_leave_out_is_told_in_a_few_words(stage, batch):
     for number in range(8):
         curve = bpy.data.objects.new(f"Hair {number}", bpy.data.hair_curves.new("Hair"))
         stage.collection.objects.link(curve)
-    told = verdicts(batch(LEFT))["left"]["ledger"]
-    assert len(told) == 6 and "hair and curves" in told[0] and told[-1] == "and 4 more, which viewcam check tells", told
+    ledger = verdicts(batch(LEFT))["left"]["ledger"]
+    assert len(ledger) == 6 and "hair and curves" in ledger[0] and ledger[-1] == "and 4 more, which viewcam check tells", ledger
 
 
 def test_the_camera_of_a_shot_by_eevee_is_checked_with_cycles(stage, tracing):

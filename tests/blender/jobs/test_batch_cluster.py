@@ -58,13 +58,13 @@ class Ear:
     """A listener that keeps each event that it is told."""
 
     def __init__(self):
-        self.told = []
+        self.events = []
 
     def tell(self, event, **fields):
-        self.told.append((event, fields))
+        self.events.append((event, fields))
 
     def shots(self, event):
-        return [fields["shot"] for name, fields in self.told if name == event]
+        return [fields["shot"] for name, fields in self.events if name == event]
 
 
 @pytest.fixture(scope="module")
@@ -139,19 +139,19 @@ class Batch:
 
     def summary(self):
         self._thread.join(WAITS)
-        assert self._outcome, self.ear.told
+        assert self._outcome, self.ear.events
         return self._outcome[0]
 
 
 def test_whoever_is_killed_the_files_are_those_of_one_process_and_each_worker_loads_once(blend, alone, tmp_path):
     with cluster.opened(None, 2, bpy.app.binary_path or None) as machines:
         batch = Batch(machines, blend, alone, tmp_path / "out")
-        assert batch.has_done(1), batch.ear.told
+        assert batch.has_done(1), batch.ear.events
         first = batch.workers()
         assert [len(blenders) for blenders in first.values()] == [1, 1], f"a Blender for each worker, not {first}"
 
         worker, blender = batch.hold_the_slow_shot()
-        assert batch.has_done(len(SHOTS) - 1) and "slow" not in batch.ear.shots("shot_done"), batch.ear.told
+        assert batch.has_done(len(SHOTS) - 1) and "slow" not in batch.ear.shots("shot_done"), batch.ear.events
         assert batch.workers() == first, "a Blender was started again, though nobody had ended one"
         os.kill(blender, signal.SIGKILL)
         assert until(lambda: [each for each in children_of(worker) if each != blender]), "Blender is not started again"

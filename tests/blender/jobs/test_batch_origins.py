@@ -147,9 +147,9 @@ def test_the_versions_count(open_file, add_camera):
     add_camera()
     open_file()
     with BlenderRenderer() as renderer:
-        told = renderer.made_from()
-    assert set(told["versions"]) == {"blender", "viewcam"}
-    assert told["versions"]["viewcam"].count(".") == 2
+        sources = renderer.made_from()
+    assert set(sources["versions"]) == {"blender", "viewcam"}
+    assert sources["versions"]["viewcam"].count(".") == 2
 
 
 def test_two_files_of_one_name_that_swap_their_contents_are_other_files(open_file, picture, tmp_path):
@@ -190,7 +190,7 @@ def importing(fresh_blender, tmp_path):
         modifier = bpy.context.object.modifiers.new("Nodes", "NODES")
         tree = modifier.node_group = bpy.data.node_groups.new("Tree", "GeometryNodeTree")
         tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-        where, said = (tree, modifier)
+        where, operator = (tree, modifier)
         if way == "group in a group":
             inner = bpy.data.node_groups.new("Inner", "GeometryNodeTree")
             inner.interface.new_socket("Path", in_out="INPUT", socket_type="NodeSocketString")
@@ -207,7 +207,7 @@ def importing(fresh_blender, tmp_path):
             reroute = tree.nodes.new("NodeReroute")
             tree.links.new(tree.nodes.new("NodeGroupInput").outputs[0], reroute.inputs[0])
             tree.links.new(reroute.outputs[0], node.inputs[0])
-            set_input(said, socket.identifier, "//mesh.ply")
+            set_input(operator, socket.identifier, "//mesh.ply")
         elif way == "string node":
             text = tree.nodes.new("FunctionNodeInputString")
             text.string = str(tmp_path / "mesh.ply")

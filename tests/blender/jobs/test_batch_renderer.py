@@ -150,8 +150,8 @@ def test_the_four_values_are_the_camera_to_float32(stage, shoot):
     assert stated == Pinhole(LEFT.eye, LEFT.look_at, LEFT.up, LEFT.d, 32, 18)
     assert (pinhole.width, pinhole.height) == (32, 18)
     assert pinhole.eye == pytest.approx(stated.eye, abs=4 * 2**-24)  # coordinates below 8, each rounded to float32 once
-    for ours, theirs in zip(pinhole.basis(), stated.basis(), strict=True):
-        assert ours == pytest.approx(theirs, abs=1.6e-7)  # of a matrix entry: blender/camera.py
+    for actual, expected in zip(pinhole.basis(), stated.basis(), strict=True):
+        assert actual == pytest.approx(expected, abs=1.6e-7)  # of a matrix entry: blender/camera.py
     assert pinhole.distance == pytest.approx(stated.distance, rel=2**-22)  # lens, sensor and their quotient in float32
     json.dumps(record, allow_nan=False)
 
@@ -488,15 +488,15 @@ def taken(folder, name):
 def close(have, wanted):
     """As Blender's float32 numbers have it: half a dozen roundings of 2⁻²⁴ of lengths of 10 seen from 10."""
     points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
-    ours, theirs = have.project(points), wanted.project(points)
-    error = np.hypot(ours[0] - theirs[0], ours[1] - theirs[1]).max()
+    actual, expected = have.project(points), wanted.project(points)
+    error = np.hypot(actual[0] - expected[0], actual[1] - expected[1]).max()
     assert error < 16 * 2.0**-24 * max(*wanted.distance, wanted.width), f"{error:.3g} pixels"
     assert (have.width, have.height, have.mirrored) == (wanted.width, wanted.height, wanted.mirrored)
 
 
 def test_a_colmap_model_is_rendered_camera_by_camera_and_comes_back(blend, tmp_path):
-    given = [Camera(name, pinhole) for name, pinhole in GIVEN.items()]
-    cameras.save(given, tmp_path / "model", "colmap")
+    given_cameras = [Camera(name, pinhole) for name, pinhole in GIVEN.items()]
+    cameras.save(given_cameras, tmp_path / "model", "colmap")
     out = tmp_path / "out"
     assert cli.main(["batch", str(blend), str(tmp_path / "model"), "--out", str(out), "--transforms"]) == 0
     for name, pinhole in GIVEN.items():

@@ -111,10 +111,10 @@ def read_transforms(folder):
     document = json.loads((folder / "transforms.json").read_text())
     cameras = {}
     for frame in document["frames"]:
-        said = document | frame
-        to_camera = np.diag([1.0, -1.0, -1.0, 1.0]) @ np.linalg.inv(said["transform_matrix"])
-        f, c, size = (said["fl_x"], said["fl_y"]), (said["cx"], said["cy"]), (said["w"], said["h"])
-        cameras[said["file_path"]] = Camera(to_camera[:3], f, c, size)
+        values = document | frame
+        to_camera = np.diag([1.0, -1.0, -1.0, 1.0]) @ np.linalg.inv(values["transform_matrix"])
+        f, c, size = (values["fl_x"], values["fl_y"]), (values["cx"], values["cy"]), (values["w"], values["h"])
+        cameras[values["file_path"]] = Camera(to_camera[:3], f, c, size)
     return cameras
 
 
@@ -126,9 +126,9 @@ def read_colmap(folder):
     }
     lenses = {}
     for line in filter(None, lines["cameras"]):
-        number, model, width, height, *said = line.split(" ")
-        said = [*map(float, said)]
-        f, c = {"SIMPLE_PINHOLE": (said[:1] * 2, said[1:]), "PINHOLE": (said[:2], said[2:])}[model]
+        number, model, width, height, *parameters = line.split(" ")
+        parameters = [*map(float, parameters)]
+        f, c = {"SIMPLE_PINHOLE": (parameters[:1] * 2, parameters[1:]), "PINHOLE": (parameters[:2], parameters[2:])}[model]
         lenses[number] = tuple(f), tuple(c), (int(width), int(height))
     cameras = {}
     for line in lines["images"][0::2]:
@@ -160,12 +160,12 @@ def look(path):
     picture.colorspace_settings.name = "Non-Color"
     (width, height), flat = picture.size, np.empty(picture.size[0] * picture.size[1] * picture.channels, np.float32)
     picture.pixels.foreach_get(flat)
-    shown = flat.reshape(height, width, -1)[::-1, :, :3].astype(float)
+    pixels = flat.reshape(height, width, -1)[::-1, :, :3].astype(float)
     bpy.data.images.remove(picture)
-    return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+    return np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4)
 
 
-def found(picture):
+def ball_centers(picture):
     """(n, 2) centers of weight of the balls, in the order of BALLS: column and row, pixel centers at + 0.5."""
     height, width, _ = picture.shape
     columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
@@ -196,7 +196,7 @@ def hold(cameras, pictures):
     for name, camera in cameras.items():
         height, width, _ = pictures[name].shape
         assert camera.size == (width, height), f"{name} has {width} × {height} pixels and not {camera.size}"
-        miss = np.linalg.norm(camera.project([*BALLS.values()]) - found(pictures[name]), axis=-1)
+        miss = np.linalg.norm(camera.project([*BALLS.values()]) - ball_centers(pictures[name]), axis=-1)
         worst = int(np.argmax(miss - beside(camera)))
         assert (miss <= CLOSE + beside(camera)).all(), f"{name}: {[*BALLS][worst]} is {miss[worst]:.2f} pixels off"
 

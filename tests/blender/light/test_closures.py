@@ -156,13 +156,13 @@ def of_layers_below_sheen():
         yield PRINCIPLED, sheen | {"Coat Weight": 0.6, "Coat Roughness": 0.3}, {}
 
 
-def check(found, shaders, figures):
-    told = [
+def check(errors, shaders, figures):
+    summary = [
         f"{kind} {inputs} {properties}: p50 {np.median(each):.1e}, p99 {np.quantile(each, 0.99):.1e}, most {each.max():.1e}"
-        for each, (kind, inputs, properties) in zip(found, shaders, strict=True)
+        for each, (kind, inputs, properties) in zip(errors, shaders, strict=True)
         if not (np.median(each) <= figures[0] and np.quantile(each, 0.99) <= figures[1])
     ]
-    assert not told, "\n".join(told)
+    assert not summary, "\n".join(summary)
 
 
 def test_lobes_are_cycles_to_float32(patches):
@@ -194,8 +194,8 @@ def test_sheen_is_cycles_where_a_smooth_normal_is_turned_away(pictures, painted,
         ball.materials.clear()
         ball.materials.append(painted(*shader))
         (sides,) = pictures(scenes=1)
-        ours, theirs = (passes["Diffuse Color"][..., :3] for passes in (sides.traced, sides.cycles[0]))
-        assert np.abs(ours - theirs).max() <= TABLES[1], shader
+        traced, cycles = (passes["Diffuse Color"][..., :3] for passes in (sides.traced, sides.cycles[0]))
+        assert np.abs(traced - cycles).max() <= TABLES[1], shader
 
 
 def test_what_lies_below_sheen_is_cycles_to_the_tables(patches):

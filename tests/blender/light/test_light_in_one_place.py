@@ -59,11 +59,11 @@ def test_light_on_surfaces_in_one_place_is_taken_out_and_named(room, tmp_path, r
     assert not compared(replace(exported, lamps=brighter), level, tests, exported).passed
 
 
-def compared(scene, level, tests, told=None):
+def compared(scene, level, tests, known=None):
     """The comparison with a scene's own picture, which is said to be of another."""
     passes = render.render(scene, level, 64, threads=2)
     reference = Image(passes, scene.camera, {"samples": "64", "level": level, "albedo tables": "yes"})
-    return api.compare(reference, tests, told or scene, 2, 16)
+    return api.compare(reference, tests, known or scene, 2, 16)
 
 
 def hidden_from_scattered_rays(sheet):

@@ -90,11 +90,11 @@ def graphs(image, straight):
     result["a constant colour as a number"] = N("Math", {"Value": warm, "Value_001": U}, operation="MULTIPLY")
     result["math clamp"] = N("Math", {"Value": U, "Value_001": V}, operation="ADD", use_clamp=True)
     for word in KINDS["vector_math"].inputs["operation"]:
-        theirs = {"fract": "FRACTION"}.get(word, word.upper())
-        if theirs not in bpy.types.ShaderNodeVectorMath.bl_rna.properties["operation"].enum_items:
+        operations = {"fract": "FRACTION"}.get(word, word.upper())
+        if operations not in bpy.types.ShaderNodeVectorMath.bl_rna.properties["operation"].enum_items:
             continue  # some came with 4.3
         inputs = {"Vector": OBJECT, "Vector_001": a, "Vector_002": (0.3, 0.2, 0.1), "Scale": 0.7}
-        result[f"vector math {word}"] = N("VectorMath", inputs, operation=theirs)
+        result[f"vector math {word}"] = N("VectorMath", inputs, operation=operations)
     for word in KINDS["mix_color"].inputs["blend"]:
         inputs = {"Factor_Float": 0.6, "A_Color": a, "B_Color": b}
         result[f"mix {word}"] = N("Mix", inputs, data_type="RGBA", blend_type=word.upper())
@@ -299,11 +299,11 @@ def floor(scene, strewn, make_material, set_world, read_passes, tmp_path):
         for name, graph in graphs.items():
             materials.append(make_material(name, "ShaderNodeEmission"))
             tree = materials[-1].node_tree
-            shown = graph
+            picture = graph
             for operation, *by in (("MINIMUM", 3), ("MAXIMUM", -3), ("MULTIPLY_ADD", 0.1, 0.5)):
-                inputs = {"Vector": shown} | {f"Vector_00{i}": (value,) * 3 for i, value in enumerate(by, start=1)}
-                shown = N("VectorMath", inputs, operation=operation)
-            tree.links.new(shown.add(tree), tree.nodes["Shader"].inputs["Color"])
+                inputs = {"Vector": picture} | {f"Vector_00{i}": (value,) * 3 for i, value in enumerate(by, start=1)}
+                picture = N("VectorMath", inputs, operation=operation)
+            tree.links.new(picture.add(tree), tree.nodes["Shader"].inputs["Color"])
         rng = np.random.default_rng(1)
         blocks = strewn(materials, cells=30, width=3.0, backwards=lambda i: i % 2 == 0)
         for name, block in zip(graphs, blocks, strict=True):
@@ -332,11 +332,11 @@ def floor(scene, strewn, make_material, set_world, read_passes, tmp_path):
     return show
 
 
-def check(found):
+def check(pairs):
     result = []
-    for name, (ours, theirs) in found.items():
-        assert len(ours) > 20, (name, len(ours))
-        apart = np.abs(ours - theirs).max(axis=1) / np.maximum(np.abs(theirs).max(axis=1), 1)
+    for name, (traced, cycles) in pairs.items():
+        assert len(traced) > 20, (name, len(traced))
+        apart = np.abs(traced - cycles).max(axis=1) / np.maximum(np.abs(cycles).max(axis=1), 1)
         scale = BYTES if name.startswith(("attribute Byte", "colour attribute")) else GLOW if name == "blackbody" else 1
         apart /= scale
         if np.median(apart) > TYPICAL or (apart > MOST).mean() > JUMPS:
@@ -405,7 +405,7 @@ def test_a_node_that_is_a_little_wrong_is_found(floor, images, monkeypatch, wron
             node = native.Node(node.type, (*node.inputs, (name, change(node[name]))))
         return right(node, *numbers)
 
-    shown = {
+    names = {
         "math": N("Math", {"Value": 0.7, "Value_001": U}, operation="ADD"),
         "mix_color": N("Mix", {"Factor_Float": 0.5, "A_Color": UV, "B_Color": (0.2, 0.9, 0.4, 1)}, data_type="RGBA"),
         "mapping": N("Mapping", {"Vector": UV, "Rotation": (0, 0, 0.2)}),
@@ -415,7 +415,7 @@ def test_a_node_that_is_a_little_wrong_is_found(floor, images, monkeypatch, wron
     }
     monkeypatch.setattr(native, "_described_node", described)
     with pytest.raises(AssertionError, match="p50"):
-        check(floor({wrong: shown[wrong]}))
+        check(floor({wrong: names[wrong]}))
 
 
 def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(
@@ -449,9 +449,9 @@ def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(
     traced = render.render(exported, "direct", 1, threads=2)
     met = traced["Depth"][..., 0] < 100
     apart = np.abs(traced["Combined"] - cycles_passes["Combined"])[met]
-    told = met.sum(), *np.percentile(apart, (50, 99, 100))
+    summary = met.sum(), *np.percentile(apart, (50, 99, 100))
     # Calibrated: 3e-7, 7e-6, and where the grid is seen edge-on 4.5e-5, of Cycles' barycentric coordinates in float32.
-    assert met.sum() > 300 and told[1] < 1e-6 and told[2] < 1e-5 and told[3] < 1e-4, told
+    assert met.sum() > 300 and summary[1] < 1e-6 and summary[2] < 1e-5 and summary[3] < 1e-4, summary
 
 
 @pytest.fixture
@@ -490,8 +490,8 @@ THROWN = (5e-6, 1e-3) if bpy.app.version >= (5, 1) else (2e-6, 2e-5)
 
 @pytest.mark.parametrize("blend", [0.0, 0.3, 0.7, 1.0])
 def test_an_image_is_thrown_on_a_body_along_its_axes(thrown, blend):
-    told = np.percentile(thrown(blend), (50, 97))
-    assert (told <= THROWN).all(), told
+    percentiles = np.percentile(thrown(blend), (50, 97))
+    assert (percentiles <= THROWN).all(), percentiles
 
 
 def test_a_blend_between_axes_that_is_a_little_wrong_is_found(thrown, monkeypatch):

@@ -70,10 +70,10 @@ def channels(path):
         return dict(archive)
 
 
-def written(name, found, layer="ViewLayer"):
+def written(name, passes, layer="ViewLayer"):
     """One pass of those that were written, (height, width, channels)."""
     names = [f"{layer}.{versions.pass_name(name)}.{letter}" for letter in image.CHANNELS[name]]
-    return np.stack([found[each] for each in names], axis=-1)
+    return np.stack([passes[each] for each in names], axis=-1)
 
 
 def traced(level="path", samples=SAMPLES, seed=SEED):
@@ -168,10 +168,10 @@ def test_a_border_is_that_part_of_the_picture(lit, write, crop):
     frame.use_border, frame.use_crop_to_border = True, crop
     frame.border_min_x, frame.border_max_x, frame.border_min_y, frame.border_max_y = 0.25, 0.75, 0.5, 0.875
     lit.view_layers[0].use_pass_z = True
-    found = write()
-    combined, part = written("Combined", found), (slice(24, 42), slice(16, 48))
+    picture = write()
+    combined, part = written("Combined", picture), (slice(24, 42), slice(16, 48))
     if crop:
-        assert np.array_equal(written("Depth", found), traced()["Depth"])
+        assert np.array_equal(written("Depth", picture), traced()["Depth"])
         assert combined.shape == (18, 32, 4)
     else:
         assert combined.shape == whole.shape
@@ -196,11 +196,11 @@ def test_each_view_layer_shows_its_own(lit, write, camera):
     hidden.objects.link(cube)
     second = lit.view_layers.new("Second")
     second.layer_collection.children[hidden.name].exclude = True
-    found = write()
-    assert np.array_equal(written("Combined", found), traced()["Combined"])
+    picture = write()
+    assert np.array_equal(written("Combined", picture), traced()["Combined"])
     lit.view_layers[0].use = False
-    assert np.array_equal(written("Combined", found, "Second"), written("Combined", write(), "Second"))
-    assert not np.array_equal(written("Combined", found), written("Combined", found, "Second"))
+    assert np.array_equal(written("Combined", picture, "Second"), written("Combined", write(), "Second"))
+    assert not np.array_equal(written("Combined", picture), written("Combined", picture, "Second"))
 
 
 def test_frames_of_an_animation_show_the_animated_pinhole(lit, camera_object, tmp_path):

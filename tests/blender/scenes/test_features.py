@@ -347,13 +347,13 @@ def test_triangles_that_lie_exactly_where_others_do_are_told(monkey, scene, add_
     from viewcam_addon.blender.jobs import renderer as jobs
     from viewcam_addon.jobs.job import Job
 
-    def told(level="direct"):
+    def reasons(level="direct"):
         ledger = jobs.export(Job(level=level)).ledger
         assert all(entry.status == "exported" for entry in ledger), "where it matters is the comparison's to find"
         return [entry.reason for entry in ledger if "lie exactly" in entry.reason]
 
     add_lamp("SUN")
-    assert not told()
+    assert not reasons()
     double = monkey.copy()
     if kind != "shared data":
         double.data = monkey.data.copy()
@@ -362,18 +362,18 @@ def test_triangles_that_lie_exactly_where_others_do_are_told(monkey, scene, add_
         with bpy.context.temp_override(active_object=monkey, selected_editable_objects=[monkey, double]):
             bpy.ops.object.join()
     for level in ("direct", "geometry"):
-        (reason,) = told(level)
+        (reason,) = reasons(level)
         assert ("others of it" if kind == "one mesh" else "those of") in reason
     if kind != "one mesh":
         double.location.x += 1e-5
-        assert not told()
+        assert not reasons()
 
 
 def test_instances_in_one_place_and_doubles_within_them_are_told(monkey, scene, add):
     from viewcam_addon.blender.jobs import renderer as jobs
     from viewcam_addon.jobs.job import Job
 
-    def told():
+    def reasons():
         reasons = [entry.reason for entry in jobs.export(Job(level="geometry")).ledger]
         return [clause.partition(":")[0] for reason in reasons for clause in reason.split("; ") if "lie exactly" in clause]
 
@@ -386,9 +386,9 @@ def test_instances_in_one_place_and_doubles_within_them_are_told(monkey, scene, 
     collection.objects.link(monkey)
     instance(1, (1, 0, 0))
     instance(2, (-1, 0, 0))
-    assert not told()
+    assert not reasons()
     instance(3, (1, 0, 0))
-    assert told() == ["1 instances lie exactly where others of it do"]
+    assert reasons() == ["1 instances lie exactly where others of it do"]
     bpy.data.objects["Place 3"].location.x = 0
     with bpy.context.temp_override():
         mesh = monkey.data
@@ -400,7 +400,7 @@ def test_instances_in_one_place_and_doubles_within_them_are_told(monkey, scene, 
         twins = [[index + count for index in face] for face in faces[:5]]
         doubled.from_pydata(np.tile(vertices.reshape(-1, 3), (2, 1)).tolist(), [], faces + twins)
         monkey.data = doubled
-    (reason,) = told()
+    (reason,) = reasons()
     assert reason.endswith("triangles lie exactly where others of it do") and 5 <= int(reason.split()[0]) <= 10
 
 
@@ -420,10 +420,10 @@ def test_triangles_of_a_lattice_are_no_doubles_of_one_another(scene, add_lamp, a
     add(mesh, "Lattice")
     add_lamp("SUN")
 
-    def told():
+    def reasons():
         return [entry.reason for entry in jobs.export(Job(level="direct")).ledger if "lie exactly" in entry.reason]
 
-    assert len(mesh.polygons) > 30_000 and not told()
+    assert len(mesh.polygons) > 30_000 and not reasons()
 
 
 # --- Surfaces in one place and things of a pixel, rendered by Cycles: either is right, and each has its own slope
@@ -579,14 +579,14 @@ def test_things_of_a_pixel_are_the_same_picture(both_sides, sheet, add, mesh_fro
         add(mesh, f"{kind.__name__} {number}", location=random.uniform(-2, 2, 3).tolist(), rotation_euler=rotation)
     sides = both_sides()
     sides.check()
-    shown = np.flatnonzero(sides.traced["Object Index"] > 0)
+    pixels = np.flatnonzero(sides.traced["Object Index"] > 0)
     off = {name: values.copy() for name, values in sides.cycles.items()}
-    off["UV"].reshape(-1, off["UV"].shape[-1])[shown, :2] += np.float32(apart)
+    off["UV"].reshape(-1, off["UV"].shape[-1])[pixels, :2] += np.float32(apart)
     tracer = render.Tracer(sides.exported, 2)
     comparison = geometry.compare(Image(sides.traced), Image(off), sides.exported.camera, tracer.surfaces_at)
     assert not comparison.passed, "\n".join(comparison.lines())
     flipped = replace(Image(sides.cycles), passes={**sides.cycles, "Normal": sides.cycles["Normal"].copy()})
-    flipped["Normal"].reshape(-1, 3)[shown[len(shown) // 2]] *= -1
+    flipped["Normal"].reshape(-1, 3)[pixels[len(pixels) // 2]] *= -1
     assert not geometry.compare(Image(sides.traced), flipped, sides.exported.camera, tracer.surfaces_at).passed
 
 

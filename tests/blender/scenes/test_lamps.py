@@ -173,8 +173,8 @@ def test_whatever_nodes_make_the_same_everywhere_colours_a_lamp(add_lamp, export
     ((point,), reasons) = export()
     red, green, blue = (power / 10 for power in point.power)
     assert not reasons and red > green > blue > 0
-    shown = constant_value(node("blackbody", temperature=2000.0))[0]
-    assert (red**2, green**2, blue**2) == pytest.approx(shown, rel=1e-12)
+    temperature_color = constant_value(node("blackbody", temperature=2000.0))[0]
+    assert (red**2, green**2, blue**2) == pytest.approx(temperature_color, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -208,9 +208,9 @@ def test_what_a_lamps_nodes_say_that_is_not_modelled_is_named(add_lamp, export, 
 def test_what_makes_a_lamp_uneven_is_its_emission(add_lamp, export, kind, output, type):
     """The lamp keeps its own strength, which the node multiplies."""
     lamp = add_lamp("POINT", energy=10.0)
-    made = attach(lamp, kind, output, "Color")
+    socket = attach(lamp, kind, output, "Color")
     if kind == "TexImage":
-        made.image = bpy.data.images.new("Gobo", 2, 2)
+        socket.image = bpy.data.images.new("Gobo", 2, 2)
     ((point,), reasons) = export()
     assert not reasons and point.power == (10.0,) * 3 and point.emission.type == type
 
@@ -227,9 +227,9 @@ def test_a_lamp_that_is_scaled_to_nothing_has_no_nodes(add_lamp, export, scale, 
 def attach(block, kind, output, to="Strength"):
     tree = use_nodes(block.data)
     emission = next(node for node in tree.nodes if node.type == "EMISSION")
-    made = tree.nodes.new(f"ShaderNode{kind}")
-    tree.links.new(made.outputs[output], emission.inputs[to])
-    return made
+    new_node = tree.nodes.new(f"ShaderNode{kind}")
+    tree.links.new(new_node.outputs[output], emission.inputs[to])
+    return new_node
 
 
 APPROXIMATED = {

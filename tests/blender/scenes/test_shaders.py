@@ -166,8 +166,12 @@ def test_a_displacement_is_read_as_the_height_that_it_is_made_of(diffuse):
         assert exactly(diffuse) == material
         raised = next(each for each in diffuse.node_tree.nodes if each.type == "DISPLACEMENT")
         raised.space, raised.inputs["Midlevel"].default_value, raised.inputs["Scale"].default_value = "OBJECT", 0.5, 0.25
-        found = exactly(diffuse).displacement
-        assert (found["operation"], found["b"].type, found["a"]["b"]) == ("multiply", "vector_math", (0.25,) * 3)
+        read_height = exactly(diffuse).displacement
+        assert (read_height["operation"], read_height["b"].type, read_height["a"]["b"]) == (
+            "multiply",
+            "vector_math",
+            (0.25,) * 3,
+        )
         diffuse.displacement_method = "BOTH"
         assert exactly(diffuse).displacement is None and materials.departures(diffuse, lit=True) == ["is displaced"]
         diffuse.displacement_method = "BUMP"
@@ -191,9 +195,9 @@ def test_curves_are_drawn_that_have_the_table_again(diffuse, image, kind, extrap
     with overridden() as overrides:
         materials.stand_in(overrides, diffuse, shaders.Reading(material, {"Checks": image, "Table": table}))
         read = shaders.read(diffuse)
-    found = read.material.surface["color"]
-    assert not read.reasons and {**dict(found.inputs), "table": None} == {**dict(value.inputs), "table": None}
-    assert read.tables[found["table"].image].pixels == pytest.approx(wanted, abs=2e-5)
+    read_color = read.material.surface["color"]
+    assert not read.reasons and {**dict(read_color.inputs), "table": None} == {**dict(value.inputs), "table": None}
+    assert read.tables[read_color["table"].image].pixels == pytest.approx(wanted, abs=2e-5)
 
 
 def test_what_light_path_says_of_light_is_named_where_both_ways_to_find_it_are_told_otherwise(diffuse, make_material):
@@ -214,16 +218,16 @@ def test_what_light_path_says_of_light_is_named_where_both_ways_to_find_it_are_t
 def test_a_value_of_more_nodes_than_are_followed_is_named(diffuse, count, both, words):
     """Each of them feeds the next; or both of its inputs, so that 2^count are asked for."""
     tree = diffuse.node_tree
-    made = tree.nodes.new("ShaderNodeTexCoord").outputs["UV"]
+    value = tree.nodes.new("ShaderNodeTexCoord").outputs["UV"]
     for number in range(count):
         node = tree.nodes.new("ShaderNodeMath")
         for socket in node.inputs[: 1 + both]:
-            tree.links.new(made, socket)
-        made = node.outputs[0]
+            tree.links.new(value, socket)
+        value = node.outputs[0]
         if number == 6:
-            tree.links.new(made, tree.nodes["Shader"].inputs["Color"])
+            tree.links.new(value, tree.nodes["Shader"].inputs["Color"])
             exactly(diffuse)
-    tree.links.new(made, tree.nodes["Shader"].inputs["Color"])
+    tree.links.new(value, tree.nodes["Shader"].inputs["Color"])
     approximately(diffuse, "Math", words)
 
 
@@ -244,10 +248,10 @@ def test_the_stand_in_of_a_shader_is_read_as_that_shader(diffuse, image, surface
         read = exactly(diffuse)
     if surface.type in ("diffuse", "emission", "glass", "refraction"):  # which are components while they are not rough
         read = Material(surface=read.closures[0].node)
-    for found, wanted in zip(read.closures, Material(surface=surface).closures, strict=True):
-        assert (found.node.type, found.factors) == (wanted.node.type, wanted.factors)
+    for read_closure, wanted in zip(read.closures, Material(surface=surface).closures, strict=True):
+        assert (read_closure.node.type, read_closure.factors) == (wanted.node.type, wanted.factors)
         for name in KINDS[wanted.node.type].inputs:
-            assert name == "distribution" or rounded(found.node[name]) == rounded(wanted.node[name]), name
+            assert name == "distribution" or rounded(read_closure.node[name]) == rounded(wanted.node[name]), name
 
 
 def rounded(colour):

@@ -117,8 +117,8 @@ def test_what_the_camera_sees_may_be_another_world_than_what_lights(sky, export)
     other = tree.nodes.new("ShaderNodeBackground")
     other.inputs["Color"].default_value = (1.0, 0.5, 0.25, 1.0)
     output = next(node for node in tree.nodes if node.type == "OUTPUT_WORLD")
-    shown = ask_for_camera(tree, "ShaderNodeMixShader", "Shader", background.outputs[0], other.outputs[0])
-    tree.links.new(shown, output.inputs["Surface"])
+    mixed = ask_for_camera(tree, "ShaderNodeMixShader", "Shader", background.outputs[0], other.outputs[0])
+    tree.links.new(mixed, output.inputs["Surface"])
     exported, reasons = export()
     assert exported.world == World((2.0, 2.0, 2.0), image="Sky", backdrop=World((1.0, 0.5, 0.25))) and not reasons
 
@@ -154,8 +154,8 @@ def test_an_image_that_is_missing_is_the_magenta_that_cycles_shows(set_world, ex
         texture.image.source, texture.image.filepath = "FILE", str(tmp_path / "gone.hdr")
     exported, reasons = export()
     assert exported.world.radiance == (2.0, 0.0, 2.0) and exported.world.image is None and not reasons
-    (said,) = (entry.reason for entry in exported.ledger if entry.object == world.name)
-    assert said.startswith("the world ") and said.endswith("magenta, as Cycles has it")
+    (reason,) = (entry.reason for entry in exported.ledger if entry.object == world.name)
+    assert reason.startswith("the world ") and reason.endswith("magenta, as Cycles has it")
 
 
 def test_cycles_is_shown_a_constant_world_where_the_image_is_missing(set_world):

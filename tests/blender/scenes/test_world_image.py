@@ -158,10 +158,10 @@ def test_neither_export_nor_render_changes_what_is_open(tree, export, scene, tmp
     kinds = ("worlds", "objects", "lights", "scenes", "cameras", "libraries")
 
     def state():
-        found = {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds}
-        found["images"] = [image.name for image in bpy.data.images if image.type != "RENDER_RESULT"]
+        names = {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds}
+        names["images"] = [image.name for image in bpy.data.images if image.type != "RENDER_RESULT"]
         links = [(link.from_node.name, link.to_node.name) for link in sky.id_data.links]
-        return found, links, [node.name for node in sky.id_data.nodes], sky.sun_disc, sky.sun_size
+        return names, links, [node.name for node in sky.id_data.nodes], sky.sun_disc, sky.sun_size
 
     before = state()
     scene.render.resolution_x, scene.render.resolution_y = 8, 8
@@ -214,13 +214,13 @@ def test_cycles_shows_the_same_image_and_nearly_the_sky_itself(tree, camera_obje
 
     picture = cycles.LightSettings(exported.film, Bounces(0, 0, 0, 0), 1)
     cycles.render(scene, bpy.context.view_layer, camera_object, tmp_path / "sky.exr", light=picture)
-    shown, true = (passes["Environment"] for passes in read_passes([tmp_path / "image.exr", tmp_path / "sky.exr"]))
+    environment, true = (passes["Environment"] for passes in read_passes([tmp_path / "image.exr", tmp_path / "sky.exr"]))
     traced = render.render(exported, "direct", 1, threads=2)["Environment"]
-    error = np.abs(traced - shown) / shown
+    error = np.abs(traced - environment) / environment
     assert np.percentile(error, 50) <= 1e-6 and np.percentile(error, 99) <= 2e-5
     # Calibrated, at the horizon: 2e-3 (Hosek and Wilkie) and 2e-5.
-    assert np.percentile(np.abs(shown - true) / true, 99) < 5e-3 and abs(shown.mean() / true.mean() - 1) < 1e-4
-    turned = np.abs(np.roll(traced, 1, axis=1) - shown) / shown  # by a pixel
+    assert np.percentile(np.abs(environment - true) / true, 99) < 5e-3 and abs(environment.mean() / true.mean() - 1) < 1e-4
+    turned = np.abs(np.roll(traced, 1, axis=1) - environment) / environment  # by a pixel
     assert np.percentile(turned, 50) > 1e-6
 
 
@@ -234,8 +234,8 @@ def test_each_of_many_renders_shows_the_camera_its_own_image(tree, camera_object
     tree.colour(add.outputs[0])
     addresses = []
 
-    def watched(*given, **how):
-        image = image_of(*given, **how)
+    def watched(*arguments, **how):
+        image = image_of(*arguments, **how)
         addresses.append(image.as_pointer())
         return image
 
@@ -243,6 +243,6 @@ def test_each_of_many_renders_shows_the_camera_its_own_image(tree, camera_object
     scene.render.resolution_x, scene.render.resolution_y = 16, 9
     paths = [tmp_path / f"{seed}.exr" for seed in range(4)]
     jobs.both_sides(Job(level="direct", samples=8), paths)
-    found = [passes["Environment"][..., :3].mean(axis=(0, 1)) for passes in read_passes(paths)]
-    assert np.allclose(found, found[0], rtol=0.1), found
+    means = [passes["Environment"][..., :3].mean(axis=(0, 1)) for passes in read_passes(paths)]
+    assert np.allclose(means, means[0], rtol=0.1), means
     assert len(addresses) == 8 and len({*addresses}) == 2, "Cycles tells images by their address"

@@ -91,8 +91,8 @@ def test_the_report_notices_keyframes_that_are_wrong(over_the_target, scene, mon
         curve.update()
 
     monkeypatch.setattr(baking, "_write", spoil)
-    (found,) = baking.bake([over_the_target], scene, 1, 21)
-    assert not found.ok
+    (flight_baked,) = baking.bake([over_the_target], scene, 1, 21)
+    assert not flight_baked.ok
 
 
 def test_the_values_are_kept_and_turned_off_and_the_frame_is_restored(over_the_target, scene, curves):

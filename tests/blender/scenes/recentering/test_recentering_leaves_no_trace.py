@@ -57,8 +57,8 @@ def test_the_ledger_is_that_of_the_file(crowd, scene, add, mesh_from, check):
 def test_rendering_alone_recentres_too(look, tmp_path, add_map):
     look(UTM)
     add_map(UTM)
-    told = jobs.cycles(Job(recenter=True), tmp_path / "picture.exr")
-    assert [(entry.object, entry.status) for entry in told] == [("Map", "exported")]
+    entries = jobs.cycles(Job(recenter=True), tmp_path / "picture.exr")
+    assert [(entry.object, entry.status) for entry in entries] == [("Map", "exported")]
     assert (tmp_path / "picture.exr").stat().st_size > 1000
 
 
@@ -116,10 +116,10 @@ def test_an_object_that_did_not_follow_is_named(sabotage, look, add, mesh_from, 
     place = recentering._place
 
     def place_wrongly(overrides, temporary, placed):
-        shown = place(overrides, temporary, placed)
-        for block, each in shown.items():
+        copies = place(overrides, temporary, placed)
+        for block, each in copies.items():
             block.matrix_parent_inverse = recentering.Matrix(sabotage(each))
-        return shown
+        return copies
 
     monkeypatch.setattr(recentering, "_place", place_wrongly)
     with pytest.raises(InputError, match="object 'Cube' did not follow") as caught:

@@ -154,7 +154,7 @@ def test_particles_follow(look, add, mesh_from, scene, check):
 
 
 @pytest.mark.parametrize(
-    "change, told",
+    "change, sentence",
     [
         (lambda matrices: matrices[:, :, [1, 0, 2, 3]], "instance 1 of Map is"),
         (lambda matrices: matrices[::-1], "instance 1 of Map is"),
@@ -162,7 +162,7 @@ def test_particles_follow(look, add, mesh_from, scene, check):
     ],
     ids=["turned", "in another order", "one fewer"],
 )
-def test_instances_that_are_not_where_the_file_has_them_are_caught(change, told, look, add, map_mesh, check_moved):
+def test_instances_that_are_not_where_the_file_has_them_are_caught(change, sentence, look, add, map_mesh, check_moved):
     look(UTM)
     many = bpy.data.collections.new("Many")
     add(map_mesh("Map", (0, 0, 0)), "Map", collection=many)
@@ -172,7 +172,7 @@ def test_instances_that_are_not_where_the_file_has_them_are_caught(change, told,
     plain, moved = (jobs.export(Job(recenter=recenter)) for recenter in (False, True))
     check_moved(plain, moved)
     (maps,) = moved.objects
-    with pytest.raises(AssertionError, match=told):
+    with pytest.raises(AssertionError, match=sentence):
         check_moved(plain, replace(moved, objects=(replace(maps, matrix=change(maps.matrices)),)))
 
 
@@ -291,12 +291,12 @@ def test_materials_that_ask_where_they_are_are_the_same_on_both_sides_and_told(
     cubes = [add(mesh_from("cube"), name, (1000.0 + 3 * i, 2000.0, 30.0)) for i, name in enumerate(("Left", "Right"))]
     material = make_material("Asks", "ShaderNodeBsdfDiffuse")
     tree = material.node_tree
-    told = tree.nodes.new("ShaderNodeObjectInfo").outputs[output]
+    socket = tree.nodes.new("ShaderNodeObjectInfo").outputs[output]
     scaled = tree.nodes.new("ShaderNodeVectorMath")
     scaled.operation, scaled.inputs[1].default_value = "MULTIPLY", (1e-2,) * 3 if output == "Location" else (1.0,) * 3
     absolute = tree.nodes.new("ShaderNodeVectorMath")
     absolute.operation = "ABSOLUTE"
-    tree.links.new(told, scaled.inputs[0])
+    tree.links.new(socket, scaled.inputs[0])
     tree.links.new(scaled.outputs[0], absolute.inputs[0])
     tree.links.new(absolute.outputs[0], tree.nodes["Shader"].inputs["Color"])
     for number, cube in enumerate(cubes):
