@@ -75,9 +75,9 @@ class Blender:
         """The seconds that the command took; SystemExit if it failed."""
         started, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
         process = self.start(*arguments)
-        said, _ = process.communicate()
+        output, _ = process.communicate()
         if process.returncode:
-            sys.exit(said)
+            sys.exit(output)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         return np.array([time.perf_counter() - started, cpu])

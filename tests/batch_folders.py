@@ -14,9 +14,9 @@ def contents(folder: Path) -> dict[str, object]:
 
 
 def assert_same(folder: Path, undisturbed: Path) -> None:
-    found, wanted = contents(folder), contents(undisturbed)
-    assert sorted(found) == sorted(wanted), f"{sorted(found)} in place of {sorted(wanted)}"
-    unlike = [name for name in wanted if found[name] != wanted[name]]
+    actual, wanted = contents(folder), contents(undisturbed)
+    assert sorted(actual) == sorted(wanted), f"{sorted(actual)} in place of {sorted(wanted)}"
+    unlike = [name for name in wanted if actual[name] != wanted[name]]
     assert not unlike, f"not as an undisturbed run leaves them: {unlike}"
 
 

@@ -112,12 +112,12 @@ def on_a_terminal():
         termios.tcsetwinsize(its, (24, 80))
         child = subprocess.Popen([*map(str, words)], stderr=its, stdout=subprocess.DEVNULL, env=environment)
         os.close(its)
-        shown = b""
+        output = b""
         with contextlib.suppress(OSError):  # Linux's way to say that the other side has gone
             while part := os.read(ours, 4096):
-                shown += part
+                output += part
         os.close(ours)
-        return child.wait(), shown.decode()
+        return child.wait(), output.decode()
 
     return run
 

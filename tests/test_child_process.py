@@ -32,10 +32,10 @@ def wait_until(is_so, seconds=20):
 
 
 def test_grandchildren_end_with_the_child(tmp_path):
-    said = tmp_path / "said.txt"
-    group = child_process.ProcessGroup([sys.executable, "-c", PARENT + "time.sleep(60)"], said, os.environ)
-    assert wait_until(lambda: said.read_text().endswith("\n")), "the group has not started"
-    members = [int(word) for word in said.read_text().split()]
+    log = tmp_path / "said.txt"
+    group = child_process.ProcessGroup([sys.executable, "-c", PARENT + "time.sleep(60)"], log, os.environ)
+    assert wait_until(lambda: log.read_text().endswith("\n")), "the group has not started"
+    members = [int(word) for word in log.read_text().split()]
     assert all(map(is_there, members)) and group.status() is None
     group.end()
     assert wait_until(lambda: not any(map(is_there, members))), "a member runs on"

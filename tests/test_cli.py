@@ -353,8 +353,8 @@ def test_what_can_not_be_written_is_said_before_anything_is_traced_or_rendered(t
     monkeypatch.setattr(command, "run", lambda options: begun.append(options) or (0, {}))
     (tmp_path / "file").write_text("no folder")
     bad = str(tmp_path / "file" / "out.png")
-    said = fails(capfd, *(word.replace("OUT.png", bad).replace("OUT", bad) for word in words))
-    assert not begun and "can't be written" in said and "out.png" in said
+    message = fails(capfd, *(word.replace("OUT.png", bad).replace("OUT", bad) for word in words))
+    assert not begun and "can't be written" in message and "out.png" in message
     good = str(tmp_path / "new" / "out.png")
     assert main([word.replace("OUT.png", good).replace("OUT", good) for word in words]) == 0
     assert len(begun) == 1 and getattr(begun[0], output) == Path(good)
@@ -386,8 +386,8 @@ def test_the_result_goes_to_standard_output_by_its_name_and_devices_stay(tmp_pat
     scene = write_scene(tmp_path)
     command = [sys.executable, "-m", "viewcam_addon", "render", scene, tmp_path / "out.exr", "--json"]
     output = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=True).stdout
-    said, _, result = output.partition("\n")
-    assert "traced 64 × 48" in said and json.loads(result)["exit_status"] == 0
+    message, _, result = output.partition("\n")
+    assert "traced 64 × 48" in message and json.loads(result)["exit_status"] == 0
     subprocess.run([*command, "/dev/null"], capture_output=True, check=True)
     assert Path("/dev/null").is_char_device()
     mixed = subprocess.run([*command, "/dev/stdout", "--log-json"], capture_output=True, text=True, check=False)
@@ -445,7 +445,7 @@ def test_a_picture_made_elsewhere_is_judged_by_the_channels_that_are_named(tmp_p
 
     from viewcam_addon import image
 
-    scene, traced, made = tmp_path / "scene.json", tmp_path / "traced.exr", tmp_path / "made.exr"
+    scene, traced, rendered = tmp_path / "scene.json", tmp_path / "traced.exr", tmp_path / "made.exr"
     scene.write_text(json.dumps(SCENE))
     assert main(["render", str(scene), str(traced)]) == 0
     passes = image.read(traced).passes
@@ -453,8 +453,8 @@ def test_a_picture_made_elsewhere_is_judged_by_the_channels_that_are_named(tmp_p
     hit = passes["Depth"][..., 0] < image.BACKGROUND_DEPTH
     pixels = {f"P.{letter}": passes["Position"][::-1, :, i] for i, letter in enumerate("XYZ")}
     pixels |= {"far": np.where(hit, away, np.inf)[::-1], "id": passes["Object Index"][::-1, :, 0]}
-    OpenEXR.File({}, {name: np.ascontiguousarray(values, np.float32) for name, values in pixels.items()}).write(str(made))
-    compare = ["compare", str(traced), str(made), "--scene", str(scene), "--channels"]
+    OpenEXR.File({}, {name: np.ascontiguousarray(values, np.float32) for name, values in pixels.items()}).write(str(rendered))
+    compare = ["compare", str(traced), str(rendered), "--scene", str(scene), "--channels"]
     result = tmp_path / "result.json"
     stated = ["position=P.X,P.Y,P.Z", "distance=far", "object-index=id"]
     assert main([*compare, *stated, "--json", str(result), "--report", str(tmp_path / "report")]) == 0
@@ -474,23 +474,23 @@ def test_a_picture_by_mitsuba_of_the_same_scene_is_the_same_and_one_of_a_moved_b
 
     mitsuba = pytest.importorskip("mitsuba")
     mitsuba.set_variant("scalar_rgb")
-    scene, traced, made, camera = (tmp_path / name for name in ("scene.json", "traced.exr", "made.exr", "camera.xml"))
+    scene, traced, rendered, camera = (tmp_path / name for name in ("scene.json", "traced.exr", "made.exr", "camera.xml"))
     scene.write_text(json.dumps(SCENE))
     assert main(["render", str(scene), str(traced)]) == 0
     cameras.save([cameras.Camera("camera", Pinhole(**CAMERA))], camera, "mitsuba")
     # One sample, through each pixel's center.
     number, flag = "<integer name='sample_count' value='1'/>", "<boolean name='jitter' value='false'/>"
-    one = f"<rfilter type='box'/></film><sampler type='stratified'>{number}{flag}</sampler>"
-    text = camera.read_text().replace("</film>", one)
+    body = f"<rfilter type='box'/></film><sampler type='stratified'>{number}{flag}</sampler>"
+    text = camera.read_text().replace("</film>", body)
     (sensor,) = mitsuba.load_string(text).sensors()
     for x, status in ((0, 0), (0.002, 1)):
         ball = {"type": "sphere", "center": [x, 0, 0]}
         document = {"type": "scene", "integrator": {"type": "aov", "aovs": "P:position"}, "ball": ball}
         pixels = np.array(mitsuba.render(mitsuba.load_dict(document), sensor=sensor))
         channels = {f"P.{letter}": np.ascontiguousarray(pixels[..., i], np.float32) for i, letter in enumerate("XYZ")}
-        OpenEXR.File({}, channels).write(str(made))
+        OpenEXR.File({}, channels).write(str(rendered))
         stated = ["--scene", str(scene), "--channels", "position=P.X,P.Y,P.Z"]
-        assert main(["compare", str(traced), str(made), *stated]) == status
+        assert main(["compare", str(traced), str(rendered), *stated]) == status
 
 
 def test_another_engine_is_checked_by_its_geometry_alone(capfd):

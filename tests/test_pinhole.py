@@ -107,9 +107,9 @@ def test_basis_neither_over_nor_underflows_at_any_scale(eye, look_at, up):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         camera = Pinhole(eye, look_at, up, 500, 64, 48)
-        one = np.array(camera.axes())
+        axes = np.array(camera.axes())
         many = np.array(basis(np.array([eye]), np.array([look_at]), np.array([up])))[:, 0]
-    assert np.array_equal(one, many)
+    assert np.array_equal(axes, many)
     if not camera.is_singular:
         error = basis_error(camera.axes(), (eye, look_at, up))
         assert error <= BASIS_TOLERANCE, f"error {error:.3g}"

@@ -22,19 +22,19 @@ HOSTILE = f"Wall\n{FORGED}\r\x1b[2K\x1b[1A\x9b31m\u2028{FORGED}\u202eklaw\u2066\
 """A name that ends its line, clears it, goes up, turns red, and turns the direction of the text."""
 
 
-def assert_shows_itself(said):
+def assert_shows_itself(text):
     """Nothing but characters that show themselves, and no line that a name has written."""
-    for line in said.splitlines():
+    for line in text.splitlines():
         assert all(character.isprintable() for character in line), f"{line!r} does not show itself"
         assert not line.startswith(FORGED), f"a name has written the line {line!r}"
 
 
 @given(st.text() | st.text(st.characters(categories=["C", "Z"])))
 def test_what_is_plain_is_one_line_that_shows_itself_and_is_plain_already(text):
-    shown = plain(text)
-    assert len(shown.splitlines()) <= 1 and plain(shown) == shown
-    assert all(unicodedata.category(character)[0] != "C" for character in shown)
-    shown.encode("utf-8")  # a lone surrogate could not be printed
+    escaped = plain(text)
+    assert len(escaped.splitlines()) <= 1 and plain(escaped) == escaped
+    assert all(unicodedata.category(character)[0] != "C" for character in escaped)
+    escaped.encode("utf-8")  # a lone surrogate could not be printed
 
 
 @given(st.text(st.characters(categories=["L", "M", "N", "P", "S", "Zs"])))
@@ -43,7 +43,7 @@ def test_what_people_write_stays_as_it_is(text):
 
 
 @pytest.mark.parametrize(
-    ("text", "shown"),
+    ("text", "escaped"),
     [
         ("a\nb", r"a\nb"),
         ("\x1b[2K", r"\x1b[2K"),
@@ -54,8 +54,8 @@ def test_what_people_write_stays_as_it_is(text):
         ("left\N{NO-BREAK SPACE}eye: 64 × 48, 10⁻⁶, 左, é", "left\N{NO-BREAK SPACE}eye: 64 × 48, 10⁻⁶, 左, é"),
     ],
 )
-def test_an_escape_says_which_character_it_was(text, shown):
-    assert plain(text) == shown
+def test_an_escape_says_which_character_it_was(text, escaped):
+    assert plain(text) == escaped
 
 
 def test_everything_is_printed_by_the_one_that_makes_it_plain():

@@ -74,7 +74,7 @@ def charts(quick: bool) -> tuple[Chart]:
             f"Read {'; '.join(claim.summary() for claim in claims)}.{' Quick: not judged.' if quick else ''}",
             tie=0.0,
             standings=tuple(claims),
-            measured={"methods": {figure.name: measured(found) for figure, found in tracks.items()}},
+            measured={"methods": {figure.name: measured(actual) for figure, actual in tracks.items()}},
             judged=not quick,
             rows=tuple(figure.name for figure in tracks),
         ),

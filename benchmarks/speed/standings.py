@@ -105,10 +105,10 @@ def reached(method: Method, points: Sequence[Point], target: float) -> Reached |
     return Reached(method, _followed(*known[-2:], target), True)
 
 
-def _followed(one: Point, other: Point, target: float) -> float:
+def _followed(point: Point, next_point: Point, target: float) -> float:
     """The line through two points, in logarithms."""
-    share = math.log(target / one.error) / math.log(other.error / one.error)
-    return one.time * (other.time / one.time) ** share
+    share = math.log(target / point.error) / math.log(next_point.error / point.error)
+    return point.time * (next_point.time / point.time) ** share
 
 
 def times(tracks: Tracks, targets: Iterable[float], reference_error: float) -> dict[float, tuple[Reached, ...]]:
@@ -152,14 +152,14 @@ def with_point_by_line(points: Sequence[Point], samples: int, error: float) -> l
 
 def curves(tracks: Tracks, least: float, judged: Sequence[Standing] = ()) -> tuple[Curve, ...]:
     """least : points of smaller errors are left out. judged : who is the best of his side in none stays in the background."""
-    found, best = [], {side.method for standing in judged for side in (standing.ours, standing.rival)}
+    result, best = [], {side.method for standing in judged for side in (standing.ours, standing.rival)}
     for method, points in tracks.items():
-        shown = [point for point in points if point.error >= least]
-        spread = tuple((min(point.seconds), max(point.seconds)) for point in shown)
-        x, y = [point.time for point in shown], [point.error for point in shown]
+        visible_points = [point for point in points if point.error >= least]
+        spread = tuple((min(point.seconds), max(point.seconds)) for point in visible_points)
+        x, y = [point.time for point in visible_points], [point.error for point in visible_points]
         minor = bool(best) and method not in best
-        found.append(Curve(method.name, x, y, ours=method.ours, spread=spread, minor=minor))
-    return tuple(found)
+        result.append(Curve(method.name, x, y, ours=method.ours, spread=spread, minor=minor))
+    return tuple(result)
 
 
 def measured(tracks: Tracks) -> dict[str, object]:

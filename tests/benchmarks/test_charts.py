@@ -102,9 +102,9 @@ EVERY_KIND = (
 
 @pytest.mark.parametrize("chart", EVERY_KIND)
 def test_a_chart_is_drawn_from_its_figures_as_it_was_drawn_when_it_was_measured(chart, tmp_path, capsys):
-    status, told = charts.run_all("subject", {"sweep": lambda quick: [chart]}, tmp_path)
-    (tmp_path / "figures.json").write_text(json.dumps({"exit_status": status, **told}, allow_nan=False), encoding="utf-8")
-    assert charts.redraw(charts.read(tmp_path / "figures.json"), tmp_path / "again") == (0, told)
+    status, sentence = charts.run_all("subject", {"sweep": lambda quick: [chart]}, tmp_path)
+    (tmp_path / "figures.json").write_text(json.dumps({"exit_status": status, **sentence}, allow_nan=False), encoding="utf-8")
+    assert charts.redraw(charts.read(tmp_path / "figures.json"), tmp_path / "again") == (0, sentence)
     assert (tmp_path / "again" / "subject-name.svg").read_bytes() == (tmp_path / "subject-name.svg").read_bytes()
 
 

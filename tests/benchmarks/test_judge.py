@@ -36,8 +36,8 @@ def test_good_pictures_pass_and_a_fault_of_each_family_is_found_in_each(block):
 
 def test_a_chart_counts_what_is_missed_at_how_few_false_alarms():
     clean = {"ours": np.arange(100.0) / 100, "SSIM": np.arange(10.0), "FLIP": np.zeros(10)}
-    found = {faults.FAULTS[0]: {"ours": np.array([2.0, 0.5]), "SSIM": np.array([8.5]), "FLIP": np.zeros(1)}}
-    chart = detection._chart("all", found, clean)
+    values = {faults.FAULTS[0]: {"ours": np.array([2.0, 0.5]), "SSIM": np.array([8.5]), "FLIP": np.zeros(1)}}
+    chart = detection._chart("all", values, clean)
     ours, ssim, _ = chart.curves
     assert list(ours.x) == [1e-2, 3e-2, 0.1, 0.3] and list(ours.y) == [0.5] * 4
     assert list(ssim.x) == [0.1, 0.3] and list(ssim.y) == [0.0, 0.0]

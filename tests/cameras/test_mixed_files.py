@@ -135,12 +135,12 @@ MIXED = (
 
 
 def given(make, folder) -> Path | str:
-    made = make(folder) if make in (colmap_binary, realitycapture) else make()
-    if isinstance(made, dict):
-        for name, text in made.items():
+    contents = make(folder) if make in (colmap_binary, realitycapture) else make()
+    if isinstance(contents, dict):
+        for name, text in contents.items():
             (folder / name).write_text(text)
         return folder
-    return made
+    return contents
 
 
 @pytest.mark.parametrize("make", MIXED)
@@ -174,11 +174,11 @@ def test_a_camera_that_is_damaged_is_no_other_kind_of_camera_and_refuses_the_fil
 
 def test_a_hundred_panoramas_are_one_note():
     images = "".join(f"{i} 1 0 0 0 0 0 4 {min(i, 2)} p{i}.png\n\n" for i in range(1, 101))
-    found = cameras.FORMATS["colmap"]
+    actual = cameras.FORMATS["colmap"]
     texts = colmap() | {"images.txt": images}
     from viewcam_addon.cameras.source import Source
 
-    (camera,) = found.read(Source(texts), GIVEN)
+    (camera,) = actual.read(Source(texts), GIVEN)
     assert len(camera.notes) == 1 and len(camera.notes[0]) < 300 and len(camera.left_out) == 99
 
 

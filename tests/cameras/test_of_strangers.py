@@ -38,11 +38,11 @@ def read(text):
 @pytest.mark.parametrize("name", ["OrbitControls", "TrackballControls", "MapControls", "ArcballControls"])
 @pytest.mark.parametrize("before", ["", "camera.lookAt(0, 5, 0);"])
 def test_controls_turn_the_camera_to_their_target_whatever_it_looked_at_before(name, before):
-    made = f"{before} const controls = new THREE.{name}(camera, canvas);"
-    assert read(THREE + made).pinhole.look_at == (0, 0, 0)
+    program = f"{before} const controls = new THREE.{name}(camera, canvas);"
+    assert read(THREE + program).pinhole.look_at == (0, 0, 0)
     with pytest.raises(InputError, match="write the target in plain numbers"):
-        read(THREE + made + "controls.target.set(1, height, 0);")
-    aimed = read(THREE + made + "controls.target.set(1, 2, 0);")
+        read(THREE + program + "controls.target.set(1, height, 0);")
+    aimed = read(THREE + program + "controls.target.set(1, 2, 0);")
     assert aimed.pinhole.look_at == (1, 2, 0) and any(name in note for note in aimed.notes)
 
 
@@ -95,8 +95,8 @@ REFUSED = {
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_would_be_another_camera_is_refused(what):
-    text, told = REFUSED[what]
-    with pytest.raises(InputError, match=told):
+    text, sentence = REFUSED[what]
+    with pytest.raises(InputError, match=sentence):
         read(text)
 
 

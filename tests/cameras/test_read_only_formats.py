@@ -419,8 +419,8 @@ def test_polycams_pictures_are_named_from_whichever_folder_is_given(tmp_path):
         folder = tmp_path / "keyframes" / f"{kind}cameras"
         folder.mkdir(parents=True)
         (folder / "123.json").write_text(document)
-        for given in (tmp_path, folder, folder / "123.json"):
-            (camera,) = cameras.read(given)
+        for path in (tmp_path, folder, folder / "123.json"):
+            (camera,) = cameras.read(path)
             assert (camera.name, camera.image) == ("123", f"keyframes/{kind}images/123.jpg")
     (tmp_path / "frame_00001.json").write_text(document)
     assert cameras.read(tmp_path / "frame_00001.json")[0].image == "frame_00001.jpg"
@@ -429,17 +429,17 @@ def test_polycams_pictures_are_named_from_whichever_folder_is_given(tmp_path):
 @pytest.mark.parametrize("name", CENTRED)
 def test_gaussian_splatting_lists_camera_to_world(name):
     known = Known(name)
-    said = {"id": 0, "img_name": "00001", "width": known.width, "height": known.height, "fx": known.f_x, "fy": known.f_y}
-    said |= {"position": known.e.tolist(), "rotation": known.opencv.T.tolist()}
-    read = the_same(cameras.read(json.dumps([said])), known)
+    values = {"id": 0, "img_name": "00001", "width": known.width, "height": known.height, "fx": known.f_x, "fy": known.f_y}
+    values |= {"position": known.e.tolist(), "rotation": known.opencv.T.tolist()}
+    read = the_same(cameras.read(json.dumps([values])), known)
     assert read.name == "00001" and any("principal point" in note for note in read.notes)
 
 
 def test_gaussian_splattings_principal_point_counts_where_it_is_said():
     known = Known("shifted")
-    said = {"id": 0, "img_name": "1", "width": known.width, "height": known.height, "fx": known.f_x, "fy": known.f_y}
-    said |= {"position": known.e.tolist(), "rotation": known.opencv.T.tolist(), "cx": known.c_x, "cy": known.c_y}
-    read = the_same(cameras.read(json.dumps([said])), known)
+    values = {"id": 0, "img_name": "1", "width": known.width, "height": known.height, "fx": known.f_x, "fy": known.f_y}
+    values |= {"position": known.e.tolist(), "rotation": known.opencv.T.tolist(), "cx": known.c_x, "cy": known.c_y}
+    read = the_same(cameras.read(json.dumps([values])), known)
     assert not any("principal point" in note for note in read.notes)
 
 
@@ -473,7 +473,7 @@ K = {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "image_size": [640, 480]}
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "sentence"),
     [
         ({"radial_distortion": [0.1, 0.2]}, "radialdistortion"),
         ({"kc": [0.1, 0.2]}, "kc"),
@@ -492,8 +492,8 @@ K = {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "image_size": [640, 480]}
         ({"K": [[1.2, 0, 0.5], [0, 1.6, 0.5], [0, 0, 1]]}, "widths of the picture"),
     ],
 )
-def test_what_opencvs_names_leave_open_is_refused_and_not_guessed(more, told):
-    with pytest.raises(InputError, match=told):
+def test_what_opencvs_names_leave_open_is_refused_and_not_guessed(more, sentence):
+    with pytest.raises(InputError, match=sentence):
         cameras.read(json.dumps({**K, **more}))
 
 
@@ -504,7 +504,7 @@ def test_a_distortion_that_no_picture_shows_is_taken_and_its_figure_said():
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "sentence"),
     [
         ({"camera_intrinsics": [700, 700, 400, 300]}, "has camera_intrinsics, which programs read differently"),
         ({"K": [[700, 0, 400], [0, 700, 300], [0, 0, 1]]}, "has K, which"),
@@ -514,13 +514,13 @@ def test_a_distortion_that_no_picture_shows_is_taken_and_its_figure_said():
         ({"w": 800}, "w 800 and the size is given as 640 × 480"),
     ],
 )
-def test_what_a_transforms_json_says_in_other_words_is_not_passed_over(more, told):
+def test_what_a_transforms_json_says_in_other_words_is_not_passed_over(more, sentence):
     frame = {"file_path": "a.png", "transform_matrix": np.eye(4).tolist()}
-    given = Options(size=(640, 480))
-    assert cameras.read(json.dumps({"camera_angle_x": 0.7, "frames": [frame]}), options=given)
+    options = Options(size=(640, 480))
+    assert cameras.read(json.dumps({"camera_angle_x": 0.7, "frames": [frame]}), options=options)
     for document in ({**more, "frames": [frame]}, {"frames": [{**frame, **more}]}):
-        with pytest.raises(InputError, match=told):
-            cameras.read(json.dumps({"camera_angle_x": 0.7, **document}), options=given)
+        with pytest.raises(InputError, match=sentence):
+            cameras.read(json.dumps({"camera_angle_x": 0.7, **document}), options=options)
 
 
 def test_a_camera_of_usd_stands_at_every_time_that_has_a_sample(tmp_path):
@@ -593,16 +593,16 @@ def test_a_window_of_a_sensor_sees_what_the_sensor_sees_there(form, size, binnin
     sensor = points[:, :2] / points[:, 2:] * f + [c_x + 0.5, c_y + 0.5]  # from the corner of the sensor
     there = (sensor - roi[:2]) / [across, down]
     assert np.abs(np.column_stack([column, wanted[1] - row]) - there).max() < 1e-9
-    told = any("window of its sensor" in note for note in camera.notes)
-    assert told == ((across, down, *roi) != (1, 1, 0, 0, 0, 0))
+    is_noted = any("window of its sensor" in note for note in camera.notes)
+    assert is_noted == ((across, down, *roi) != (1, 1, 0, 0, 0, 0))
 
 
 def test_yaml_in_brackets_is_read_as_pyyaml_reads_it():
     from viewcam_addon.cameras import yaml as ours
 
-    theirs = pytest.importorskip("yaml")
+    yaml = pytest.importorskip("yaml")
     text = "a: {rows: 3, 'b c': [1.5, 2, [x y, 4]], d: {e: http://f/g, h: {}}}\nk: [[1, 2], [3, -4.0e-3]]\n"
-    assert ours.read(text) == theirs.safe_load(text)
+    assert ours.read(text) == yaml.safe_load(text)
     for broken in ("[1, 2", "[1 2]]", "{a: 1", "{a: 1]", "[" * 50 + "]" * 50, "{[1]: 2}"):
         assert ours.read(f"k: {broken}\nl: 1\n").get("k") in (broken, f"{broken} l: 1", None)
 

@@ -222,28 +222,30 @@ def test_what_it_can_not_say_it_refuses_and_never_leaves_out(tmp_path, form, nam
     assert not (form in NO_MIRROR and pinhole.mirrored)
     if form not in NO_POSE:
         points = points_before(pinhole)
-        ours, theirs = pinhole.project(points), back.pinhole.project(points)
+        ours, expected = pinhole.project(points), back.pinhole.project(points)
         limit = max(1e-3, 64 * (FLOAT32 if form == "usd" else FLOAT64) * max(*pinhole.distance) * 1e6)
-        assert np.hypot(ours[0] - theirs[0], ours[1] - theirs[1]).max() < limit
+        assert np.hypot(ours[0] - expected[0], ours[1] - expected[1]).max() < limit
 
 
 @pytest.mark.parametrize("form", [form for form in OURS if form not in NO_POSE])
 def test_several_are_written_in_their_order_and_none_is_chosen_silently(tmp_path, form):
-    given = [Camera(name, CAMERAS[name]) for name in ("plain", "portrait", "wide", "rolled")]
+    written_cameras = [Camera(name, CAMERAS[name]) for name in ("plain", "portrait", "wide", "rolled")]
     several = cameras.FORMATS[form].SUFFIX == "" or form in ("sidecar", "opencv")
     path = tmp_path if several else tmp_path / f"all{cameras.FORMATS[form].SUFFIX}"
     if form == "opencv":  # a file for each
-        assert {file.name for file in cameras.save(given, path, form)} == {f"{camera.name}.yml" for camera in given}
+        assert {file.name for file in cameras.save(written_cameras, path, form)} == {
+            f"{camera.name}.yml" for camera in written_cameras
+        }
         return
-    cameras.save(given, path, form)
+    cameras.save(written_cameras, path, form)
     back = cameras.read(path, options=Options(size=(640, 360)))
     names = [camera.name for camera in back]
     assert names == (
         ["0", "1", "2", "3"]
         if form == "bop"
-        else sorted(c.name for c in given)
+        else sorted(c.name for c in written_cameras)
         if form == "sidecar"
-        else [c.name for c in given]
+        else [c.name for c in written_cameras]
     )
     with pytest.raises(InputError, match=f"{names[0]}.*{names[3]}"):
         cameras.choose(back)
@@ -320,10 +322,10 @@ def test_a_folder_with_files_of_others_says_which_were_not_read(tmp_path):
 
 @pytest.mark.parametrize("form", ["transforms", "colmap", "gltf", "usd", "opencv", "ros"])
 def test_what_is_written_remembers_axes_and_scale_and_says_so_where_others_are_chosen(tmp_path, form):
-    given = Options(axes="y_up", scale=0.01)
+    options = Options(axes="y_up", scale=0.01)
     path = tmp_path / f"a{cameras.FORMATS[form].SUFFIX}"
-    cameras.save([Camera("a", CAMERAS["plain"])], path, form, given)
-    (as_written,), (otherwise,) = cameras.read(path, options=given), cameras.read(path)
+    cameras.save([Camera("a", CAMERAS["plain"])], path, form, options)
+    (as_written,), (otherwise,) = cameras.read(path, options=options), cameras.read(path)
     assert not any("was written with" in note for note in as_written.notes)
     assert any("axes=y_up scale=0.01" in note for note in otherwise.notes)
 
@@ -344,11 +346,11 @@ def test_a_world_is_leveled_by_its_cameras_as_nerfstudio_does(tilt):
     turn, _ = rotations.Rotation.align_vectors([tilt], [(0, 0, 1)])
     angles = np.linspace(0, 2 * np.pi, 8, endpoint=False)
     eyes = np.stack([7 * np.cos(angles), 7 * np.sin(angles), np.full(8, 3.0)], axis=-1)
-    made = [
+    turned = [
         Camera(f"{i}", Pinhole(tuple(eye), tuple(turn.apply((0, 0, 1))), tilt, 600, 640, 360))
         for i, eye in enumerate(turn.apply(eyes))
     ]
-    cameras_read = cameras.read(cameras.write(made, "transforms"), options=Options(up_from="cameras"))
+    cameras_read = cameras.read(cameras.write(turned, "transforms"), options=Options(up_from="cameras"))
     ups = np.mean([camera.pinhole.picture_axes()[1] for camera in cameras_read], axis=0)
     assert ups / np.linalg.norm(ups) == pytest.approx((0, 0, 1), abs=1e-14)
     assert [camera.pinhole.eye[2] for camera in cameras_read] == pytest.approx([3.0] * 8, abs=1e-13)
@@ -359,6 +361,6 @@ def test_a_world_is_leveled_by_its_cameras_as_nerfstudio_does(tilt):
 
 
 def test_cameras_whose_ups_cancel_out_level_nothing():
-    made = [Camera(f"{up}", Pinhole((7, 0, 0), (0, 0, 0), (0, 0, up), 600, 640, 360)) for up in (-1, 1)]
+    with_ups = [Camera(f"{up}", Pinhole((7, 0, 0), (0, 0, 0), (0, 0, up), 600, 640, 360)) for up in (-1, 1)]
     with pytest.raises(InputError, match="cancel out"):
-        cameras.read(cameras.write(made, "transforms"), options=Options(up_from="cameras"))
+        cameras.read(cameras.write(with_ups, "transforms"), options=Options(up_from="cameras"))

@@ -167,11 +167,11 @@ def test_what_mitsuba_reads_we_read_as_it_does(mitsuba, sensor, transform, film)
         f'</transform><film type="hdrfilm">{FILMS[film]}</film></sensor><emitter type="spot"><transform name="to_world">'
         '<lookat origin="1,1,1" target="0,0,0" up="0,1,0"/></transform></emitter></scene>'
     )
-    (theirs,) = mitsuba.load_string(text).sensors()
+    (expected,) = mitsuba.load_string(text).sensors()
     (camera,) = cameras.read(text)
     pinhole = camera.pinhole
-    assert (pinhole.width, pinhole.height) == tuple(theirs.film().crop_size())
-    check_rays(pinhole, rays_of_mitsuba(mitsuba, theirs, PLACES), PLACES)
+    assert (pinhole.width, pinhole.height) == tuple(expected.film().crop_size())
+    check_rays(pinhole, rays_of_mitsuba(mitsuba, expected, PLACES), PLACES)
     assert pinhole.mirrored == (transform == "mirror")
 
 
@@ -209,10 +209,10 @@ def test_several_sensors_are_several_cameras():
     ],
 )
 def test_what_mitsuba_reads_as_a_dictionary_we_read_as_it_does(mitsuba, text):
-    theirs = eval(text, {"mi": mitsuba})
+    expected = eval(text, {"mi": mitsuba})
     (camera,) = cameras.read(text)
-    assert (camera.pinhole.width, camera.pinhole.height) == tuple(theirs.film().size())
-    check_rays(camera.pinhole, rays_of_mitsuba(mitsuba, theirs, PLACES), PLACES)
+    assert (camera.pinhole.width, camera.pinhole.height) == tuple(expected.film().size())
+    check_rays(camera.pinhole, rays_of_mitsuba(mitsuba, expected, PLACES), PLACES)
 
 
 # ---- pbrt: its source's formulas, each matrix as it stands there
@@ -346,12 +346,13 @@ def test_what_of_pbrt_is_no_pinhole_or_unsaid_is_refused(text, sentence):
 )
 def test_a_camera_of_pbrt_that_stands_still_may_be_said_at_both_times(text):
     still = 'LookAt 1 2 3 0 0 0 0 0 1 Camera "perspective"'
-    given = Options(size=(640, 480))
+    options = Options(size=(640, 480))
     assert (
-        cameras.read(f'{text} Camera "perspective"', options=given)[0].pinhole == cameras.read(still, options=given)[0].pinhole
+        cameras.read(f'{text} Camera "perspective"', options=options)[0].pinhole
+        == cameras.read(still, options=options)[0].pinhole
     )
     with pytest.raises(InputError, match="moves while the shutter"):
-        cameras.read(f'{text} ActiveTransform StartTime Translate 1 0 0 Camera "perspective"', options=given)
+        cameras.read(f'{text} ActiveTransform StartTime Translate 1 0 0 Camera "perspective"', options=options)
 
 
 # ---- POV-Ray: the documented ray through each place of the picture
@@ -372,17 +373,17 @@ def pov_vectors(text):
 
 @pytest.mark.parametrize("name", CAMERAS)
 def test_by_pov_rays_formula_what_we_write_is_the_same_picture(name):
-    given = pov_vectors(cameras.write([of(name)], "pov_ray"))
-    if "look_at" in given:
-        ahead = given["look_at"] - given["location"]
+    vectors = pov_vectors(cameras.write([of(name)], "pov_ray"))
+    if "look_at" in vectors:
+        ahead = vectors["look_at"] - vectors["location"]
         ahead /= np.linalg.norm(ahead)
-        right = np.cross(given["sky"], ahead)
+        right = np.cross(vectors["sky"], ahead)
         right /= np.linalg.norm(right)
-        handed = math.copysign(1, np.cross(given["up"], given["direction"]) @ given["right"])
-        given["up"] = np.cross(ahead, right) * np.linalg.norm(given["up"])
-        given["right"] = handed * right * np.linalg.norm(given["right"])
-        given["direction"] = ahead * np.linalg.norm(given["direction"])
-    rays = pov_rays(*(given[key] for key in ("location", "right", "up", "direction")), PLACES)
+        handed = math.copysign(1, np.cross(vectors["up"], vectors["direction"]) @ vectors["right"])
+        vectors["up"] = np.cross(ahead, right) * np.linalg.norm(vectors["up"])
+        vectors["right"] = handed * right * np.linalg.norm(vectors["right"])
+        vectors["direction"] = ahead * np.linalg.norm(vectors["direction"])
+    rays = pov_rays(*(vectors[key] for key in ("location", "right", "up", "direction")), PLACES)
     pinhole = CAMERAS[name]
     # Of the eye far away the look-at point's rounding remains: 2⁻⁵³ of it, across the distance to it.
     reach = max(map(abs, pinhole.look_at)) / math.dist(pinhole.eye, pinhole.look_at)
@@ -611,10 +612,10 @@ def test_three_js_view_offset_shows_a_part_of_the_full_picture(part, size):
     assert (camera.pinhole.width, camera.pinhole.height) == size
     points = np.random.default_rng(5).normal(size=(100, 3))
     column, row, _ = full.pinhole.project(points)
-    found = camera.pinhole.project(points)
+    actual = camera.pinhole.project(points)
     x, y, width, height = part
-    assert found[0] == pytest.approx((column - x) * size[0] / width, abs=1e-9 * full_width)
-    assert size[1] - found[1] == pytest.approx((full_height - row - y) * size[1] / height, abs=1e-9 * full_width)
+    assert actual[0] == pytest.approx((column - x) * size[0] / width, abs=1e-9 * full_width)
+    assert size[1] - actual[1] == pytest.approx((full_height - row - y) * size[1] / height, abs=1e-9 * full_width)
 
 
 def test_three_js_view_offset_says_the_size_and_may_be_cleared():

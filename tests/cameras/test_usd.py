@@ -70,9 +70,9 @@ def test_what_is_chosen_comes_on_top_of_what_the_stage_says():
 
 @pytest.mark.parametrize("name", ["plain", "shifted_and_not_square", "telephoto"])
 def test_what_was_written_with_y_up_is_the_same_camera_whether_that_is_chosen_or_not(name):
-    given = [Camera("a", CAMERAS[name])]
+    written_cameras = [Camera("a", CAMERAS[name])]
     for options in (Options(), Options(axes="y_up")):
-        text = cameras.write(given, "usd", options)
+        text = cameras.write(written_cameras, "usd", options)
         assert read(text)[0].pinhole == read(text, Options(axes="y_up"))[0].pinhole == CAMERAS[name] or options.axes == "as_is"
         assert read(text)[0].pinhole == CAMERAS[name] and not any("written with" in note for note in read(text)[0].notes)
 

@@ -98,7 +98,7 @@ def test_text_on_standard_input_is_answered_on_standard_output(monkeypatch, capf
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "sentence"),
     [
         (["camera", "MODEL", "--camera", "middle"], "'left', 'right'"),
         (["camera", "MODEL", "--list", "--to", "gltf"], "--list and --to"),
@@ -111,12 +111,12 @@ def test_text_on_standard_input_is_answered_on_standard_output(monkeypatch, capf
         (["camera", "none.json"], "none.json"),
     ],
 )
-def test_what_is_wrong_is_one_sentence_and_nothing_is_written(model, tmp_path, monkeypatch, capfd, words, told):
+def test_what_is_wrong_is_one_sentence_and_nothing_is_written(model, tmp_path, monkeypatch, capfd, words, sentence):
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.rglob("*"))
     assert cli.main([str(model) if word == "MODEL" else word for word in words]) == 2
     (line,) = capfd.readouterr().err.splitlines()
-    assert line.startswith("viewcam camera: ") and told in line
+    assert line.startswith("viewcam camera: ") and sentence in line
     assert sorted(tmp_path.rglob("*")) == before
 
 

@@ -86,12 +86,12 @@ def compared(reference, scene, level, samples):
 @pytest.fixture(scope="module")
 def reference():
     """reference(level, samples) → the right picture, rendered once."""
-    scene, made = build(), {}
+    scene, pictures_by_name = build(), {}
 
     def rendered(level, samples):
-        if (level, samples) not in made:
-            made[level, samples] = picture(scene, level, samples, 0)
-        return made[level, samples]
+        if (level, samples) not in pictures_by_name:
+            pictures_by_name[level, samples] = picture(scene, level, samples, 0)
+        return pictures_by_name[level, samples]
 
     return rendered
 

@@ -141,9 +141,9 @@ def test_a_twin_whose_normals_are_a_little_off_is_told_from_the_one_that_is_seen
 
 def test_leaves_of_a_pixel_are_seen(reference):
     """Else the other tests prove nothing of them."""
-    shown = reference["Object Index"][..., 0] == 4
-    alone = tolerances.at_borders(np.where(shown, 4, -1))
-    assert alone.sum() > 0.5 * shown.sum() > 60
+    on_leaves = reference["Object Index"][..., 0] == 4
+    alone = tolerances.at_borders(np.where(on_leaves, 4, -1))
+    assert alone.sum() > 0.5 * on_leaves.sum() > 60
 
 
 def test_nothing_is_explained_without_the_scene(tracer, reference):

@@ -199,7 +199,7 @@ class Reader:
 
     def _compare_events(self, example: Example, folder: Path) -> None:
         """The keys of each event that is shown, with those of a batch in which one shot fails and of one in which none does."""
-        shown = {event["event"]: [*event] for event in map(json.loads, example.text.splitlines())}
+        keys_by_event = {event["event"]: [*event] for event in map(json.loads, example.text.splitlines())}
         right = folder / "events" / "right.png"
         right.parent.mkdir()
         right.symlink_to(folder / "shots.csv" / "right.png")  # which is no folder
@@ -209,7 +209,7 @@ class Reader:
         lines = (failed.stdout + self._must(words, folder)).splitlines()
         record = {event["event"]: [*event] for event in (json.loads(line) for line in lines if line.startswith("{"))}
         rare = {"stopping": ["event", "time", "signal"], "shot_elsewhere": ["event", "time", "shot"]}
-        assert shown == record | rare, failed.stderr
+        assert keys_by_event == record | rare, failed.stderr
 
     def _must(self, command: list[str], folder: Path) -> str:
         done = self._run(command, folder)

@@ -57,8 +57,8 @@ def as_a_user_sees(mutant: Path) -> list[str]:
 
 
 def assert_met(kind: str, count: int, folder: Path) -> None:
-    found = failures(kind, count, folder)
-    assert not found, f"{len(found)} of {count} mutants:\n" + "\n".join(found[:20])
+    actual = failures(kind, count, folder)
+    assert not actual, f"{len(actual)} of {count} mutants:\n" + "\n".join(actual[:20])
 
 
 SAMPLE = {"scene": 60, "exr": 40, "shots": 200, "sidecar": 40, "labels": 60, "cameras-all": 225}
@@ -102,5 +102,5 @@ def test_every_hostile_file_of_cameras_is_read_or_refused_in_a_sentence(name, tm
     ],
 )
 def test_what_a_mutant_can_do_is_seen(kind, words, tmp_path):
-    found = failures(kind, 4, tmp_path)
-    assert [each[: len(words)] for each in found] == [words], found
+    actual = failures(kind, 4, tmp_path)
+    assert [each[: len(words)] for each in actual] == [words], actual

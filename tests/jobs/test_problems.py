@@ -132,24 +132,24 @@ def test_a_thousand_rows_with_every_kind_of_bad_one_name_each_by_line_and_column
     assert len(KINDS) >= 40
     lines = [HEADER, *(line_of({}, line) for line in range(2, 1002))]
     expected = []
-    for number, (changes, told) in enumerate(KINDS):
+    for number, (changes, problem) in enumerate(KINDS):
         line = 7 + 13 * number
         lines[line - 1] = line_of(changes, line)
-        if told is None:
+        if problem is None:
             expected.append((f"line {line} ", ""))
-        for columns, sentence in told or ():
+        for columns, sentence in problem or ():
             expected.append((f"line {line}, column{'s' * (', ' in columns)} {columns}", sentence))
     path = tmp_path / "thousand.csv"
     path.write_bytes("\r\n".join(lines).encode("utf-8", "surrogateescape"))
     problems = list(problems_of(path, ["Camera"]))
     for place, sentence in expected:
-        found = [
-            told
-            for told in problems
-            if told.startswith((place + " ", place + ":")) or (not sentence and told.startswith(place))
+        result = [
+            problem
+            for problem in problems
+            if problem.startswith((place + " ", place + ":")) or (not sentence and problem.startswith(place))
         ]
-        assert len(found) == 1 and sentence in found[0], f"{place} … {sentence}: told was {found}"
-        problems.remove(found[0])
+        assert len(result) == 1 and sentence in result[0], f"{place} … {sentence}: told was {result}"
+        problems.remove(result[0])
     assert not problems, f"more was told than is wrong: {problems}"
 
 
@@ -158,10 +158,10 @@ def test_each_problem_is_one_printable_line_in_the_order_of_the_file(tmp_path):
     (tmp_path / "bad.csv").write_bytes("\n".join(lines).encode("utf-8", "surrogateescape"))
     problems = problems_of(tmp_path / "bad.csv", ["Camera"])
     assert all(problem.isprintable() and len(problem) < 300 for problem in problems)
-    shapeless = {number for number, (_, told) in enumerate(KINDS, start=2) if told is None}
-    told = [int(problem.split()[1].rstrip(",")) for problem in problems]
-    assert [line for line in told if line not in shapeless] == sorted(line for line in told if line not in shapeless)
-    assert {*told} == {*range(2, len(KINDS) + 2)} - {line_of_first_good()}
+    shapeless = {number for number, (_, entries) in enumerate(KINDS, start=2) if entries is None}
+    entries = [int(problem.split()[1].rstrip(",")) for problem in problems]
+    assert [line for line in entries if line not in shapeless] == sorted(line for line in entries if line not in shapeless)
+    assert {*entries} == {*range(2, len(KINDS) + 2)} - {line_of_first_good()}
 
 
 def line_of_first_good():
@@ -187,14 +187,14 @@ def test_more_than_a_hundred_problems_are_counted(tmp_path):
     (tmp_path / "bad.csv").write_text("\n".join(lines), encoding="utf-8")
     with pytest.raises(ShotsError) as raised:
         lists.read(tmp_path / "bad.csv")
-    told = str(raised.value).splitlines()
+    sentences = str(raised.value).splitlines()
     assert len(raised.value.problems) == 250
-    assert "250 problems" in told[0] and len(told) == MOST_SHOWN + 2
-    assert told[-1] == f"  … and {250 - MOST_SHOWN} more"
+    assert "250 problems" in sentences[0] and len(sentences) == MOST_SHOWN + 2
+    assert sentences[-1] == f"  … and {250 - MOST_SHOWN} more"
 
 
 @pytest.mark.parametrize(
-    ("header", "told"),
+    ("header", "sentence"),
     [
         ("name,camera,colour", ["line 1, column 'colour' is unknown: take it out"]),
         ("name,camera,Frame", ["line 1, column 'Frame' is unknown: write frame"]),
@@ -215,13 +215,13 @@ def test_more_than_a_hundred_problems_are_counted(tmp_path):
         ),
     ],
 )
-def test_what_is_wrong_with_the_header_is_told_once_and_not_in_each_row(tmp_path, header, told):
+def test_what_is_wrong_with_the_header_is_told_once_and_not_in_each_row(tmp_path, header, sentence):
     values = {"name": "a{}", "camera": "Camera", "frame": "1", "eye": "1 2 3", "eye_x": "1", "eye_z": "3", "look_at": "0 0 1"}
     values |= {"up": "0 0 1", "d": "5"}
     rows = [",".join(values.get(column, "") for column in header.split(",")).replace("{}", str(i)) for i in range(3)]
     if "up_x" in header or "colour" in header:
         rows = [row.replace("0 0 1", "") for row in rows]
-    assert list(problems_in(tmp_path, "list.csv", "\n".join([header, *rows]))) == told
+    assert list(problems_in(tmp_path, "list.csv", "\n".join([header, *rows]))) == sentence
 
 
 def test_with_a_wrong_header_the_rows_are_looked_at_all_the_same(tmp_path):
@@ -244,7 +244,7 @@ DEEP = "[" * 100_000 + "]" * 100_000
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "sentence"),
     [
         ("7", ["no list of shots"]),
         ('"a"', ["no list of shots"]),
@@ -287,10 +287,10 @@ DEEP = "[" * 100_000 + "]" * 100_000
     ],
     ids=lambda value: value[:30] if isinstance(value, str) else "",
 )
-def test_what_is_wrong_with_a_document_is_told(tmp_path, text, told):
+def test_what_is_wrong_with_a_document_is_told(tmp_path, text, sentence):
     problems = problems_in(tmp_path, "list.json", text, ["C"])
-    assert len(problems) == len(told), problems
-    for problem, part in zip(problems, told, strict=True):
+    assert len(problems) == len(sentence), problems
+    for problem, part in zip(problems, sentence, strict=True):
         assert part in problem and problem.isprintable() and len(problem) < 300, problem
 
 

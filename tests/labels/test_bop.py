@@ -28,9 +28,9 @@ def scene(i):
     is hidden as a whole."""
     small = np.array([moved(-2, 0, 0.4, 0.2 + i, 0.4)])
     askew = np.array([moved(-1, -2, 0.5, 0.5) @ np.array([[-0.5, 0.2, 0, 0], [0, 0.3, 0, 0], [0, 0.1, 0.4, 0], [0, 0, 0, 1]])])
-    found = room(replace(CAMERA, eye=(1 + 0.2 * i, -7, 3)), ball=moved(0.1, 2, 0.8, scale=0.3) if i == 2 else None)
+    actual = room(replace(CAMERA, eye=(1 + 0.2 * i, -7, 3)), ball=moved(0.1, 2, 0.8, scale=0.3) if i == 2 else None)
     more = Object("Cube.001", "cube", small), Object("Askew", "cube", askew)
-    return replace(found, objects=(*found.objects, *more))
+    return replace(actual, objects=(*actual.objects, *more))
 
 
 @pytest.fixture(scope="module")
@@ -74,8 +74,8 @@ def test_each_pixels_point_projects_to_the_pixels_centre_from_the_world_and_from
             for points in (of_world, of_model):
                 x, y, w = k @ points.T
                 worst = max([worst, *np.abs(x / w - columns), *np.abs(y / w - rows)])
-                shown = depth[rows, columns]
-                off = np.abs(points[:, 2] - shown)[shown > 0].max(initial=0.0)
+                depths = depth[rows, columns]
+                off = np.abs(points[:, 2] - depths)[depths > 0].max(initial=0.0)
                 # Half a step of the PNG, and in millimeters the rounding that PIXELS is of.
                 assert off <= camera["depth_scale"] / 2 + 0.01, f"depth is off by {off:.3g} mm"
     assert 0 < worst <= PIXELS, f"a point projects {worst:.3g} pixels beside its pixel's centre"
@@ -92,19 +92,19 @@ def test_our_reader_of_bop_finds_the_cameras_again(written):
 def test_masks_are_the_labels_to_the_pixel_and_their_figures_are_the_toolkits(written):
     hidden = invalid = 0
     for i, labels in enumerate(written.labels):
-        given = {each["id"]: each for each in labels.instances if each["amodal"]}
-        told = written.scene_gt[str(i)]
-        assert [each["instance_id"] for each in told] == list(given)
+        amodal = {each["id"]: each for each in labels.instances if each["amodal"]}
+        entry = written.scene_gt[str(i)]
+        assert [each["instance_id"] for each in entry] == list(amodal)
         depth = written.png(f"depth/{i:06d}")
         farthest = 65535.5 * written.scene_camera[str(i)]["depth_scale"] / 1000
         assert depth.dtype == np.uint16 and (farthest < 14) == (i == 1)
         np.testing.assert_array_equal(depth > 0, labels.image["Depth"][::-1, :, 0] < farthest)
-        for place, (each, info) in enumerate(zip(told, written.scene_gt_info[str(i)], strict=True)):
+        for place, (each, info) in enumerate(zip(entry, written.scene_gt_info[str(i)], strict=True)):
             whole, visible = (written.png(f"{kind}/{i:06d}_{place:06d}") for kind in ("mask", "mask_visib"))
             for mask in (whole, visible):
                 assert mask.dtype == np.uint8 and mask.shape == (48, 64) and set(np.unique(mask)) <= {0, 255}
             np.testing.assert_array_equal(visible > 0, labels.image["Instance"][::-1, :, 0] == each["instance_id"])
-            assert (whole[visible > 0] > 0).all() and (whole > 0).sum() == given[each["instance_id"]]["amodal"]["area"]
+            assert (whole[visible > 0] > 0).all() and (whole > 0).sum() == amodal[each["instance_id"]]["amodal"]["area"]
             assert info == {
                 "bbox_obj": box(whole) if visible.any() else [-1] * 4,
                 "bbox_visib": box(visible),

@@ -48,9 +48,9 @@ def test_the_exr_has_every_pass_to_the_last_bit(written):
 
 def test_the_passes_of_each_label_are_those_that_are_told_beforehand(written):
     labels, _ = written
-    told = [name for names in PASSES.values() for name in names]
-    assert list(labels.image.passes)[: len(told)] == told
-    assert all(name.startswith("Crypto") for name in list(labels.image.passes)[len(told) :])
+    entries = [name for names in PASSES.values() for name in names]
+    assert list(labels.image.passes)[: len(entries)] == entries
+    assert all(name.startswith("Crypto") for name in list(labels.image.passes)[len(entries) :])
 
 
 def test_no_json_of_an_older_frame_stands_beside_files_of_a_newer(written, tmp_path, monkeypatch):
@@ -122,8 +122,8 @@ def test_the_command_writes_what_the_function_finds(written, tmp_path, capfd):
         scene_file.write(frame, tmp_path / f"{i}.json")
     words = ["render", "1.json", "shot.exr", "--labels", ",".join(KINDS)]
     words += ["--previous", "0.json", "--next", "2.json", "--json", "result.json"]
-    given = [str(tmp_path / word) if word.endswith((".json", ".exr")) else word for word in words]
-    assert main(given) == 0
+    arguments = [str(tmp_path / word) if word.endswith((".json", ".exr")) else word for word in words]
+    assert main(arguments) == 0
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["labels"] == [str(tmp_path / f"shot.{ending}") for ending in ENDINGS]
     for ending in ENDINGS:
@@ -141,9 +141,9 @@ def test_the_command_writes_what_the_function_finds(written, tmp_path, capfd):
 )
 def test_what_is_wrong_is_one_sentence_before_anything_is_written(tmp_path, capfd, words, sentence):
     scene_file.write(room(), tmp_path / "scene.json")
-    given = [str(tmp_path / "scene.json") if word == "SCENE" else word for word in words]
+    arguments = [str(tmp_path / "scene.json") if word == "SCENE" else word for word in words]
     before = sorted(tmp_path.iterdir())
-    assert main(["render", str(tmp_path / "scene.json"), str(tmp_path / "out.exr"), *given]) == 2
+    assert main(["render", str(tmp_path / "scene.json"), str(tmp_path / "out.exr"), *arguments]) == 2
     (line,) = capfd.readouterr().err.strip().splitlines()
     assert sentence in line and sorted(tmp_path.iterdir()) == before
 
@@ -171,25 +171,25 @@ def run(*words):
 @pytest.mark.parametrize("kind", ["visible", "amodal"])
 def test_pycocotools_loads_it_and_finds_every_mask(pictures, tmp_path, kind):
     loader = pytest.importorskip("pycocotools.coco").COCO
-    found, folder = pictures
+    actual, folder = pictures
     assert run(folder, tmp_path / "all.json", *(["--amodal"] if kind == "amodal" else [])) == 0
     dataset = loader(tmp_path / "all.json")
     assert [each["name"] for each in dataset.loadCats(dataset.getCatIds())] == ["Ball", "Cube", "Floor"]
     images = {each["file_name"]: each for each in dataset.loadImgs(dataset.getImgIds())}
     assert list(images) == ["a.exr", "b.exr", "c.exr"]
-    for name, labels in found.items():
+    for name, labels in actual.items():
         image = images[f"{name}.exr"]
         assert (image["width"], image["height"]) == (64, 48)
-        given = {each["id"]: each for each in labels.instances if each[kind] is not None}
+        encoded = {each["id"]: each for each in labels.instances if each[kind] is not None}
         annotations = dataset.loadAnns(dataset.getAnnIds(image["id"]))
-        assert {each["instance_id"] for each in annotations} == set(given)
+        assert {each["instance_id"] for each in annotations} == set(encoded)
         for each in annotations:
-            mask, expected = dataset.annToMask(each), given[each["instance_id"]]
+            mask, expected = dataset.annToMask(each), encoded[each["instance_id"]]
             assert mask.sum() == each["area"] == expected[kind]["area"] and each["bbox"] == expected[kind]["bbox"]
             assert dataset.loadCats(each["category_id"])[0]["name"] == coco.category(expected["name"])
             if kind == "visible":
                 np.testing.assert_array_equal(mask, labels.image["Instance"][::-1, :, 0] == each["instance_id"])
-    hidden = [each for each in found["c"].instances if each["name"] == "Ball"]
+    hidden = [each for each in actual["c"].instances if each["name"] == "Ball"]
     assert [each["visible"] for each in hidden] == [None], "the test wants an object that is hidden as a whole"
     ids = dataset.getAnnIds()
     assert sorted(ids) == list(range(1, len(ids) + 1))

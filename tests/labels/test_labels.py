@@ -89,8 +89,8 @@ def test_labels_are_what_the_tracer_shows_at_level_geometry(camera):
     scene = room(camera)
     labels, passes = vp.label(scene), vp.render(scene, level="geometry")
     index = {each["id"]: each["object_index"] for each in labels.instances} | {0: 0}
-    shown = np.vectorize(index.get)(labels.image["Instance"].astype(int))
-    np.testing.assert_array_equal(shown, passes["Object Index"])
+    index_of_pixels = np.vectorize(index.get)(labels.image["Instance"].astype(int))
+    np.testing.assert_array_equal(index_of_pixels, passes["Object Index"])
     np.testing.assert_array_equal(labels.image["Material Index"], passes["Material Index"])
     np.testing.assert_allclose(labels.image["Depth"], passes["Depth"], rtol=2 * FLOAT32)
     np.testing.assert_allclose(labels.image["Position"], passes["Position"], atol=20 * FLOAT32)
@@ -123,8 +123,8 @@ def test_an_amodal_mask_is_the_object_alone(camera):
     for placed in scene.objects:
         for number, matrix in enumerate(placed.matrices):
             alone = Surfaces(replace(scene, objects=(replace(placed, matrix=matrix),))).instance[::-1] == 0
-            told = amodal.get((placed.name, number))
-            mask = mask_of(told["segmentation"]) if told else np.zeros_like(alone)
+            amodal_entry = amodal.get((placed.name, number))
+            mask = mask_of(amodal_entry["segmentation"]) if amodal_entry else np.zeros_like(alone)
             # Two ways to one ray, rounded apart: only a center within 1e-12 of an outline could differ, and none is.
             np.testing.assert_array_equal(mask, alone, err_msg=f"{placed.name} {number}")
 
@@ -133,8 +133,8 @@ def test_what_is_flattened_has_labels_too():
     flat = moved(0, -1, 0.5, 0.3, 0.5) @ np.diag([1, 1, 0, 1.0])
     scene = room(cubes=np.array([flat, moved(2, 1, 1)]))
     labels = vp.label(scene, ("depth", "normals", "position", "masks", "amodal", "flow"), next=scene)
-    shown = labels.image["Instance"][..., 0] != 0
-    assert all(np.isfinite(values[shown]).all() for values in labels.image.passes.values())
+    is_covered = labels.image["Instance"][..., 0] != 0
+    assert all(np.isfinite(values[is_covered]).all() for values in labels.image.passes.values())
     flattened = next(each for each in labels.instances if (each["name"], each["number"]) == ("Cube", 0))
     board = replace(scene.objects[2], matrix=flat)
     alone = Surfaces(replace(scene, objects=(board,))).instance[::-1] == 0
@@ -164,11 +164,11 @@ def test_run_lengths_of_a_part_of_a_picture_are_those_of_the_whole_picture(data)
         pictures.append(np.zeros((height, width), bool))
         pictures[-1][low : low + rows, left : left + columns] = covered
         windows.append((left, low, covered))
-    for found, picture in zip(masks.of_windows(windows, (height, width)), pictures, strict=True):
-        assert (found is None) == (not picture.any())
-        if found:
-            np.testing.assert_array_equal(mask_of(found["segmentation"]), picture[::-1])
-            assert min(found["segmentation"]["counts"][1:]) > 0 and found["area"] == picture.sum()
+    for values, picture in zip(masks.of_windows(windows, (height, width)), pictures, strict=True):
+        assert (values is None) == (not picture.any())
+        if values:
+            np.testing.assert_array_equal(mask_of(values["segmentation"]), picture[::-1])
+            assert min(values["segmentation"]["counts"][1:]) > 0 and values["area"] == picture.sum()
 
 
 @settings(max_examples=25)
@@ -179,11 +179,11 @@ def test_a_silhouette_ends_where_the_clip_range_begins(camera, near):
     windows = Silhouettes(Surfaces(scene)).windows()
     for number, (instance, window) in enumerate(zip(instances(scene), windows, strict=True)):
         alone = Surfaces(replace(scene, objects=(replace(instance.placed, matrix=instance.matrix),))).instance == 0
-        found = np.zeros_like(alone)
+        actual = np.zeros_like(alone)
         if window:
             left, low, covered = window
-            found[low : low + covered.shape[0], left : left + covered.shape[1]] = covered
-        np.testing.assert_array_equal(found, alone, err_msg=f"instance {number}")
+            actual[low : low + covered.shape[0], left : left + covered.shape[1]] = covered
+        np.testing.assert_array_equal(actual, alone, err_msg=f"instance {number}")
 
 
 def test_what_is_shown_is_in_its_silhouette_even_if_its_box_seems_beside_the_picture(monkeypatch):
@@ -270,16 +270,16 @@ def flow_of_poses(labels, here, there, motions):
     matrices = np.array([motions.get(number, np.eye(4)) for number in ids.ravel()]).reshape(*ids.shape, 4, 4)
     world = np.einsum("hwij,hwj->hwi", matrices[..., :3, :3], world) + matrices[..., :3, 3]
     inner, rotation, shift = intrinsics(there)
-    found = (world @ rotation.T + shift) @ inner.T
-    return found[..., :2] / found[..., 2:] - np.stack([columns, rows], -1)
+    angles = (world @ rotation.T + shift) @ inner.T
+    return angles[..., :2] / angles[..., 2:] - np.stack([columns, rows], -1)
 
 
 def largest_difference(labels, expected, name="Forward"):
     """Over all pixels that show something which both cameras see."""
     flow = labels.image[f"{name} Flow"][::-1].astype(float)
-    shown = (labels.image["Instance"] != 0)[::-1, :, 0] & (labels.image[f"{name} Hidden"] == 0)[::-1, :, 0]
-    assert shown.sum() > 100, "there is too little to compare"
-    return np.abs(flow - expected)[shown].max()
+    is_visible = (labels.image["Instance"] != 0)[::-1, :, 0] & (labels.image[f"{name} Hidden"] == 0)[::-1, :, 0]
+    assert is_visible.sum() > 100, "there is too little to compare"
+    return np.abs(flow - expected)[is_visible].max()
 
 
 @settings(max_examples=20)
@@ -311,11 +311,11 @@ def test_backward_is_towards_the_previous_frame(scene):
 
 def test_what_stands_still_before_a_still_camera_has_no_flow_at_all(scene):
     labels = vp.label(scene, ("masks", "flow"), next=room())
-    shown = labels.image["Instance"][..., 0] != 0
+    is_covered = labels.image["Instance"][..., 0] != 0
     # The point is projected back onto its own center, to the last bits.
-    assert np.abs(labels.image["Forward Flow"][shown]).max() < 1e-12
-    assert (labels.image["Forward Motion"][shown] == 0).all() and not labels.image["Forward Hidden"].any()
-    assert np.isnan(labels.image["Forward Flow"][~shown]).all()
+    assert np.abs(labels.image["Forward Flow"][is_covered]).max() < 1e-12
+    assert (labels.image["Forward Motion"][is_covered] == 0).all() and not labels.image["Forward Hidden"].any()
+    assert np.isnan(labels.image["Forward Flow"][~is_covered]).all()
 
 
 @settings(max_examples=10)
@@ -361,11 +361,11 @@ def test_a_point_is_hidden_where_the_other_frame_shows_another_one(x, y, z):
     point = (labels.image["Position"].astype(float) + labels.image["Forward Motion"].astype(float))[rows, columns]
     column, row, depth = camera.project(point)
     inside = (column >= 0) & (column < 64) & (row >= 0) & (row < 48)
-    shown = Tracer(after).surface_at(np.floor(column[inside]), np.floor(row[inside]), column[inside] % 1, row[inside] % 1)
+    rendered = Tracer(after).surface_at(np.floor(column[inside]), np.floor(row[inside]), column[inside] % 1, row[inside] % 1)
     hidden = labels.image["Forward Hidden"][rows, columns, 0] != 0
     assert hidden[~inside].all()
     # Float32 places each point within 1e-6; where what is before it is so near, either answer is right, and so at outlines.
-    nearer = depth[inside] - shown["Depth"][:, 0]
+    nearer = depth[inside] - rendered["Depth"][:, 0]
     sure = np.abs(np.abs(nearer) - 1e-4) > 0.9e-4
     assert sure.mean() > 0.97
     wrong = sure & (hidden[inside] != (nearer > 1e-4))
@@ -408,9 +408,9 @@ STEP = 1 / coverage.SAMPLES
 CRYPTOMATTE = "cryptomatte/542cafa"
 
 
-def soft(found, name, number=0):
-    told = next(each for each in found.instances if (each["name"], each["number"]) == (name, number))
-    return coverage.soft_mask(found.image, told["coverage"]["name"])
+def soft(labels, name, number=0):
+    entry = next(each for each in labels.instances if (each["name"], each["number"]) == (name, number))
+    return coverage.soft_mask(labels.image, entry["coverage"]["name"])
 
 
 def board(left, low, right, high):

@@ -55,8 +55,8 @@ def pick_the_engine():
         move(x, y)
         yield
         with bpy.context.temp_override(window=window(), area=area, region=where):
-            found = bpy.context.property
-        if found and found[1] == "render.engine":
+            actual = bpy.context.property
+        if actual and actual[1] == "render.engine":
             break
     for _ in range(len(bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items) + 6):
         if bpy.context.scene.render.engine == "VIEWCAM":

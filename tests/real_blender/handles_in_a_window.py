@@ -46,8 +46,8 @@ def views():
 def pixel_of(point, view=None):
     """Window coordinates of a point in world space, whole pixels as a mouse has them."""
     view = view or views()[-1]
-    found = location_3d_to_region_2d(view, view.data, Vector(point))
-    return round(view.x + found.x), round(view.y + found.y)
+    actual = location_3d_to_region_2d(view, view.data, Vector(point))
+    return round(view.x + actual.x), round(view.y + actual.y)
 
 
 def carried(point, from_pixel, to_pixel):
@@ -378,9 +378,9 @@ def drag_the_look_at_point_that_is_looked_at():
         yield from let_go(end)
         assert key == "" or everything() == before, f"{key} did not bring back what was before the view was panned"
     is_at_its_values()
-    found = values().numbers()
-    moved = np.subtract(found[1], look_at)
-    assert found[0] == eye and found[2:] == (up, distance) and moved @ u > 0.05 and moved @ v > 0.03, f"panned by {moved}"
+    actual = values().numbers()
+    moved = np.subtract(actual[1], look_at)
+    assert actual[0] == eye and actual[2:] == (up, distance) and moved @ u > 0.05 and moved @ v > 0.03, f"panned by {moved}"
     yield from undo()
     assert everything() == before
 
@@ -419,8 +419,8 @@ def count_what_is_made():
     for _ in range(3):
         region("VIEW_3D", "WINDOW")[0].tag_redraw()
         yield
-    made = batches.cache_info().misses - before
-    assert made == 1, f"the lines were made {made} times for one change"
+    misses = batches.cache_info().misses - before
+    assert misses == 1, f"the lines were made {misses} times for one change"
     bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
 
 

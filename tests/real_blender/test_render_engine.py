@@ -81,8 +81,8 @@ def in_a_window(real_blender, *arguments, simulated):
 @pytest.mark.parametrize("host", ["real"], indirect=True)
 def test_f12_in_a_window_shows_the_picture_of_viewcam_render(host, lit_file, reference, tmp_path):
     in_a_window(host, "render", lit_file, tmp_path / "shown.exr", simulated=True)
-    shown = image.read(tmp_path / "shown.exr").passes
-    assert np.array_equal(shown["Combined"], reference["Combined"])
+    rendered = image.read(tmp_path / "shown.exr").passes
+    assert np.array_equal(rendered["Combined"], reference["Combined"])
 
 
 @pytest.mark.parametrize("host", ["real"], indirect=True)

@@ -154,11 +154,11 @@ def test_an_object_that_stands_in_many_places_is_as_many_objects(ball, make_mesh
     mesh = make_mesh(rng.normal(size=(2700 * 3, 3)) * 0.1, np.arange(2700 * 3))
     for geometry, count in ((ball(6), 20), (mesh, 400)):
         matrices = np.array([random_matrix(rng, 9.0) for _ in range(count)])
-        one = (Object("all", "thing", matrices),)
+        placed = (Object("all", "thing", matrices),)
         each = tuple(Object(f"{number}", "thing", matrix) for number, matrix in enumerate(matrices))
         rays = random_rays(rng, 500, 9.0)
         result = []
-        for objects in (one, each):
+        for objects in (placed, each):
             core = CoreScene(Scene(CAMERA, {"thing": geometry}, objects), 2)
             result.append(core.closest(core.rays(*rays)))
         for first, second in zip(*result, strict=True):

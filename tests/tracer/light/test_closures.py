@@ -75,10 +75,10 @@ def test_samples_fall_as_often_as_their_density_says(name, behind):
     kept = drawn.sampled_pdf > 0
     kept &= drawn.sampled_pdf < np.inf
     expected = count * np.bincount(cells(directions), there.pdf * angle, 128)
-    found = np.bincount(cells(drawn.sampled[:, kept]), minlength=128)
+    values = np.bincount(cells(drawn.sampled[:, kept]), minlength=128)
     many = expected > 20
-    expected, found = np.append(expected[many], expected[~many].sum()), np.append(found[many], found[~many].sum())
-    squares = ((found - expected) ** 2 / np.maximum(expected, 1)).sum()
+    expected, values = np.append(expected[many], expected[~many].sum()), np.append(values[many], values[~many].sum())
+    squares = ((values - expected) ** 2 / np.maximum(expected, 1)).sum()
     freedom = len(expected)
     assert squares < freedom + 5 * np.sqrt(2 * freedom) + 5, f"χ² is {squares:.0f} of {freedom}"
     assert abs(expected.sum() - kept.sum()) < 5 * np.sqrt(count), "the density's integral is the share of samples that are kept"

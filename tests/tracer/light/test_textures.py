@@ -69,8 +69,8 @@ def test_between_four_pixels_of_a_checkerboard_an_image_is_their_mean():
 
 def test_the_closest_pixel_changes_half_way_between_centres():
     picture = grey([[0.0, 1.0]])
-    found = looked_up(picture, at([0.499999, 0.5, 0.999999, 1.0, -1e-9, -1e-20], 0.5), True)[0]
-    np.testing.assert_array_equal(found, [0, 1, 1, 0, 1, 1])
+    colors = looked_up(picture, at([0.499999, 0.5, 0.999999, 1.0, -1e-9, -1e-20], 0.5), True)[0]
+    np.testing.assert_array_equal(colors, [0, 1, 1, 0, 1, 1])
 
 
 def stood_for(pixels):
@@ -193,8 +193,8 @@ def test_an_interpolated_image_is_continuous_and_stays_between_its_pixels(seed, 
 def test_srgb_is_decoded_after_pixels_are_blended():
     """Half-way between 0 and 1 is the sRGB value ½, 0.2140; blending light would give ½."""
     pixels = grey([[0.0, 1.0]]).pixels
-    found = looked_up(Picture(pixels, srgb=True), at([0.25, 0.5, 0.75], 0.5), False)[0]
-    np.testing.assert_allclose(found, [0, 0.21404114, 1], atol=1e-7)
+    colors = looked_up(Picture(pixels, srgb=True), at([0.25, 0.5, 0.75], 0.5), False)[0]
+    np.testing.assert_allclose(colors, [0, 0.21404114, 1], atol=1e-7)
     assert looked_up(Picture(pixels), at(0.5, 0.5), False)[0, 0] == 0.5
 
 
@@ -246,8 +246,8 @@ def test_images_and_vertex_colours_multiply_the_colour_where_their_material_is_a
     textured = Material(diffuse=Colour((1.0, 0.5, 0.0), image="ramp", closest=True, vertex=True))
     of_red = Material(diffuse=RED)
     for u, expected in ((0.1, (0.5, 0.125, 0)), (0.9, (0.25, 0.0625, 0))):
-        found = shown(textured, of_red, images=images, uv=(u, 0.5), vertex_colours=(1.0, 0.5, 0.25))
-        np.testing.assert_allclose(found, [expected, RED.rgb], rtol=1e-6)
+        actual = shown(textured, of_red, images=images, uv=(u, 0.5), vertex_colours=(1.0, 0.5, 0.25))
+        np.testing.assert_allclose(actual, [expected, RED.rgb], rtol=1e-6)
 
 
 # --- Filters

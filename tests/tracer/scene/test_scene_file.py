@@ -41,8 +41,8 @@ def assert_same_scene(first, second):
                 pairs = [(each, read_back[key]) for key, each in array.items()]
             else:
                 pairs = [] if array is None else [(array, read_back)]
-            for one, again in pairs:
-                assert one.dtype == again.dtype and np.array_equal(one, again), f"{field} of {name}"
+            for left, again in pairs:
+                assert left.dtype == again.dtype and np.array_equal(left, again), f"{field} of {name}"
     for placed, other in zip(first.objects, second.objects, strict=True):
         assert np.array_equal(placed.matrix, other.matrix)
         assert (placed.name, placed.color) == (other.name, other.color)

@@ -134,9 +134,9 @@ def test_a_vertex_that_did_not_follow_and_an_object_that_is_gone_are_named(look,
 
     def spoil(change):
         def place_wrongly(overrides, temporary, placed):
-            shown = place(overrides, temporary, placed)
-            change(next(iter(shown)))
-            return shown
+            copies = place(overrides, temporary, placed)
+            change(next(iter(copies)))
+            return copies
 
         monkeypatch.setattr(recentering, "_place", place_wrongly)
 
