@@ -109,8 +109,9 @@ def _chart(family: str, errors_by_fault: dict[Fault, dict[str, np.ndarray]], cle
         "good pictures that are called bad",
         "faults that are missed",
         tuple(curves),
-        f"Read how much is missed at how few false alarms: {len(errors_by_fault)} faults × {trials[0]} seeds, {trials[-1]} pairs of "
-        f"good pictures; of these the others judged {seen[0]} and {seen[-1]}. Found by each at its own threshold, and false alarms: "
+        f"Read how much is missed at how few false alarms: {len(errors_by_fault)} faults × {trials[0]} seeds, "
+        f"{trials[-1]} pairs of good pictures; of these the others judged {seen[0]} and {seen[-1]}. "
+        f"Found by each at its own threshold, and false alarms: "
         f"{'; '.join(at_own_threshold)}.{beside if family == 'all' else ''}",
         tie=0.05,
         log_y=False,
