@@ -153,7 +153,7 @@ class Block:
         return result
 
     def faulty(self, fault: Fault) -> list[Said]:
-        number, tracer, message = 1 + FAULTS.index(fault), self._bench.faulty[fault], []
+        number, tracer, judged = 1 + FAULTS.index(fault), self._bench.faulty[fault], []
         for i in range(SIDE):
             test = self._surfaces(tracer, self._random(number, i))
             if fault.of_picture:
@@ -162,15 +162,15 @@ class Block:
                 fault.of_picture(test, self._random(number, i))
             of_geometry = self._of_geometry(test)
             if of_geometry > 1 and i > 0:
-                message.append({rivals.OURS: of_geometry})
+                judged.append({rivals.OURS: of_geometry})
                 continue
             lit = self._light(number, tracer, i) if fault.of_scene else [dict(passes) for passes in self._lit[i]]
             if fault.of_picture:
                 for passes in lit:
                     passes.update(Combined=passes["Combined"].copy())
                     fault.of_picture(passes, self._random(number, i))  # the same place in all of them
-            message.append(self._said(of_geometry, lit, i, by_all=i == 0))
-        return message
+            judged.append(self._said(of_geometry, lit, i, by_all=i == 0))
+        return judged
 
     def _said(self, of_geometry: float, lit: list[Passes], j: int, by_all: bool) -> Said:
         reference = self._references[j]

@@ -43,9 +43,9 @@ def batch(capfd, *words, status=0):
 
 
 def fails(capfd, *words, status=2):
-    message = batch(capfd, *words, status=status)
-    assert message.out == "" and len(message.err.splitlines()) == 1 and "bug" not in message.err, message
-    return message.err
+    output = batch(capfd, *words, status=status)
+    assert output.out == "" and len(output.err.splitlines()) == 1 and "bug" not in output.err, output
+    return output.err
 
 
 def files(folder):
@@ -60,15 +60,15 @@ def test_a_thousand_rows_with_forty_kinds_of_bad_ones_are_named_by_line_and_colu
         rows[line - 2][HEADER.split(",").index(column)] = text
     path, out, result = tmp_path / "shots.csv", tmp_path / "out", tmp_path / "result.json"
     path.write_text("\n".join([HEADER, *map(",".join, rows)]), encoding="utf-8")
-    message = batch(capfd, CORNELL, path, "--out", out, "--json", result, "--log-json", status=2)
-    lines = message.err.splitlines()
+    output = batch(capfd, CORNELL, path, "--out", out, "--json", result, "--log-json", status=2)
+    lines = output.err.splitlines()
     assert lines[0].startswith(f"viewcam batch: {path}: ") and lines[0].endswith("problems, nothing is rendered")
     for line, (column, text) in wrong.items():
         about = [sentence for sentence in lines if f"  line {line}, column" in sentence]
         places = "".join(sentence.partition(":")[0].partition(" is ")[0] for sentence in about)
         assert column in places, f"line {line}, {column} = {text!r}: told was {about}"
     assert {int(sentence.split()[1].rstrip(",")) for sentence in lines[1:]} == {*wrong}, "a right line is called wrong"
-    error = next(event for event in map(json.loads, message.out.splitlines()) if event["event"] == "error")
+    error = next(event for event in map(json.loads, output.out.splitlines()) if event["event"] == "error")
     assert error["problems"] == json.loads(result.read_text())["problems"] == [sentence.strip() for sentence in lines[1:]]
     assert not out.exists()
 
@@ -144,8 +144,8 @@ def test_shards_are_the_whole_and_have_summaries_of_their_own(tmp_path, capfd):
 
 def test_frames_and_cameras_make_shots_of_their_names(tmp_path, capfd):
     out = tmp_path / "out"
-    message = batch(capfd, CORNELL, "--frames=-1..1", "--out", out, *SMALL)
-    assert message.out.startswith("3 shots, in ") and str(out / "contact-sheet.html") in message.out and message.err == ""
+    output = batch(capfd, CORNELL, "--frames=-1..1", "--out", out, *SMALL)
+    assert output.out.startswith("3 shots, in ") and str(out / "contact-sheet.html") in output.out and output.err == ""
     batch(capfd, CORNELL, "--cameras", "Virtual*", "--out", out, *SMALL)
     assert {"frame_-001.exr", "frame_000.exr", "frame_001.exr", f"{CAMERA}.exr"} < {*files(out)}
 
@@ -181,8 +181,8 @@ def test_what_can_not_be_known_is_said_and_resume_known_renders_it_anew(tmp_path
     ):
         assert any("'stage.usdc' is binary USD" in sentence for sentence in warned["warnings"])
     assert "is binary USD" in (out / "contact-sheet.html").read_text()
-    message = batch(capfd, blend, *words, "--resume").out
-    assert rendered() == 0 and "--resume-known" in message and "'stage.usdc' is binary USD" in message
+    output = batch(capfd, blend, *words, "--resume").out
+    assert rendered() == 0 and "--resume-known" in output and "'stage.usdc' is binary USD" in output
     assert "not sure" not in batch(capfd, blend, *words, "--resume-known").out
     assert rendered() == 2
     known = ("--orbit", "2", "--out", tmp_path / "known", *SMALL)
@@ -191,14 +191,14 @@ def test_what_can_not_be_known_is_said_and_resume_known_renders_it_anew(tmp_path
 
 
 def test_every_event_of_a_batch_is_a_line(tmp_path, capfd):
-    message = batch(capfd, CORNELL, "--orbit", "2", "--out", tmp_path / "out", *SMALL, "--log-json")
-    record = [json.loads(line) for line in message.out.splitlines()]
+    output = batch(capfd, CORNELL, "--orbit", "2", "--out", tmp_path / "out", *SMALL, "--log-json")
+    record = [json.loads(line) for line in output.out.splitlines()]
     shot = ["shot_started", "shot_done"]
     assert [event["event"] for event in record] == [
         *("started", "batch_started", *shot, *shot, "batch_finished", "message", "finished")
     ]
     assert record[3]["shot"] == "orbit_000" and Path(record[3]["image"]) == tmp_path / "out" / "orbit_000.exr"
-    assert message.err == ""
+    assert output.err == ""
 
 
 def test_a_shot_that_fails_is_a_sentence_and_the_rest_are_there(tmp_path, symlink, capfd):
@@ -206,10 +206,10 @@ def test_a_shot_that_fails_is_a_sentence_and_the_rest_are_there(tmp_path, symlin
     out.mkdir()
     (tmp_path / "file").touch()
     symlink(out / "orbit_001.png", tmp_path / "file" / "picture.png")  # which is no folder
-    message = batch(capfd, CORNELL, "--orbit", "3", "--out", out, *SMALL, status=4)
-    failed, summary = message.err.splitlines()
+    output = batch(capfd, CORNELL, "--orbit", "3", "--out", out, *SMALL, status=4)
+    failed, summary = output.err.splitlines()
     assert failed.startswith("viewcam batch: orbit_001: ") and "orbit_001.png" in failed
-    assert "of 3 shots, 1 failed and 0 are left" in summary and "--resume" in summary and message.out == ""
+    assert "of 3 shots, 1 failed and 0 are left" in summary and "--resume" in summary and output.out == ""
     assert {"orbit_000.json", "orbit_002.json"} < {*files(out)} and "orbit_001.json" not in files(out)
 
 
