@@ -297,4 +297,4 @@ def _reason(error: Exception) -> str:
 
 
 if __name__ == "__main__":
-    child_process.serve(sys.argv[-1], lambda request, _: _read(request))
+    child_process.serve(sys.argv[-1], lambda request, _: _answer(request))
