@@ -2,9 +2,10 @@
 
 An event is a name and fields. Of every command are told `started` (command, words), `message` (text: a line that it would have
 printed), `error` (command, text, and `problems` where there are several), `note` (command, text: how something was taken, or
-what to know) and `finished` (command, exit_status, seconds); a picture that is traced tells `progress` (share), a check each
-`step` (name: rendering, with number and of, tracing, comparing), and a batch tells of its shots (docs/batch.md). All of it goes
-to copies of standard output and standard error, so it is heard while libraries are silent.
+what to know) and `finished` (command, exit_status, seconds); a picture that is traced tells `progress` (share), as do labels
+that become a scene of BOP's (work: written), a check each `step` (name: rendering, with number and of, tracing, comparing),
+and a batch tells of its shots (docs/batch.md). All of it goes to copies of standard output and standard error, so it is heard
+while libraries are silent.
 
 Rejected: Python's logging, whose levels, loggers and handlers are more than a line of JSON needs, and to which the libraries in
 this process write as well.
@@ -54,7 +55,7 @@ class Bar(Sentences):
         if event == "batch_started":
             self._open(total=fields["shots"], initial=fields["kept"], unit="shot")
         elif event == "progress":
-            self._progress(100 * fields["share"])
+            self._progress(100 * fields["share"], fields.get("work", "traced"))
         elif event == "shot_started" and self._bar is not None:
             self._bar.set_description_str(plain(fields["shot"]))
         elif event in ("shot_done", "shot_failed", "shot_elsewhere") and self._bar is not None:
@@ -64,9 +65,9 @@ class Bar(Sentences):
         elif event in ("batch_finished", "finished"):
             self._close()
 
-    def _progress(self, percent: float) -> None:
+    def _progress(self, percent: float, work: str) -> None:
         if percent == 0.0:  # and no bar for what takes half a second
-            self._open(total=100, desc="traced", bar_format=_PERCENT, miniters=0, delay=0.5)
+            self._open(total=100, desc=work, bar_format=_PERCENT, miniters=0, delay=0.5)
         elif self._bar is not None:
             self._bar.update(percent - self._bar.n)
         if percent == 100.0:

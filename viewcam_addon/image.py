@@ -319,22 +319,29 @@ def write(path: str | os.PathLike[str], image: Image) -> None:
     InputError
         if the folder can't be written or the disk is full.
     """
-    import OpenEXR
-
     channels = {
         f"{_LAYER}.{name}.{letter}": np.ascontiguousarray(array[::-1, :, i])
         for name, array in image.passes.items()
         for i, letter in enumerate(CHANNELS[name])
     }
-    header = {"compression": OpenEXR.RLE_COMPRESSION, "type": OpenEXR.scanlineimage, **image.attributes}
-    if image.camera is not None:
-        header |= _camera_attributes(image.camera)
+    _save(path, {**image.attributes, **(_camera_attributes(image.camera) if image.camera is not None else {})}, channels)
+
+
+def write_rgba(path: str | os.PathLike[str], pixels: NDArray[np.float32]) -> None:
+    """Write a plain 32-bit EXR of one picture. pixels : (height, width, 4), rows from the **top**. Raises as `write` does."""
+    _save(path, {}, {letter: np.ascontiguousarray(pixels[..., i]) for i, letter in enumerate("RGBA")})
+
+
+def _save(path: str | os.PathLike[str], attributes: Mapping[str, Any], channels: Mapping[str, NDArray[np.float32]]) -> None:
+    import OpenEXR
+
+    header = {"compression": OpenEXR.RLE_COMPRESSION, "type": OpenEXR.scanlineimage, **attributes}
     if hasattr(OpenEXR, "set_global_thread_count"):  # which is 0: it would compress in this thread alone
         OpenEXR.set_global_thread_count(machine.cores())
     with written_whole(path) as temporary:
         try:
             with silent_libraries():
-                OpenEXR.File(header, channels).write(str(temporary))
+                OpenEXR.File(header, dict(channels)).write(str(temporary))
         except RuntimeError as error:
             raise OSError(_first_line(error)) from error
 

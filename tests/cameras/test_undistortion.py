@@ -185,3 +185,50 @@ def test_sixteen_bits_and_alpha_stay(tmp_path):
     plane = camera.pinhole.plane
     deep = np.full((HEIGHT, WIDTH, 4), 40_001, np.uint16)
     assert (resampled(deep, camera.lens, plane, undistorted(camera.lens, plane)) == 40_001).all()
+
+
+# --- ST maps, by pycolmap and by a picture that goes there and back
+
+
+@pytest.mark.parametrize("model", ["OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV"])
+def test_maps_tell_pycolmaps_places_both_ways(tmp_path, capfd, model):
+    numbers = {
+        "OPENCV": (300.0, 305.0, 163.0, 88.0, -0.12, 0.05, 0.002, -0.003),
+        "OPENCV_FISHEYE": (220.0, 221.0, 160.0, 91.0, 0.02, -0.01, 0.003, 0.001),
+        "FULL_OPENCV": (300.0, 300.0, 161.0, 89.0, -0.1, 0.02, 0.001, 0.002, 0.01, 0.03, -0.01, 0.002),
+    }[model]
+    written = tmp_path / "scan"
+    written.mkdir()
+    (written / "cameras.txt").write_text(f"1 {model} 320 180 {' '.join(map(str, numbers))}\n")
+    (written / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n2 1 0 0 0 1 0 0 1 b.png\n\n")
+    assert cli.main(["camera", str(written), "--st-maps", str(tmp_path / "out"), "--blank", "1"]) == 0
+    assert "lens_1: 320 × 180 with the lens, " in capfd.readouterr().out
+    told = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    bent = pycolmap.Camera(model=model, width=320, height=180, params=numbers)
+    pinhole = [told[key] for key in ("fl_x", "fl_y", "cx", "cy")]
+    straight = pycolmap.Camera(model="PINHOLE", width=told["w"], height=told["h"], params=pinhole)
+    for what, here, there in (("distort", bent, straight), ("undistort", straight, bent)):
+        found = read_rgba(tmp_path / "out" / f"lens_1.{what}.exr")
+        assert found.shape == (here.height, here.width, 4)
+        rows, columns = np.nonzero(found[..., 3])
+        assert len(rows) > 0.7 * here.width * here.height
+        assert what == "undistort" or len(rows) == 320 * 180, "with --blank 1 the render fills the photograph"
+        rays = here.cam_from_img(np.stack([columns, rows], axis=-1) + 0.5)
+        expected = there.img_from_cam(np.column_stack([rays, np.ones(len(rays))]))
+        s, t = found[rows, columns, :2].T.astype(float)
+        off = np.abs(np.stack([s * there.width, (1 - t) * there.height], axis=-1) - expected)
+        assert off.max() <= 1e-4, f"{what} is off by {off.max():.3g} pixels"  # float32's half step of 1 is 1e-5 of 320
+
+
+def read_rgba(path):
+    """(height, width, 4), rows from the top."""
+    openexr = pytest.importorskip("OpenEXR")
+    return openexr.File(str(path)).parts[0].channels["RGBA"].pixels
+
+
+def test_maps_of_cameras_without_a_lens_are_a_sentence(tmp_path, capfd):
+    (tmp_path / "cameras.txt").write_text("1 PINHOLE 320 180 300 300 160 90\n")
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n")
+    assert cli.main(["camera", str(tmp_path), "--st-maps", str(tmp_path / "out")]) == 2
+    assert "has a lens that distorts: there is nothing to map" in capfd.readouterr().err and not (tmp_path / "out").exists()
+    assert cli.main(["camera", str(tmp_path), "--st-maps", str(tmp_path / "out"), "--to", "colmap"]) == 2

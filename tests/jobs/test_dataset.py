@@ -2,15 +2,23 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
+import viewcam_addon as vp
+from viewcam_addon import cameras
 from viewcam_addon.cameras import sidecar as record
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import dataset
 from viewcam_addon.jobs.folder import Folder, write_json
 from viewcam_addon.jobs.job import Job
+from viewcam_addon.labels import files as label_files
 from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.png import encoded
+
+from ..labels.conftest import room
 
 STATED = Pinhole((3, -6, 2.5), (0, 0, 1), (0, 0, 1), 400.0, 320, 180)
 # What came of it in Blender, of which only the last bits differ; here it is plain to see which of the two is written.
@@ -134,3 +142,129 @@ def test_a_folder_that_can_not_be_written_is_a_sentence(folder, finish):
     with pytest.raises(InputError, match="can't be written"):
         write(folder, shots("a"))
     assert written(folder) == []
+
+
+# --- With labels: depth, masks, points and held-out pictures, by the rules of those who read them
+
+
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory):
+    """The folder of a dataset of nine labeled pictures, every fourth of which is held out."""
+    folder = Folder(tmp_path_factory.mktemp("dataset") / "out")
+    listed = shots(*(f"r_{i}" for i in range(9)))
+    for i, shot in enumerate(listed):
+        camera = Pinhole((4 * np.sin(i / 3) + 0.4, -7 * np.cos(i / 3), 3), (0.2, 0, 0.8), (0, 0, 1), 70.0, 64, 48)
+        label(folder, shot.name, camera)
+    dataset.write(folder, listed, settings(listed), "png", "4")
+    return folder.path
+
+
+def label(folder, name, camera, steps=1000.0, kinds=("depth", "masks")):
+    """A shot and its labels as a batch leaves them, in a picture of colors by place."""
+    row, column = np.mgrid[: camera.height, : camera.width]
+    picture = np.stack([4 * row, 3 * column, row * 0 + 7], axis=-1).astype(np.uint8)
+    folder.image(name).write_bytes(b"picture")
+    folder.preview(name).write_bytes(encoded(picture))
+    beside = label_files.write(folder.image(name), vp.label(room(camera), kinds), steps)
+    sizes = {"image": 7, "preview": folder.preview(name).stat().st_size, **{path.name: path.stat().st_size for path in beside}}
+    told = {"rendered": {"width": 64, "height": 48}, "warnings": [], "timing": {"seconds": 0.5}}
+    of_labels = {"kinds": [*kinds], "depth_steps": steps, "files": [path.name for path in beside]}
+    made_from = {"settings": "of now", "image": f"{name}.exr", "bytes": sizes, "labels": of_labels}
+    write_json(folder.sidecar(name), {**made_from, **told, **record.record(camera)})
+
+
+def test_nerfstudio_finds_all_it_asks_for(learned):
+    """Its parser's rules: a depth and a mask of every frame, each of one channel; lists of all three splits, of pictures that
+    there are; numbers of the camera at the top."""
+    cv2 = pytest.importorskip("cv2")
+    told = json.loads((learned / "transforms.json").read_text())
+    assert {"fl_x", "fl_y", "cx", "cy", "w", "h"} <= told.keys()
+    assert all({"mask_path", "depth_file_path", "file_path", "transform_matrix"} <= frame.keys() for frame in told["frames"])
+    for frame in told["frames"]:
+        assert cv2.imread(str(learned / frame["file_path"])).shape == (told["h"], told["w"], 3)
+        depth = cv2.imread(str(learned / frame["depth_file_path"]), cv2.IMREAD_ANYDEPTH) * told["depth_unit_scale_factor"]
+        mask = cv2.imread(str(learned / frame["mask_path"]), cv2.IMREAD_UNCHANGED)
+        assert mask.shape == depth.shape == (told["h"], told["w"])
+        camera = np.array(frame["transform_matrix"])
+        floor = -camera[2, 3] / -camera[2, 2]  # along the axis to z = 0: nothing that the middle shows is beyond
+        assert 0 < depth[24, 32] <= floor + 0.001 and set(np.unique(mask)) == {0, 255}
+        assert np.array_equal(mask > 0, depth > 0)
+    pictures = [frame["file_path"] for frame in told["frames"]]
+    assert told["test_filenames"] == told["val_filenames"] == ["r_0.png", "r_4.png", "r_8.png"]
+    assert sorted(told["train_filenames"] + told["test_filenames"]) == sorted(pictures)
+
+
+def test_points_have_the_pictures_colors_where_splatting_looks_for_them(learned):
+    pycolmap = pytest.importorskip("pycolmap")
+    told = json.loads((learned / "transforms.json").read_text())
+    head, _, data = (learned / told["ply_file_path"]).read_bytes().partition(b"end_header\n")
+    names = [line.split()[-1] for line in head.decode().splitlines() if line.startswith("property")]
+    assert names == ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"]
+    found = np.frombuffer(data, [(name, "<f4" if i < 6 else "u1") for i, name in enumerate(names)])
+    model = pycolmap.Reconstruction(learned / "sparse" / "0")
+    assert len(found) == model.num_points3D() > 1000 and model.num_images() == 9
+    near = 0
+    for point, vertex in zip((model.points3D[i] for i in sorted(model.points3D)), found, strict=True):
+        assert np.abs(point.xyz - [vertex[name] for name in "xyz"]).max() < 1e-5
+        assert [*point.color] == [vertex[name] for name in ("red", "green", "blue")] and vertex["blue"] == 7
+        places = [model.images[each.image_id].points2D[each.point2D_idx].xy for each in point.track.elements]
+        near += any(np.abs([4 * (y - 0.5) - vertex["red"], 3 * (x - 0.5) - vertex["green"]]).max() < 0.01 for x, y in places)
+    assert near == len(found), f"{len(found) - near} of {len(found)} points have a color that no picture has at their place"
+
+
+def test_instant_ngp_has_depth_in_scene_units_and_a_cube_that_holds_the_points(learned):
+    told = json.loads((learned / "transforms.json").read_text())
+    assert told["integer_depth_scale"] == 0.001 and all((learned / frame["depth_path"]).is_file() for frame in told["frames"])
+    lines = (learned / "sparse/0/points3D.txt").read_text().splitlines()
+    points = np.array([line.split()[1:4] for line in lines if line[0] != "#"], float) * 0.33
+    scale = told["aabb_scale"]
+    assert scale in (1, 2, 4, 8, 16, 32, 64, 128)
+    assert np.abs(points).max() <= scale / 2 and (scale == 1 or np.abs(points).max() > scale / 4)
+
+
+def test_the_original_nerf_and_its_readers_find_three_files_of_pictures_without_a_suffix(learned):
+    names = {}
+    for split in ("train", "val", "test"):
+        told = json.loads((learned / f"transforms_{split}.json").read_text())
+        assert abs(told["camera_angle_x"] - 2 * np.arctan(32 / 70)) < 1e-12
+        names[split] = [frame["file_path"] for frame in told["frames"]]
+        assert all((learned / f"{name}.png").is_file() and not Path(name).suffix for name in names[split])
+    assert names["test"] == names["val"] == ["r_0", "r_4", "r_8"] and len(names["train"]) == 6
+    assert len(cameras.read(learned / "transforms_train.json")) == 6
+
+
+@pytest.mark.parametrize(("test", "held_out"), [("4", ["a", "eval_2"]), ("eval_*", ["eval_1", "eval_2"]), ("[bc]", ["b", "c"])])
+def test_pictures_are_held_out_by_number_or_name(folder, finish, test, held_out):
+    listed = shots("a", "b", "c", "eval_1", "eval_2")
+    for shot in listed:
+        finish(shot.name)
+    dataset.refuse(listed, "png", test)
+    dataset.write(folder, listed, settings(listed), "png", test)
+    told = json.loads((folder.path / "transforms_test.json").read_text())
+    assert [frame["file_path"] for frame in told["frames"]] == held_out
+
+
+@pytest.mark.parametrize(
+    ("suffix", "test", "sentence"),
+    [
+        ("png", "1", "holds out all of the 2 pictures"),
+        ("png", "c*", "holds out none of the 2 pictures"),
+        ("exr", "2", "whose pictures are PNGs"),
+    ],
+)
+def test_what_can_not_be_held_out_is_refused_before_anything_is_rendered(suffix, test, sentence):
+    with pytest.raises(InputError, match=sentence):
+        dataset.refuse(shots("a", "b"), suffix, test)
+
+
+def test_depths_of_different_steps_are_refused_and_labels_of_some_shots_are_not_named(folder, finish):
+    camera = Pinhole((0.4, -7, 3), (0.2, 0, 0.8), (0, 0, 1), 70.0, 64, 48)
+    label(folder, "a", camera)
+    label(folder, "b", camera, steps=500.0)
+    with pytest.raises(InputError, match="depths have different steps"):
+        write(folder, shots("a", "b"))
+    finish("c", camera)
+    write(folder, shots("a", "c"))
+    told = json.loads((folder.path / "transforms.json").read_text())
+    assert not {"ply_file_path", "depth_unit_scale_factor"} & told.keys()
+    assert all(frame.keys() == {"file_path", "transform_matrix", "virtual_pinhole"} for frame in told["frames"])

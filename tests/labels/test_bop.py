@@ -11,7 +11,7 @@ import viewcam_addon as vp
 from viewcam_addon import cameras
 from viewcam_addon.cli import main
 from viewcam_addon.files import written_whole
-from viewcam_addon.labels import files
+from viewcam_addon.labels import bop, files
 from viewcam_addon.png import encoded
 from viewcam_addon.tracer.scene import Object
 
@@ -42,7 +42,9 @@ def written(tmp_path_factory):
     for i, each in enumerate(labels):
         files.write(shots / f"{i}.exr", each, depth_steps=5000.0 if i == 1 else 1000.0)
     (shots / "0.png").write_bytes(encoded(np.full((48, 64, 3), 7, np.uint8)))
-    assert main(["labels", str(shots), str(out), "--to", "bop"]) == 0
+    shares = []
+    bop.write(shots, out, shares.append)
+    assert shares == [0.0, 1 / 3, 2 / 3, 1.0]
     read = {name: json.loads((out / f"{name}.json").read_text()) for name in ("scene_camera", "scene_gt", "scene_gt_info")}
     return SimpleNamespace(
         labels=labels,

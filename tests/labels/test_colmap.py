@@ -9,6 +9,7 @@ import pytest
 
 import viewcam_addon as vp
 from viewcam_addon.cli import main
+from viewcam_addon.errors import InputError
 from viewcam_addon.labels import colmap, files
 from viewcam_addon.labels.surfaces import Surfaces
 from viewcam_addon.png import encoded
@@ -131,7 +132,7 @@ def test_what_moves_from_picture_to_picture_has_no_track_from_one_to_the_other(t
 
 def test_points_lie_evenly_over_what_is_shown():
     state = np.zeros((48, 64), int)
-    actual = colmap._sampled(0, CAMERA, np.full((48, 64), 5.0), state, state.astype(np.float32), 192)
+    actual = colmap._sampled(0, CAMERA, np.full((48, 64), 5.0), state, np.zeros((48, 64, 3), np.uint8), 192)
     column, row, _ = CAMERA.project(actual.positions)
     counts = np.histogram2d(row, column, bins=(6, 8), range=((0, 48), (0, 64)))[0]
     assert counts.sum() == 192 and counts.min() > 0
@@ -140,8 +141,10 @@ def test_points_lie_evenly_over_what_is_shown():
 
 def test_the_same_labels_give_the_same_bytes(written, tmp_path):
     colmap.write(written.shots, tmp_path / "again", 600)
-    first, two = ({path.name: path.read_bytes() for path in folder.iterdir()} for folder in (written.model, tmp_path / "again"))
-    assert first == two and set(first) == {"cameras.txt", "images.txt", "points3D.txt"}
+    first, second = (
+        {path.name: path.read_bytes() for path in folder.iterdir()} for folder in (written.model, tmp_path / "again")
+    )
+    assert first == second and set(first) == {"cameras.txt", "images.txt", "points3D.txt", "points3D.ply"}
 
 
 def test_points_come_into_the_model_of_cameras_alone_that_a_batch_has_written_and_into_no_other(written, tmp_path, capfd):
@@ -150,6 +153,7 @@ def test_points_come_into_the_model_of_cameras_alone_that_a_batch_has_written_an
     shutil.copytree(written.model, model)
     heads = [line for line in (model / "points3D.txt").read_text().splitlines() if line.startswith("#")]
     (model / "points3D.txt").write_text("\n".join(heads) + "\n")
+    (model / "points3D.ply").unlink()
     assert main(["labels", str(written.shots), str(model), "--to", "colmap", "--points", "600"]) == 0
     assert (model / "points3D.txt").read_bytes() == (written.model / "points3D.txt").read_bytes()
     assert [path.name for path in model.parent.iterdir()] == ["0"]
@@ -161,11 +165,46 @@ def test_points_come_into_the_model_of_cameras_alone_that_a_batch_has_written_an
     assert capfd.readouterr().err.count("is there already") == 2 and (model / "notes.txt").read_text() == "mine"
 
 
+def test_tracks_may_be_shortened_and_lead_over_all_pictures_still():
+    rng = np.random.default_rng(1)
+    shown = [(np.flatnonzero(rng.random(500) < 0.7), None) for _ in range(20)]
+    shown = [(which, np.stack([which, which + 0.5], axis=-1)) for which, _ in shown]
+    short = colmap._shortened(shown, 4)
+    before, after = (np.bincount(np.concatenate([which for which, _ in each]), minlength=500) for each in (shown, short))
+    assert (after == np.minimum(before, 4)).all()
+    assert all(
+        set(which) <= set(all_of) and (places[:, 0] == which).all()
+        for (which, places), (all_of, _) in zip(short, shown, strict=True)
+    )
+    counts = [len(which) for which, _ in short]
+    assert min(counts) > 0.7 * np.mean(counts), "no picture goes without"
+
+
+@pytest.mark.parametrize("form", ["colmap", "bop", "kitti"])
+def test_overwrite_replaces_what_was_written_so_and_nothing_else(tmp_path, capfd, form):
+    scenes = [room(replace(CAMERA, eye=eye)) for eye in EYES[:2]]
+    shots, out = labelled(tmp_path / "shots", scenes, ("depth", "masks", "amodal")), tmp_path / "out"
+    words = ["labels", str(shots), str(out), "--to", form]
+    assert main(words) == 0 and main(words) == 2
+    before = {path.relative_to(out): path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    (shots / "1.labels.json").unlink()
+    assert main([*words, "--overwrite"]) == 0
+    after = {path.relative_to(out): path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert after.keys() < before.keys() or after != before
+    (out / "notes.txt").write_text("mine")
+    capfd.readouterr()
+    assert main([*words, "--overwrite"]) == 2 and "is there already" in capfd.readouterr().err
+    assert (out / "notes.txt").read_text() == "mine"
+
+
 def test_a_picture_beside_its_labels_is_the_one_that_is_named(tmp_path):
     shots = labelled(tmp_path / "shots", [room()])
     (shots / "0.png").write_bytes(encoded(np.zeros((48, 64, 3), np.uint8)))
     assert colmap.write(shots, tmp_path / "model") == {"images": 1, "points": 0, "observations": 0}
     assert " 1 0.png\n" in (tmp_path / "model" / "images.txt").read_text()
+    (shots / "0.png").write_bytes((shots / "0.png").read_bytes()[:50])
+    with pytest.raises(InputError, match=r"0\.png is no PNG of 8 or 16 bits that can be read"):
+        colmap.write(shots, tmp_path / "another")
 
 
 @pytest.mark.parametrize(

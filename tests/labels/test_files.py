@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import viewcam_addon as vp
 from viewcam_addon import image
 from viewcam_addon.cli import main
 from viewcam_addon.errors import InputError
-from viewcam_addon.labels import KINDS, PASSES, coco, files
+from viewcam_addon.labels import KINDS, PASSES, coco, files, masks
 from viewcam_addon.png import encoded
 from viewcam_addon.tracer.scene import scene_file
 
@@ -20,6 +22,7 @@ ENDINGS = [
     "labels.exr",
     "depth.png",
     "instances.png",
+    "mask.png",
     "forward.flo",
     "forward_hidden.png",
     "backward.flo",
@@ -189,10 +192,27 @@ def test_pycocotools_loads_it_and_finds_every_mask(pictures, tmp_path, kind):
             assert dataset.loadCats(each["category_id"])[0]["name"] == coco.category(expected["name"])
             if kind == "visible":
                 np.testing.assert_array_equal(mask, labels.image["Instance"][::-1, :, 0] == each["instance_id"])
+    coco_masks = pytest.importorskip("pycocotools.mask")
+    runs = [each["segmentation"] for each in dataset.loadAnns(dataset.getAnnIds())]
+    stated = [(each["area"], each["bbox"]) for each in dataset.loadAnns(dataset.getAnnIds())]
+    assert [*zip(coco_masks.area(runs).tolist(), coco_masks.toBbox(runs).tolist(), strict=True)] == stated
+    results = json.loads((tmp_path / "all.json").read_text())["annotations"]
+    kept = ("image_id", "category_id", "segmentation")  # of results that are masks: with a box it would be of boxes
+    again = dataset.loadRes([{name: each[name] for name in kept} | {"score": 1.0} for each in results])
+    assert [(each["area"], [*each["bbox"]]) for each in again.loadAnns(again.getAnnIds())] == stated
     hidden = [each for each in actual["c"].instances if each["name"] == "Ball"]
     assert [each["visible"] for each in hidden] == [None], "the test wants an object that is hidden as a whole"
     ids = dataset.getAnnIds()
     assert sorted(ids) == list(range(1, len(ids) + 1))
+
+
+@given(st.lists(st.integers(1, 70_000), min_size=1, max_size=12), st.booleans())
+def test_run_lengths_as_a_text_are_those_of_pycocotools(counts, begins_with_a_set_pixel):
+    coco_masks = pytest.importorskip("pycocotools.mask")
+    counts = [0] * begins_with_a_set_pixel + counts
+    segmentation = {"size": [sum(counts), 1], "counts": counts}
+    expected = coco_masks.frPyObjects(segmentation, sum(counts), 1)["counts"].decode("ascii")
+    assert masks.compressed(segmentation) == {"size": [sum(counts), 1], "counts": expected}
 
 
 def test_segments_are_those_of_the_colours_of_the_pictures(pictures, tmp_path):

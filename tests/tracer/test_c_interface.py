@@ -200,8 +200,9 @@ def trace_light(draw, calls):
     calls(
         "trace_light",
         light,
-        draw(mostly(st.just(0), [1, 2**32 - 1])),
-        draw(mostly(st.just(0), [1, 2**32 - 1])),
+        draw(mostly(st.just(0), [1, 32, 2**32 - 1])),
+        draw(mostly(st.just(0), [1, 32, 2**32 - 1])),
+        draw(mostly(st.just(settings.samples), [0, 1, 3, 2**32 - 1])),
         addresses,
         None,
     )

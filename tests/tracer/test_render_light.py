@@ -13,7 +13,7 @@ from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import native
 from viewcam_addon.tracer.render import Stopped, Tracer, render
-from viewcam_addon.tracer.scene.film import Bounces, Film
+from viewcam_addon.tracer.scene.film import MOST_REFINED, Bounces, Film, refinement
 from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun, World
 from viewcam_addon.tracer.scene.materials import Colour, Material
 from viewcam_addon.tracer.scene.shader_nodes import node
@@ -250,6 +250,35 @@ def test_a_watcher_is_shown_all_rows_in_the_thread_that_asked(lively, level):
     if level == "path":
         assert audience.threads == {threading.get_ident()} and audience.filled
         assert_same(watched, render(scene, level, 4, threads=2))
+
+
+@pytest.mark.parametrize("samples", [1, 7, 40])
+def test_a_picture_that_refines_is_shown_whole_at_each_step_and_ends_with_the_bits_of_one_that_does_not(lively, samples):
+    """A step is what a picture has that never gets more, but for what of it is known of its noise."""
+    scene, steps, shown = lively(SEED, 70, 40), refinement(samples, 70 * 40), []
+    audience = Audience()
+    audience.tile = lambda passes, rows: shown.append(
+        (rows, {name: values[rows.start : rows.stop].copy() for name, values in passes.items()})
+    )
+    refined = render(scene, "path", samples, 7, threads=2, watcher=audience, steps=steps)
+    assert_same(refined, render(scene, "path", samples, 7, threads=3))
+    each = len(shown) // len(steps)
+    for step, bands in zip(steps, (shown[i : i + each] for i in range(0, len(shown), each)), strict=True):
+        assert sorted(row for rows, _ in bands for row in rows) == list(range(40))
+        picture = np.concatenate([passes["Combined"] for _, passes in sorted(bands, key=lambda band: band[0].start)])
+        assert np.isfinite(picture).all()
+        if step == steps[0] and samples > 1:
+            # The first sample of many is not at the pixel's center, as the only one is, but of the same light.
+            assert abs(picture[..., :3].mean() / refined["Combined"][..., :3].mean() - 1) < 0.3
+        elif step == steps[-1]:
+            np.testing.assert_array_equal(picture, refined["Combined"])
+
+
+def test_a_picture_that_refines_has_each_sample_once():
+    for samples in (1, 2, 3, 15, 16, 17, 64, 1000, 2**24):
+        steps = refinement(samples, 1)
+        assert steps[-1] == samples and (np.diff((0, *steps)) > 0).all() and max(np.diff((0, *steps))) <= 16
+    assert refinement(64, MOST_REFINED + 1) == ()
 
 
 def test_a_render_of_hours_stops_within_a_second(lively):

@@ -23,7 +23,7 @@ cameras/cameras.py (get_image_coords, _generate_rays_from_coords); instant-ngp's
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -76,10 +76,16 @@ def text(content: dict[str, Any]) -> str:
     return f'{{\n{head} "frames": [\n{frames}\n ]\n}}\n'
 
 
-def document(cameras: Iterable[Camera], aabb_scale: int | None = None) -> dict[str, Any]:
+def document(
+    cameras: Iterable[Camera],
+    aabb_scale: int | None = None,
+    more: Mapping[str, Any] | None = None,
+    of_frames: Iterable[Mapping[str, Any]] | None = None,
+) -> dict[str, Any]:
     """The content of the file, frames in the order of the cameras.
 
     aabb_scale : for instant-ngp alone: how many times the unit cube it looks for the scene in. Not said if None.
+    more : further keys at the top. of_frames : further keys of each frame.
 
     Raises
     ------
@@ -94,14 +100,16 @@ def document(cameras: Iterable[Camera], aabb_scale: int | None = None) -> dict[s
     return {
         **(pictures[0] if shared else {}),
         **({} if aabb_scale is None else {"aabb_scale": int(aabb_scale)}),
+        **(more or {}),
         "frames": [
             {
                 "file_path": naming.image_of(camera),
+                **keys,
                 **({} if shared else picture),
                 "transform_matrix": axes.camera_to_world(camera.pinhole),
                 own.KEY: own.document(camera.pinhole),
             }
-            for camera, picture in zip(cameras, pictures, strict=True)
+            for camera, picture, keys in zip(cameras, pictures, of_frames or [{}] * len(cameras), strict=True)
         ],
     }
 

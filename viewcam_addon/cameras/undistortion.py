@@ -37,6 +37,7 @@ _BAND = 2**20  # pixels that are computed at a time
 _FOLDERS = {"mask_path": "masks", "depth_file_path": "depths"}  # by the keys of a frame
 
 
+@lru_cache(maxsize=64)
 def undistorted(lens: Lens, plane: ViewPlane, blank: float = 0.0) -> ViewPlane:
     """The view plane of the picture without the lens, as large as COLMAP makes it.
 
@@ -96,6 +97,47 @@ def places(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> np.ndarray:
 def _bands(cut: ViewPlane) -> list[slice]:
     step = max(1, _BAND // cut.width)
     return [slice(start, min(start + step, cut.height)) for start in range(0, cut.height, step)]
+
+
+def st_maps(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> tuple[np.ndarray, np.ndarray]:
+    """The maps by which compositors take a lens off a photograph and put it on a pinhole's picture.
+
+    plane : of the photograph. cut : of the picture. The first has the picture's size and tells places in the photograph, the
+    second the other way round. (rows, columns, 4) float32, rows from the top: s from the left and t from the **bottom**, 0 … 1
+    from edge to edge, 0, and 1; all 0 where it is nothing of the other, a pixel around which counts: sizes are whole numbers.
+    """
+    middle = np.array([plane.principal_point[0], plane.height - plane.principal_point[1]])
+    middle_of_cut = np.array([cut.principal_point[0], cut.height - cut.principal_point[1]])
+    back = np.empty((plane.height, plane.width, 2))
+    columns, down = np.arange(plane.width) + 0.5, np.arange(plane.height) + 0.5
+    for rows in _bands(plane):
+        points = (np.stack(np.meshgrid(columns, down[rows]), axis=-1) - middle) / plane.distance
+        back[rows] = lens.undistort(points) * cut.distance + middle_of_cut
+    return _st(places(lens, plane, cut), plane), _st(back, cut)
+
+
+def _st(found: np.ndarray, other: ViewPlane) -> np.ndarray:
+    """A map of places in another picture, in its pixels from the top left."""
+    shares = found / (other.width, other.height)
+    with np.errstate(invalid="ignore"):
+        within = (np.abs(shares - 0.5) <= 0.5 + 1 / np.array([other.width, other.height])).all(axis=-1)
+    result = np.zeros((*found.shape[:2], 4), np.float32)
+    result[within, 0], result[within, 1], result[within, 3] = shares[within, 0], 1 - shares[within, 1], 1
+    return result
+
+
+def straight(cameras: Sequence[Camera], blank: float) -> list[Camera]:
+    """The cameras as pinholes, whose pictures are as large as `undistorted` makes them."""
+    result = []
+    for camera in cameras:
+        pinhole = camera.pinhole
+        if camera.lens is not None:
+            cut = undistorted(camera.lens, pinhole.plane, blank)
+            pinhole = dataclasses.replace(
+                pinhole, distance=cut.distance, principal_point=cut.principal_point, width=cut.width, height=cut.height
+            )
+        result.append(dataclasses.replace(camera, pinhole=pinhole, lens=None))
+    return result
 
 
 def of_screen(photograph: np.ndarray, lens: Lens, plane: ViewPlane, widest: int) -> np.ndarray:
@@ -175,22 +217,14 @@ def _save(cameras: Sequence[Camera], dataset: Path, out: Path, form: str, blank:
     files = [naming.picture_of(camera, folder) for camera in cameras]
     if missing := [naming.image_of(camera) for camera, file in zip(cameras, files, strict=True) if file is None]:
         raise InputError(f"{naming.several(missing)} can't be found beside {dataset} nor in images/: put the pictures there")
-    cut_planes: dict[tuple[Lens, ViewPlane], ViewPlane] = {}
     written, frames = [], []
-    for camera, file, others in zip(cameras, files, beside, strict=True):
-        plane, name = camera.pinhole.plane, naming.image_of(camera).removeprefix("images/")
-        if camera.lens is not None and (camera.lens, plane) not in cut_planes:
-            cut_planes[camera.lens, plane] = undistorted(camera.lens, plane, blank)
-        cut = plane if camera.lens is None else cut_planes[camera.lens, plane]
+    for camera, pinhole, file, others in zip(cameras, straight(cameras, blank), files, beside, strict=True):
+        name = naming.image_of(camera).removeprefix("images/")
         targets = {key: Path(_FOLDERS[key], name).with_suffix(other.suffix) for key, other in others.items()}
         for source, target in ((file, Path("images", name)), *((others[key], targets[key]) for key in others)):
-            _convert(cast(Path, source), out / target, camera, cut, nearest=source is not file)
+            _convert(cast(Path, source), out / target, camera, pinhole.pinhole.plane, nearest=source is not file)
         frames.append({key: target.as_posix() for key, target in targets.items()})
-        pinhole = dataclasses.replace(
-            camera.pinhole, distance=cut.distance, principal_point=cut.principal_point, width=cut.width, height=cut.height
-        )
-        image = f"images/{name}" if form == "transforms" else name
-        written.append(dataclasses.replace(camera, pinhole=pinhole, lens=None, image=image))
+        written.append(dataclasses.replace(pinhole, image=f"images/{name}" if form == "transforms" else name))
     if form == "transforms":
         document = transforms.document(written)
         if (scale := _depth_scale(dataset)) is not None:

@@ -34,8 +34,8 @@ examples:
       each camera so called, compared with the reference tracer
   {command}{file} --orbit 1000 --out truth --labels depth,masks --labels-only
       ground truth without pictures; without --labels-only beside them
-  {command}{file} --orbit 200 --out nerf --transforms
-      with transforms.json and COLMAP text for those who learn the scene
+  {command}{file} --orbit 200 --out nerf --transforms --labels depth,masks --test 8
+      with transforms.json and COLMAP text for those who learn the scene, depth, masks and points
   {command}{file} shots.csv --out renders --workers 2
       on two processes; --scheduler tcp://host:8786 on a farm
 
@@ -94,6 +94,8 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     written.add_argument(
         "--transforms", choices=["png", "exr"], nargs="?", const="png", help="transforms.json and COLMAP text of the png or exr"
     )
+    words = "of --transforms: hold out every N-th picture, or those so called, for tests (transforms_train.json and its like)"
+    written.add_argument("--test", metavar="N|GLOB", help=words)
 
     add_machines(added)
 
@@ -110,6 +112,7 @@ def run(options: argparse.Namespace) -> Result:
         overwrite=options.overwrite,
         shard=options.shard,
         transforms=options.transforms,
+        test=options.test,
         time_limit=options.time_limit,
         workers=options.workers,
         scheduler=options.scheduler,
@@ -134,6 +137,8 @@ def _refuse_contradictions(options: argparse.Namespace) -> None:
         raise InputError("--labels-only leaves nothing to write: say which with --labels")
     if options.labels_only and options.transforms:
         raise InputError("--transforms names the pictures, and --labels-only makes none: leave one of them out")
+    if options.test and not options.transforms:
+        raise InputError("--test is of a dataset: add --transforms, or leave it out")
     if options.scheduler and options.workers is not None:
         raise InputError("a scheduler with an address has its workers already: leave --workers out")
 

@@ -10,9 +10,11 @@ from pathlib import Path
 
 from .. import argument_types as types
 from .. import cameras
-from ..cameras import Camera, Options, undistortion
+from ..cameras import Camera, Options, naming, transforms, undistortion
+from ..cameras.distortion import Lens
 from ..cameras.sidecar import record
 from ..errors import InputError
+from ..files import folder_written_whole
 from ..jobs import makers
 from ..pinhole import ViewPlane
 from ..terminal import say, silent_libraries
@@ -33,8 +35,10 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     add_reading_options(added)
     text = "write the pictures without their lens, and their cameras as pinholes, into this new folder"
     added.add_argument("--undistort", metavar="OUT", type=types.path, help=f"{text} (--to transforms or colmap)")
-    text = "how much of it may be empty: 0 (default): nothing; 1: as much as shows all of each photograph"
-    added.add_argument("--blank", type=types.share, metavar="B", default=0.0, help=f"for --undistort: {text}")
+    text = "write the maps by which compositors take each lens off and put it on, and the pinholes, into this new folder"
+    added.add_argument("--st-maps", metavar="OUT", type=types.path, help=text)
+    text = "how much of a pinhole's picture may be empty: 0 (default): nothing; 1: as much as shows all of each photograph"
+    added.add_argument("--blank", type=types.share, metavar="B", default=0.0, help=f"for these two: {text}")
     added.add_argument("--out-axes", choices=[*cameras.AXES], default="as_is", help="the axes of what is written")
     added.add_argument("--out-scale", type=types.above_zero, metavar="S", default=1.0, help="1 unit written is S units here")
 
@@ -94,6 +98,8 @@ def run(options: argparse.Namespace) -> Result:
         raise InputError("--list and --to say each what to do with the cameras: give one of them")
     if options.undistort:
         return _undistort(options)
+    if options.st_maps:
+        return _st_maps(options)
     if options.out and not options.to:
         raise InputError("--out says where to, but not in which format: give --to")
     with silent_libraries():  # Blender tells what it opens, USD all that a stage lacks
@@ -150,6 +156,32 @@ def _undistort(options: argparse.Namespace) -> Result:
     bent = sum(camera.lens is not None for camera in read)
     say(f"{len(written)} pictures, {bent} of them undistorted ({sizes}): {options.undistort}")
     return 0, {"cameras": [{"name": each.name, **_to_json(each)} for each in written]}
+
+
+def _st_maps(options: argparse.Namespace) -> Result:
+    from .. import image
+
+    if options.list or options.out or options.to or options.undistort:
+        raise InputError("--st-maps writes maps and pinholes into its folder: leave --list, --to, --out and --undistort out")
+    with silent_libraries():
+        read = _read(options)
+    of_lenses: dict[tuple[Lens, ViewPlane], list[str]] = {}
+    for camera in read:
+        if camera.lens is not None:
+            of_lenses.setdefault((camera.lens, camera.pinhole.plane), []).append(camera.name)
+    if not of_lenses:
+        raise InputError(f"no camera of {options.file} has a lens that distorts: there is nothing to map")
+    lines = []
+    with folder_written_whole(options.st_maps) as temporary:
+        for number, ((lens, plane), names) in enumerate(of_lenses.items(), start=1):
+            cut = undistortion.undistorted(lens, plane, options.blank)
+            for what, pixels in zip(("undistort", "distort"), undistortion.st_maps(lens, plane, cut), strict=True):
+                image.write_rgba(temporary / f"lens_{number}.{what}.exr", pixels)
+            sizes = f"{plane.width} × {plane.height} with the lens, {cut.width} × {cut.height} without"
+            lines.append(f"lens_{number}: {sizes}, of {naming.several(names)}")
+        cameras.save(undistortion.straight(read, options.blank), temporary / transforms.FILE, "transforms")
+    say(*lines, f"{len(of_lenses)} lenses and {len(read)} pinholes: {options.st_maps}")
+    return 0, {"lenses": [{"name": f"lens_{i}", "cameras": names} for i, names in enumerate(of_lenses.values(), start=1)]}
 
 
 def _to_json(camera: Camera) -> dict:

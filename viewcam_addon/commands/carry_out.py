@@ -111,7 +111,7 @@ def carry_out(
         )
         words = ""
         if plan.transforms:
-            words = dataset.write(folder, work_list.all_jobs, work_list.settings, plan.transforms)
+            words = dataset.write(folder, work_list.all_jobs, work_list.settings, plan.transforms, plan.test)
     _tell(plan, events, summary, folder, unknown)
     if words:
         say(words)
@@ -143,7 +143,7 @@ def _work_list(plan: Plan, listed: Sequence[Job], complete: Callable[[Job], Job]
     if plan.outputs.labels:
         _refuse_names_of_labels(all_jobs)
     if plan.transforms:
-        dataset.refuse(all_jobs, plan.transforms)
+        dataset.refuse(all_jobs, plan.transforms, plan.test)
     made_from = renderer.made_from()
     settings = {job.name: settings_hash(job, made_from) for job in all_jobs}
     return _WorkList(all_jobs, jobs, made_from, settings)

@@ -1,6 +1,7 @@
 """`viewcam labels`: the labels of many pictures as a dataset: one file, or a folder."""
 
 import argparse
+import functools
 import json
 
 from .. import argument_types as types
@@ -10,17 +11,16 @@ from ..labels import bop, coco, colmap, kitti
 from ..terminal import say
 from . import Result
 
-_FOLDERS = {"bop": bop, "kitti": kitti}
-
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     added.set_defaults(writes=("output",))
     added.add_argument("folder", metavar="FOLDER", type=types.path, help="where viewcam render --labels has written")
     added.add_argument("output", metavar="OUT", type=types.path, help="a file of COCO's; of another format a new folder")
     words = "COCO's instances (default) or panoptic format; BOP's scene; COLMAP's points and tracks; KITTI's depth and flow"
-    added.add_argument("--to", choices=["coco", "panoptic", "colmap", *_FOLDERS], default="coco", help=words)
+    added.add_argument("--to", choices=["coco", "panoptic", "colmap", "bop", "kitti"], default="coco", help=words)
     added.add_argument("--amodal", action="store_true", help="whole objects, in place of what is visible of them")
     words = "for COLMAP: points that are sampled in each picture (default: 1000)"
+    added.add_argument("--overwrite", action="store_true", help="replace a folder of the same format, and nothing else")
     added.add_argument("--points", type=types.positive, metavar="N", help=words)
 
 
@@ -30,9 +30,12 @@ def run(options: argparse.Namespace) -> Result:
     if options.points and options.to != "colmap":
         raise InputError("--points are those of a COLMAP model: add --to colmap, or leave it out")
     if options.to == "colmap":
-        counts = colmap.write(options.folder, options.output, options.points or colmap.POINTS)
-    elif options.to in _FOLDERS:
-        counts = _FOLDERS[options.to].write(options.folder, options.output)
+        counts = colmap.write(options.folder, options.output, options.points or colmap.POINTS, options.overwrite)
+    elif options.to == "bop":
+        progress = functools.partial(options.events.tell, "progress", work="written")
+        counts = bop.write(options.folder, options.output, lambda share: progress(share=share), options.overwrite)
+    elif options.to == "kitti":
+        counts = kitti.write(options.folder, options.output, options.overwrite)
     else:
         document = coco.panoptic(options.folder) if options.to == "panoptic" else coco.instances(options.folder, options.amodal)
         with written_whole(options.output) as temporary:

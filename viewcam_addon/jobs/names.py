@@ -13,7 +13,7 @@ from ..errors import InputError
 # Bytes of UTF-8. 255 is what file systems take; a temporary file beside it needs a prefix and a suffix more.
 LONGEST = 200
 
-OWN = ("summary", "contact-sheet", "transforms")
+OWN = ("summary", "contact-sheet", "transforms", "transforms_train", "transforms_val", "transforms_test")
 """The names of a batch's own files; a part of one adds to each which part it is."""
 
 _PART = re.compile(r"-\d+-of-\d+$", re.ASCII)

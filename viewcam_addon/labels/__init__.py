@@ -32,6 +32,7 @@ DEPTH_STEPS = 1000.0
 FILES = {
     "depth.png": "Depth",
     "instances.png": "Instance",
+    "mask.png": "Instance",
     "forward.flo": "Forward Flow",
     "forward_hidden.png": "Forward Hidden",
     "backward.flo": "Backward Flow",

@@ -8,31 +8,36 @@
 
 Lengths are millimeters, of a scene whose unit is a meter; (0, 0) is the center of the first pixel; boxes are [x, y, w, h] with
 w = greatest − least column, one less than COCO's; all as BOP's toolkit has it. A picture shows no more of a whole object than
-lies within: px_count_all, bbox_obj and visib_fract end there, too.
+lies within: px_count_all, bbox_obj and visib_fract end there, too. Each instance has both masks, of what is hidden an empty
+one, since the toolkit opens all of them.
 
 **Models.** A pose is a rotation, so that an object's scale belongs to its model: A = R S, S symmetric, is unique (the polar
 decomposition), and what has the same name, box and S is the same object. Where A mirrors, S does. The models themselves are not
 written: labels have no meshes.
 
-Sources: bop_toolkit: docs/bop_datasets_format.md, calc_gt_info and calc_2d_bbox.
+Sources: bop_toolkit: docs/bop_datasets_format.md, calc_gt_info and calc_2d_bbox; load_masks of bop_scenewise and calc_gt_coco.
 """
 
-import itertools
 import json
 import shutil
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import cameras
+from .. import cameras, machine
 from ..errors import InputError
 from ..files import folder_written_whole
 from ..pinhole import Pinhole
 from ..png import encoded
 from . import files, masks
 from .coco import Document, category, found, with_mask
+
+_SCENE = ("scene_camera", "scene_gt", "scene_gt_info")
+_FILES = ("depth", "mask", "mask_visib", "objects.json", *(f"{name}.json" for name in _SCENE))
 
 _MILLIMETRES = 1000.0
 """In a meter."""
@@ -41,11 +46,14 @@ _SAME = 1e-6
 """The tolerance of one object's figures from picture to picture: float32's rounding of a matrix, and a little more."""
 
 
-def write(folder: Path, output: Path) -> dict[str, int]:
+def write(
+    folder: Path, output: Path, progress: Callable[[float], None] = lambda share: None, overwrite: bool = False
+) -> dict[str, int]:
     """Write a new folder of all pictures' labels, whole or not at all.
 
     folder : of label files that have depth, masks and amodal masks, and pictures as PNG or JPEG beside them, if there are any.
-    output : must not be there yet, or be empty.
+    output : must not be there yet, or be empty. progress : is told the share of the pictures that are written.
+    overwrite : whether `output` may be a scene that was written so.
 
     Returns how many images, instances and objects there are, and how many of the images have a picture in rgb.
 
@@ -54,17 +62,23 @@ def write(folder: Path, output: Path) -> dict[str, int]:
     InputError
         if there are no label files, one lacks something or can't be read, or the folder can't be written.
     """
+    progress(0.0)
     pictures, _ = found(folder)
     objects = _Objects(pictures)
-    scene: dict[str, dict[str, Any]] = {"scene_camera": {}, "scene_gt": {}, "scene_gt_info": {}}
-    with folder_written_whole(output) as temporary:
+    scene: dict[str, dict[str, Any]] = {name: {} for name in _SCENE}
+
+    def may_replace(there: Path) -> bool:
+        return overwrite and files.holds(there, _FILES, (*_FILES, "rgb"))
+
+    with folder_written_whole(output, may_replace) as temporary, ThreadPoolExecutor(machine.cores()) as threads:
         for kind in ("depth", "mask", "mask_visib"):
             (temporary / kind).mkdir()
         for number, (path, told) in enumerate(pictures):
             with files.understood(path):
-                values = _picture(path, told, objects, temporary, number)
+                values = _picture(path, told, objects, temporary, number, threads)
             for name, each in zip(scene, values, strict=True):
                 scene[name][str(number)] = each
+            progress((number + 1) / len(pictures))
         for name, values in {**scene, "objects": objects.told()}.items():
             (temporary / f"{name}.json").write_text(_lines(values), encoding="utf-8", newline="\n")
         shown = sum(_copy_rgb(path, told, temporary, number) for number, (path, told) in enumerate(pictures))
@@ -72,7 +86,9 @@ def write(folder: Path, output: Path) -> dict[str, int]:
     return {"images": len(pictures), "instances": count, "objects": len(objects.told()), "rgb": shown}
 
 
-def _picture(path: Path, told: Document, objects: "_Objects", output: Path, number: int) -> tuple[Any, Any, Any]:
+def _picture(
+    path: Path, told: Document, objects: "_Objects", output: Path, number: int, threads: ThreadPoolExecutor
+) -> tuple[Any, Any, Any]:
     """The entries of a picture in the three files; its depth and masks are written."""
     depth = files.passes(path, told, ("Depth",))
     if not depth:
@@ -80,13 +96,31 @@ def _picture(path: Path, told: Document, objects: "_Objects", output: Path, numb
     with_mask("visible", path, told)
     levels = files.depth_levels(depth["Depth"][..., 0], told["depth_png_steps"])
     (output / "depth" / f"{number:06d}.png").write_bytes(encoded(levels))
-    poses, seen = [], []
-    for place, each in enumerate(with_mask("amodal", path, told)):
-        whole, visible = (_mask(each[kind], levels.shape) for kind in ("amodal", "visible"))
-        for kind, mask in (("mask", whole), ("mask_visib", visible)):
-            (output / kind / f"{number:06d}_{place:06d}.png").write_bytes(encoded(np.uint8(255) * mask))
-        poses.append({"obj_id": objects.number(each), **_pose(each), "instance_id": each["id"]})
-        seen.append(_seen(each, int((levels[whole] > 0).sum())))
+    instances = with_mask("amodal", path, told)
+    nothing = encoded(np.zeros(levels.shape, np.uint8))
+
+    def write_masks(place: int) -> int:
+        """Write the masks of an instance; returns how many pixels of the whole one have a depth."""
+        each, name = instances[place], f"{number:06d}_{place:06d}.png"
+        whole = masks.decoded(each["amodal"]["segmentation"])
+        visible = encoded(_levels(masks.decoded(each["visible"]["segmentation"]))) if each["visible"] else nothing
+        (output / "mask" / name).write_bytes(encoded(_levels(whole)))
+        (output / "mask_visib" / name).write_bytes(visible)
+        return int(np.count_nonzero(levels[whole]))
+
+    valid = threads.map(write_masks, range(len(instances)))
+    matrices = np.array([each["object_to_camera"] for each in instances]).reshape(-1, 4, 4)
+    turns, _ = _turned_and_stretched(matrices[:, :3, :3])
+    poses = [
+        {
+            "obj_id": objects.number(each),
+            "cam_R_m2c": turn.ravel().tolist(),
+            "cam_t_m2c": (_MILLIMETRES * matrix[:3, 3]).tolist(),
+            "instance_id": each["id"],
+        }
+        for each, turn, matrix in zip(instances, turns, matrices, strict=True)
+    ]
+    seen = [_seen(each, pixels) for each, pixels in zip(instances, valid, strict=True)]
     return {**_camera(told), "depth_scale": _MILLIMETRES / told["depth_png_steps"]}, poses, seen
 
 
@@ -94,52 +128,65 @@ class _Objects:
     """The objects of all pictures, numbered from 1: in the order of their names, and those of one name as they appear."""
 
     def __init__(self, pictures: list[tuple[Path, Document]]) -> None:
-        self._named: dict[str, list[tuple[int, dict[str, Any], NDArray]]] = {}
-        alike: dict[str, list[tuple[dict[str, Any], NDArray]]] = {}
+        alike: dict[str, list[_Object]] = {}
+        self._object_of: dict[tuple[Any, ...], _Object] = {}
         for path, told in pictures:
             with files.understood(path):
                 for each in told["instances"]:
-                    known = alike.setdefault(category(each["name"]), [])
-                    box, stretch = each["box"], _turned_and_stretched(each)[1]
-                    if not any(_is_one(box, stretch, *other) for other in known):
-                        known.append((box, stretch))
-        numbers = itertools.count(1)
-        for name in sorted(alike):
-            self._named[name] = [(next(numbers), *each) for each in alike[name]]
+                    if (key := self._key(each)) not in self._object_of:
+                        self._object_of[key] = _object_of(each, alike.setdefault(category(each["name"]), []))
+        self._every = [(name, each) for name in sorted(alike) for each in alike[name]]
+        self._numbers = {id(each): number for number, (_, each) in enumerate(self._every, start=1)}
 
     def number(self, instance: Document) -> int:
-        box, stretch = instance["box"], _turned_and_stretched(instance)[1]
-        return next(number for number, *other in self._named[category(instance["name"])] if _is_one(box, stretch, *other))
+        return self._numbers[id(self._object_of[self._key(instance)])]
 
     def told(self) -> dict[str, Any]:
         return {
-            str(number): {"name": name, "box": box, "object_to_model": (_MILLIMETRES * stretch).tolist()}
-            for name, alike in self._named.items()
-            for number, box, stretch in alike
+            str(number): {"name": name, "box": each.box, "object_to_model": (_MILLIMETRES * each.stretch).tolist()}
+            for number, (name, each) in enumerate(self._every, start=1)
         }
 
-
-def _is_one(box: dict[str, Any], stretch: NDArray, its_box: dict[str, Any], its_stretch: NDArray) -> bool:
-    return _are_same(stretch, its_stretch) and _are_same([box["min"], box["max"]], [its_box["min"], its_box["max"]])
-
-
-def _are_same(some: Any, others: Any) -> bool:
-    some, others = np.array(some), np.array(others)
-    return bool(np.abs(some - others).max() <= _SAME * np.abs(some).max())
+    @staticmethod
+    def _key(instance: Document) -> tuple[Any, ...]:
+        """All that decides which object an instance is; what stands still has one in all pictures."""
+        box, rows = instance["box"], instance["object_to_world"][:3]
+        return category(instance["name"]), *box["min"], *box["max"], *(number for row in rows for number in row[:3])
 
 
-def _turned_and_stretched(instance: Document) -> tuple[NDArray, NDArray]:
-    """R and S of the matrix from the object to the camera, A = R S."""
-    matrix = np.array(instance["object_to_camera"])[:3, :3]
-    left, _, right = np.linalg.svd(matrix)
-    turn = left @ right
-    turn *= np.sign(np.linalg.det(turn))
-    return turn, turn.T @ matrix
+class _Object(NamedTuple):
+    """box : as the label has it. stretch : S. figures : of both, in two rows of nine."""
+
+    box: dict[str, Any]
+    stretch: NDArray
+    figures: NDArray
 
 
-def _pose(instance: Document) -> Document:
-    place = _MILLIMETRES * np.array(instance["object_to_camera"])[:3, 3]
-    return {"cam_R_m2c": _turned_and_stretched(instance)[0].ravel().tolist(), "cam_t_m2c": place.tolist()}
+def _object_of(instance: Document, known: list[_Object]) -> _Object:
+    """The object that an instance is, of those known; which a new one joins."""
+    box = instance["box"]
+    stretch = _turned_and_stretched(np.array(instance["object_to_world"])[:3, :3])[1]
+    new = _Object(box, stretch, np.array([[*box["min"], *box["max"], 0, 0, 0], stretch.ravel()]))
+    if known:
+        off = np.abs(np.array([each.figures for each in known]) - new.figures).max(axis=-1)
+        alike = (off <= _SAME * np.abs(new.figures).max(axis=-1)).all(axis=-1)
+        if alike.any():
+            return known[int(alike.argmax())]
+    known.append(new)
+    return new
+
+
+def _turned_and_stretched(matrices: NDArray) -> tuple[NDArray, NDArray]:
+    """R and S of each matrix, A = R S: (..., 3, 3)."""
+    left, _, right = np.linalg.svd(matrices)
+    turns = left @ right
+    turns *= np.sign(np.linalg.det(turns))[..., None, None]
+    return turns, turns.swapaxes(-1, -2) @ matrices
+
+
+def _levels(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """0 and 255."""
+    return np.uint8(255) * mask
 
 
 def _seen(instance: Document, valid: int) -> Document:
@@ -157,10 +204,6 @@ def _seen(instance: Document, valid: int) -> Document:
 def _box(mask: Document | None) -> list[int]:
     x, y, width, height = mask["bbox"] if mask else (-1, -1, 0, 0)
     return [x, y, width - 1, height - 1]
-
-
-def _mask(told: Document | None, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    return masks.decoded(told["segmentation"]) if told else np.zeros(shape, bool)
 
 
 def _camera(told: Document) -> Document:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from . import files
+from . import files, masks
 
 Document = dict[str, Any]
 
@@ -31,6 +31,7 @@ def instances(folder: Path, amodal: bool = False) -> Document:
                     "image_id": number,
                     "category_id": categories[category(each["name"])],
                     **each[kind],
+                    "segmentation": masks.compressed(each[kind]["segmentation"]),
                     "iscrowd": 0,
                     "instance_id": each["id"],
                 }

@@ -13,8 +13,11 @@ pixels' centers only. There the point counts as seen if
 
 So what can't be told is an object that hides a point of itself by less than a thousandth of the depth, and whatever is thinner
 than a pixel. Rejected: a tolerance between depth maps at the nearest pixel, which a slanted floor exceeds within half a pixel.
+
+A point has the color that its picture shows there, if that is a PNG, and else that of its instance's id.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,6 +30,7 @@ from ..errors import InputError
 from ..files import folder_written_whole
 from ..image import BACKGROUND_DEPTH
 from ..pinhole import Pinhole
+from ..png import decoded
 from . import files
 from .coco import Document, found
 
@@ -44,6 +48,10 @@ _ROUNDING = 2.0**-22
 _EVENLY = 0.7548776662466927, 0.5698402909980532
 
 
+PLY = "points3D.ply"
+"""The points beside the model, for those who begin with them: Gaussian splatting reads it there."""
+
+
 class _Sampled(NamedTuple):
     """Points, each array with as many rows. source : which picture they come from. depth : there. state : as of `_planes`."""
 
@@ -51,15 +59,15 @@ class _Sampled(NamedTuple):
     source: NDArray[np.intp]
     depth: Array
     state: NDArray[np.int64]
-    ids: NDArray[np.float32]
+    colours: NDArray[np.uint8]
 
 
-def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
-    """Write a new folder of cameras.txt, images.txt and points3D.txt, whole or not at all.
+def write(folder: Path, output: Path, points: int = POINTS, overwrite: bool = False) -> dict[str, int]:
+    """Write a new folder of cameras.txt, images.txt, points3D.txt and points3D.ply, whole or not at all.
 
     folder : of label files that have depth and masks. output : must not be there yet, be empty, or hold a model of cameras
     alone, as a batch with --transforms writes it. points : how many are sampled in each picture, evenly over what it shows;
-    those that no other picture sees are left out.
+    those that no other picture sees are left out. overwrite : whether `output` may hold a model with points, too.
 
     Returns how many images, points and observations there are.
 
@@ -70,33 +78,101 @@ def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
         the folder can't be written.
     """
     pictures, _ = found(folder)
-    states: dict[str, int] = {}
-    with folder_written_whole(output, _has_no_points) as temporary:
-        views, pieces = [], []
-        for number, (path, told) in enumerate(pictures):
+
+    def may_replace(there: Path) -> bool:
+        return _has_no_points(there) or (overwrite and files.holds(there, colmap.TEXTS, (*colmap.TEXTS, PLY)))
+
+    with folder_written_whole(output, may_replace) as temporary:
+        views = []
+        for path, told in pictures:
             with files.understood(path):
                 name = files.picture(path, told)
                 views.append(cameras.Camera(name, Pinhole(**told["camera"]), image=name))
-                pieces.append(_sampled(number, views[-1].pinhole, *_planes(path, told, states), points))
-        sampled = _Sampled(*map(np.concatenate, zip(*pieces, strict=True)))
-        shown = [
-            _shown(sampled, number, view.pinhole, *_planes(path, told, states)[:2])
-            for number, (view, (path, told)) in enumerate(zip(views, pictures, strict=True))
-        ]
-        often = np.bincount(np.concatenate([which for which, _ in shown]), minlength=len(sampled.source)) > 1
-        new = np.cumsum(often) - 1
-        tracks = colmap.Tracks(
-            sampled.positions[often],
-            files.id_colours(sampled.ids[often]),
-            [(new[which[often[which]]], places[often[which]]) for which, places in shown],
-        )
-        for file, text in colmap.texts(views, tracks).items():
-            (temporary / file).write_text(text, encoding="utf-8", newline="\n")
+        tracks = tracks_of(pictures, views, points)
+        for file, content in contents(views, tracks).items():
+            (temporary / file).write_bytes(content)
     return {
         "images": len(views),
         "points": len(tracks.positions),
         "observations": sum(len(which) for which, _ in tracks.observations),
     }
+
+
+def tracks_of(
+    pictures: Sequence[tuple[Path, Document]], views: Sequence[cameras.Camera], points: int, longest: int | None = None
+) -> colmap.Tracks:
+    """Points of all pictures that two show at least, and where each shows them.
+
+    pictures : label files that have depth and masks. views : their cameras. points : as of `write`. longest : how many of the
+    pictures that see a point its track has at most, all if None. Raises InputError if one lacks something or can't be read.
+    """
+    states: dict[str, int] = {}
+    pieces, shown = [], []
+    for number, (view, (path, told)) in enumerate(zip(views, pictures, strict=True)):
+        with files.understood(path):
+            depth, state, ids = _planes(path, told, states)
+            pieces.append(_sampled(number, view.pinhole, depth, state, _colours(path, told, ids), points))
+    sampled = _Sampled(*map(np.concatenate, zip(*pieces, strict=True)))
+    for number, (view, (path, told)) in enumerate(zip(views, pictures, strict=True)):
+        shown.append(_shown(sampled, number, view.pinhole, *_planes(path, told, states)[:2]))
+    if longest is not None:
+        shown = _shortened(shown, longest)
+    often = np.bincount(np.concatenate([which for which, _ in shown]), minlength=len(sampled.source)) > 1
+    new = np.cumsum(often) - 1
+    return colmap.Tracks(
+        sampled.positions[often],
+        sampled.colours[often],
+        [(new[which[often[which]]], places[often[which]]) for which, places in shown],
+    )
+
+
+def _shortened(shown: list[tuple[NDArray[np.intp], Array]], longest: int) -> list[tuple[NDArray[np.intp], Array]]:
+    """The places in each picture, of each point those in `longest` pictures at most, spread over those that see it."""
+    point = np.concatenate([which for which, _ in shown])
+    picture = np.repeat(np.arange(len(shown)), [len(which) for which, _ in shown])
+    order = np.lexsort(((picture * _EVENLY[0] + point * _EVENLY[1]) % 1.0, point))
+    first = np.flatnonzero(np.diff(point[order], prepend=-1))
+    kept = np.zeros(len(point), bool)
+    kept[order] = np.arange(len(point)) - np.repeat(first, np.diff(first, append=len(point))) < longest
+    parts = np.split(kept, np.cumsum([len(which) for which, _ in shown])[:-1])
+    return [(which[part], places[part]) for (which, places), part in zip(shown, parts, strict=True)]
+
+
+def contents(views: Sequence[cameras.Camera], tracks: colmap.Tracks) -> dict[str, bytes]:
+    """The files of a model with points, by name. Raises InputError for what COLMAP can't name."""
+    texts = {name: text.encode("utf-8") for name, text in colmap.texts(views, tracks).items()}
+    return {**texts, PLY: _ply(tracks)}
+
+
+def _ply(tracks: colmap.Tracks) -> bytes:
+    """The points as Gaussian splatting reads them: with normals, which are 0, or it takes none of them."""
+    types = [
+        *((name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")),
+        *((name, "u1") for name in ("red", "green", "blue")),
+    ]
+    vertices = np.zeros(len(tracks.positions), types)
+    for names, columns in (("x", "y", "z"), tracks.positions), (("red", "green", "blue"), tracks.colours):
+        for name, column in zip(names, np.transpose(columns), strict=True):
+            vertices[name] = column
+    kinds = {"<f4": "float", "u1": "uchar"}
+    head = "".join(f"property {kinds[kind]} {name}\n" for name, kind in types)
+    return (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n{head}end_header\n".encode()
+        + vertices.tobytes()
+    )
+
+
+def _colours(path: Path, told: Document, ids: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """(height, width, 3): the picture beside a label file, if it is a PNG, or else its ids."""
+    picture = files.photograph(path, told)
+    if picture is None or picture.suffix != ".png":
+        return files.id_colours(ids)
+    try:
+        pixels = decoded(picture.read_bytes())
+    except (OSError, ValueError) as error:
+        raise InputError(f"{picture} is no PNG of 8 or 16 bits that can be read: render it again, or move it away") from error
+    colours = pixels[..., :3] if pixels.shape[-1] > 2 else np.repeat(pixels[..., :1], 3, axis=-1)
+    return (colours >> 8 * (colours.dtype.itemsize - 1)).astype(np.uint8)
 
 
 def _planes(path: Path, told: Document, states: dict[str, int]) -> tuple[Array, NDArray[np.int64], NDArray[np.float32]]:
@@ -121,14 +197,14 @@ def _planes(path: Path, told: Document, states: dict[str, int]) -> tuple[Array, 
 
 def _has_no_points(folder: Path) -> bool:
     """True if a folder holds a text model that lacks nothing but points, and nothing else."""
-    if {path.name for path in folder.iterdir()} != {*colmap.TEXTS}:
+    if not files.holds(folder, colmap.TEXTS, colmap.TEXTS):
         return False
     with open(folder / "points3D.txt", encoding="utf-8", errors="replace") as lines:
         return not any(line.strip() and not line.startswith("#") for line in lines)
 
 
 def _sampled(
-    number: int, camera: Pinhole, depth: Array, state: NDArray[np.int64], ids: NDArray[np.float32], points: int
+    number: int, camera: Pinhole, depth: Array, state: NDArray[np.int64], colours: NDArray[np.uint8], points: int
 ) -> _Sampled:
     rows, columns = np.nonzero(state >= 0)
     rank = (columns * _EVENLY[0] + rows * _EVENLY[1]) % 1.0
@@ -138,7 +214,7 @@ def _sampled(
     u, v, w = camera.basis()
     z = depth[rows, columns]
     positions = np.array(camera.eye) + z[:, None] * (x[:, None] * u + y[:, None] * v - w)
-    return _Sampled(positions, np.full(len(z), number), z, state[rows, columns], ids[rows, columns])
+    return _Sampled(positions, np.full(len(z), number), z, state[rows, columns], colours[rows, columns])
 
 
 def _shown(

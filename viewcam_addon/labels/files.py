@@ -6,7 +6,7 @@ Each appears whole, and the JSON last: where it stands, so do the others. An old
 import contextlib
 import json
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Never
@@ -231,6 +231,11 @@ def _told(path: Path, labels: Labels, names: list[str], depth_steps: float) -> d
         "lost": labels.lost,
         "instances": labels.instances,
     }
+
+
+def holds(folder: Path, least: Collection[str], most: Collection[str]) -> bool:
+    """True if a folder holds all of the names `least`, and nothing but `most`: then it may be replaced by its like."""
+    return {*least} <= {path.name for path in folder.iterdir()} <= {*most}
 
 
 def depth_levels(depth: NDArray[np.float32], steps: float) -> NDArray[np.uint16]:

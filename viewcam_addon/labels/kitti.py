@@ -25,10 +25,10 @@ DEPTH_STEPS = 256.0
 _FLOW_STEPS, _NO_FLOW = 64.0, 2.0**15
 
 
-def write(folder: Path, output: Path) -> dict[str, int]:
+def write(folder: Path, output: Path, overwrite: bool = False) -> dict[str, int]:
     """Write a new folder of what each picture's labels have of depth and forward flow, whole or not at all.
 
-    folder : of label files. output : must not be there yet, or be empty.
+    folder : of label files. output : must not be there yet, or be empty. overwrite : whether it may be what was written so.
 
     Returns how many pictures have which.
 
@@ -39,7 +39,11 @@ def write(folder: Path, output: Path) -> dict[str, int]:
     """
     pictures, _ = found(folder)
     counts = {"depth": 0, "flow": 0}
-    with folder_written_whole(output) as temporary:
+
+    def may_replace(there: Path) -> bool:
+        return overwrite and files.holds(there, (), ("depth", "flow_occ", "flow_noc"))
+
+    with folder_written_whole(output, may_replace) as temporary:
         for path, told in pictures:
             planes = _planes(files.passes(path, told, ("Depth", "Forward Flow", "Forward Hidden")))
             if not planes:

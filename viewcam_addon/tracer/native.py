@@ -184,7 +184,7 @@ class _Core(Structure):
         ("light_create", _function(c_int, c_void_p, POINTER(_LightSettings), POINTER(c_void_p))),
         ("light_free", _function(None, c_void_p)),
         ("light_pairs", _function(c_size_t, c_void_p, c_size_t, c_void_p, c_void_p)),
-        ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, POINTER(_LightPasses), c_void_p)),
+        ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, c_uint32, POINTER(_LightPasses), c_void_p)),
         (
             "probe_sobol",
             _function(c_int, c_uint32, c_uint32, c_int, c_size_t, c_void_p, c_void_p, c_int, c_int, c_void_p),
@@ -620,10 +620,13 @@ class CoreLight:
         if self._handle:
             self._scene.core.light_free(self._handle)
 
-    def trace(self, passes: Passes, row: int, column: int, stop: Any) -> None:
-        """Write a tile, by its lowest row and first column, into `LIGHT`'s passes, (height, width, channels), C-contiguous."""
+    def trace(self, passes: Passes, row: int, column: int, samples: int, stop: Any) -> None:
+        """Write a tile, by its lowest row and first column, into `LIGHT`'s passes, (height, width, channels), C-contiguous.
+
+        samples : that its pixels have then: all, or fewer, to which the next call adds.
+        """
         addresses = _LightPasses(*(_address(passes.get(name)) for name in LIGHT))
-        self._scene.check(self._scene.core.trace_light(self._handle, row, column, addresses, stop))
+        self._scene.check(self._scene.core.trace_light(self._handle, row, column, samples, addresses, stop))
 
     def pairs(self) -> list[tuple[int, int | None, int]]:
         """Two objects, which may be one, that paths have met in one place, and how often; the most frequent first, of 1,000.

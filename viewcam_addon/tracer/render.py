@@ -7,7 +7,7 @@ number of threads.
 
 import functools
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -86,29 +86,32 @@ class Tracer:
         seed: int,
         watcher: Watcher | None = None,
         error: float | None = None,
+        steps: Sequence[int] = (),
     ) -> Passes:
         """Render light, and the geometry at the pixel centers: Depth and Object Index.
 
-        error : as in `render`; then there is the pass Sample Count, too.
+        error, steps : as in `render`; with an error there is the pass Sample Count, too.
         """
         names = LIGHT_PASSES if error is None else (*LIGHT_PASSES, "Sample Count")
         passes = self._blank(lambda shape: _dark(shape, names) | unwritten(shape, CENTRES))
         light = CoreLight(self._core, self._scene, level, samples, seed, error)
         width, height = self._camera.width, self._camera.height
-        left = {first: -(-width // native.TILE) for first in range(0, height, native.TILE)}  # tiles of each band of rows
         centres = {name: passes[name] for name in CENTRES}
-        tiles = ((row, column) for row in left for column in range(0, width, native.TILE))
+        steps = steps or (samples,)
+        for step in steps:
 
-        def trace(tile: tuple[int, int], stop: int) -> None:
-            row, column = tile
-            if column == 0:
-                self._core.render_geometry(centres, range(row, min(row + native.TILE, height)), stop)
-            light.trace(passes, row, column, stop)
+            def trace(tile: tuple[int, int], stop: int, step: int = step) -> None:
+                row, column = tile
+                if column == 0 and step == steps[0]:
+                    self._core.render_geometry(centres, range(row, min(row + native.TILE, height)), stop)
+                light.trace(passes, row, column, step, stop)
 
-        for row, _ in self._in_threads(trace, tiles, watcher):
-            left[row] -= 1
-            if not left[row] and watcher is not None:
-                watcher.tile(passes, range(row, min(row + native.TILE, height)))
+            left = {first: -(-width // native.TILE) for first in range(0, height, native.TILE)}  # tiles of each band of rows
+            tiles = ((row, column) for row in left for column in range(0, width, native.TILE))
+            for row, _ in self._in_threads(trace, tiles, watcher):
+                left[row] -= 1
+                if not left[row] and watcher is not None:
+                    watcher.tile(passes, range(row, min(row + native.TILE, height)))
         return passes
 
     def coincident_light(
@@ -125,7 +128,7 @@ class Tracer:
         light = CoreLight(self._core, self._scene, level, samples, seed, None, roundings)
         width, height = self._camera.width, self._camera.height
         tiles = ((row, column) for row in range(0, height, native.TILE) for column in range(0, width, native.TILE))
-        for _ in self._in_threads(lambda tile, stop: light.trace(passes, *tile, stop), tiles, None):
+        for _ in self._in_threads(lambda tile, stop: light.trace(passes, *tile, samples, stop), tiles, None):
             pass
         pairs: dict[tuple[str, str], int] = {}
         seen_otherwise: dict[str, int] = {}
@@ -268,6 +271,7 @@ def render(
     watcher: Watcher | None = None,
     error: float | None = None,
     keeper: Keeper | None = None,
+    steps: Sequence[int] = (),
 ) -> Passes:
     """Trace the scene: pass name → (height, width, channels) float32, rows from the bottom.
 
@@ -275,6 +279,8 @@ def render(
     seed : another for other noise. error : the standard error that each pixel's Combined may have, scene-linear: the root of
     the mean of its channels' variances. Then pixels get as few samples as that takes, `samples` at most; Sample Count tells.
     keeper : of what this scene may share with others that it has traced, or will.
+    steps : the numbers of samples, ascending and the last of them `samples`, at which the watcher is shown the whole picture;
+    none to show each band of rows once. The picture has the same bits either way. Not with an error.
 
     Raises
     ------
@@ -293,7 +299,7 @@ def render(
         tracer = (keeper or Keeper()).tracer(scene, threads)
         if level == "geometry":
             return tracer.render(watcher)
-        return tracer.render_light(level, samples, seed, watcher, error)
+        return tracer.render_light(level, samples, seed, watcher, error, steps)
     except MemoryError as error:
         raise InputError("the scene needs more memory than there is: take some of it out, or give fewer threads") from error
 

@@ -30,7 +30,7 @@ def endless(monkeypatch):
     """Rendering shows one row and then never ends by itself; a list of what happened to it."""
     happened = []
 
-    def render(scene, level, samples, seed, threads, watcher, keeper):
+    def render(scene, level, samples, seed, threads, watcher, **_):
         watcher.tile({"Depth": np.zeros((30, 40, 1), np.float32)}, range(1))
         happened.append("began")
         while not watcher.stop():

@@ -5,6 +5,8 @@ What goes wrong is reported, which ends `blender -b` with status 1 and without a
 
 Level `geometry` knows no light: its Combined shows surfaces as a lamp at the eye would, by the cosine between ray and normal.
 
+Light refines over the whole picture, step by step, the final one with the bits that it has at once.
+
 What is prepared for one picture serves all passes of a frame, and the next frames as well where Blender's "Persistent Data" is
 on, which keeps the engine. The scene is read anew for each, except in a batch (`keeps_scene`).
 
@@ -15,7 +17,7 @@ Rejected: a result that is begun once and updated, which Blender would copy whol
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import bpy
@@ -26,7 +28,7 @@ from ...errors import InputError
 from ...image import CHANNELS, GEOMETRY_PASSES, SETTINGS
 from ...terminal import plain
 from ...tracer.scene import Scene
-from ...tracer.scene.film import LEVELS
+from ...tracer.scene.film import LEVELS, refinement
 from ...tracer.scene.levels import least_level
 from ...tracer.tiles import Passes
 from .. import datablocks, versions
@@ -137,12 +139,17 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         type(self).level = level
         words = f"Level {level}" if level == _GEOMETRY else f"Level {level}, {settings.samples} samples"
         self.update_stats("", words)
-        started, done = time.perf_counter(), np.zeros(scene.camera.height, bool)
-        for band, rows in self._bands(depsgraph, scene, level):
+        width, height = scene.camera.width, scene.camera.height
+        # Nobody looks at what comes before the last in a Blender without a window.
+        steps = () if level == _GEOMETRY or bpy.app.background else refinement(settings.samples, width * height)
+        taken = np.array([0, *(steps or [1])])  # samples after each step
+        started, step = time.perf_counter(), np.zeros(height, int)  # that the rows have come to
+        for band, rows in self._bands(depsgraph, scene, level, steps):
             self._show(depsgraph, band, rows)
-            done[rows.start : rows.stop] = True
-            self.update_progress(done.mean())
-            remaining = round((time.perf_counter() - started) * (1 / done.mean() - 1))
+            step[rows.start : rows.stop] += 1
+            share = taken[step].mean() / taken[-1]
+            self.update_progress(share)
+            remaining = round((time.perf_counter() - started) * (1 / share - 1))
             self.update_stats("", f"{words} | Remaining {remaining // 60}:{remaining % 60:02}")
 
     def _exported(self, depsgraph: bpy.types.Depsgraph) -> Scene:
@@ -174,11 +181,13 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         self._read = lit, scene
         return scene
 
-    def _bands(self, depsgraph: bpy.types.Depsgraph, scene: Scene, level: str) -> Iterator[tuple[Passes, range]]:
+    def _bands(
+        self, depsgraph: bpy.types.Depsgraph, scene: Scene, level: str, steps: Sequence[int]
+    ) -> Iterator[tuple[Passes, range]]:
         """Trace the scene: the passes of some rows, and which they are. What is where is that at the pixels' centers."""
 
-        def traced(level: str) -> Iterator[tuple[Passes, range]]:
-            return tracing.bands(scene, level, settings.samples, settings.seed, threads, self.test_break, self._keeper)
+        def traced(level: str, steps: Sequence[int] = ()) -> Iterator[tuple[Passes, range]]:
+            return tracing.bands(scene, level, settings.samples, settings.seed, threads, self.test_break, self._keeper, steps)
 
         self._keeper = self._keeper or tracing.keeper()
         settings, threads = depsgraph.scene_eval.virtual_pinhole_reference, depsgraph.scene.render.threads
@@ -186,7 +195,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         if level != _GEOMETRY and set(GEOMETRY_PASSES) & set(_asked_for(depsgraph.scene_eval, depsgraph.view_layer)):
             for passes, _ in traced(_GEOMETRY):
                 centres = passes
-        for passes, rows in traced(level):
+        for passes, rows in traced(level, steps):
             band = {name: values[rows.start : rows.stop] for name, values in (centres | passes).items()}
             if level == _GEOMETRY:
                 band["Combined"] = lit_from_the_eye(band)

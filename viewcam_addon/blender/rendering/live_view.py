@@ -24,7 +24,7 @@ from ...image import BACKGROUND_DEPTH
 from ...pinhole import Pinhole
 from ...rotation import float64
 from ...tracer.scene import Scene
-from ...tracer.scene.film import LEVELS
+from ...tracer.scene.film import LEVELS, refinement
 from ...tracer.tiles import Passes, Stopped
 
 if TYPE_CHECKING:
@@ -50,6 +50,8 @@ class LiveView:
         self.number, self.drawn, self.samples, self.message = 0, 0, 0, ""
         self._asked = threading.Condition()
         self._next: tuple[Scene, str, int] | None = None
+        self._steps: list[int] = []  # samples of the pictures of light that are still to come
+        self._rows = 0  # of the next one that are there
         self._is_at_work = self._is_closed = False
         self._all.add(self)
         threading.Thread(target=self._work, name="viewcam view", daemon=True).start()
@@ -74,7 +76,14 @@ class LiveView:
         return self._is_closed or (not self._is_at_work and self.drawn == self.number)
 
     def tile(self, passes: Passes, rows: range) -> None:
-        """Nothing: pictures are shown whole."""
+        """Publish light where all rows have come to the next step: pictures are shown whole."""
+        if not self._steps:
+            return
+        picture = passes["Combined"]
+        self._rows += len(rows)
+        if self._rows == len(picture):
+            self._rows, samples = 0, self._steps.pop(0)
+            self._publish(picture.copy(), samples)
 
     def stop(self) -> bool:
         """True if something else is asked for."""
@@ -100,16 +109,13 @@ class LiveView:
 
     def _trace(self, scene: Scene, level: str, samples: int, keeper: "Keeper") -> None:
         tracer = keeper.tracer(scene)
+        self._steps, self._rows = [], 0
         surfaces = tracer.render(self, ("Depth", "Facing"))
         self._publish(lit_from_the_eye(surfaces), 0)
-        if level == _GEOMETRY:
-            return
-        total, done = np.zeros((), np.float64), 0
-        while done < samples:
-            more = min(max(1, done), samples - done)  # each picture has twice as many as the one before
-            light = tracer.render_light(level, more, done, self)["Combined"]
-            total, done = total + more * light.astype(np.float64), done + more
-            self._publish((total / done).astype(np.float32), done)
+        if level != _GEOMETRY:
+            steps = refinement(samples, surfaces["Depth"].size) or (samples,)
+            self._steps = list(steps)
+            tracer.render_light(level, samples, 0, self, steps=steps)
 
     def _publish(self, picture: Picture | None, samples: int, message: str = "") -> None:
         if picture is not None:

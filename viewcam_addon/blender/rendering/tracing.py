@@ -9,7 +9,7 @@ import contextlib
 import queue
 import threading
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
@@ -52,11 +52,12 @@ def bands(
     threads: int,
     is_cancelled: Callable[[], bool],
     keeper: "Keeper | None" = None,
+    steps: Sequence[int] = (),
 ) -> Iterator[tuple[Passes, range]]:
     """Trace a scene, and give what is finished: the passes of the whole picture, and the rows of them that are new.
 
     is_cancelled : asked in the caller's thread. When it says so, or when the caller takes no more, tracing ends at once.
-    keeper : as in tracer.render.render.
+    keeper, steps : as in tracer.render.render; with steps, all rows come again at each.
 
     Raises
     ------
@@ -67,7 +68,7 @@ def bands(
 
     watcher = _Watcher()
     with ThreadPoolExecutor(1, "viewcam") as pool:
-        tracing = pool.submit(render, scene, level, samples, seed, threads, watcher, keeper=keeper)
+        tracing = pool.submit(render, scene, level, samples, seed, threads, watcher, keeper=keeper, steps=steps)
         tracing.add_done_callback(lambda _: watcher.bands.put(None))
         try:
             while not is_cancelled():

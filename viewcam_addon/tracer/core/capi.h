@@ -117,8 +117,9 @@ typedef struct {
     void (*light_free)(ViewcamLight*);
     /* The objects, two and two, that paths have met in one place, and how often: the first `most`. Returns how many there are. */
     size_t (*light_pairs)(const ViewcamLight*, size_t most, uint32_t* objects, uint64_t* counts);
-    /* A tile of 32 × 32 pixels, by its lowest row and its first column. */
-    int (*trace_light)(const ViewcamLight*, uint32_t row, uint32_t column, const ViewcamLightPasses*, const volatile int* stop);
+    /* A tile of 32 × 32 pixels, by its lowest row and its first column, until its pixels have so many samples: all, or fewer, to which
+     * a later call adds. No two threads may trace the same tile. */
+    int (*trace_light)(ViewcamLight*, uint32_t row, uint32_t column, uint32_t samples, const ViewcamLightPasses*, const volatile int* stop);
 
     /* For tests: light_functions.h says what they are given and return. */
     int (*probe_sobol)(uint32_t seed, uint32_t samples, int scatterings, size_t, const uint32_t*, const uint32_t*, int first, int dimensions, double*);

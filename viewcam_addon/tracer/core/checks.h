@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "capi.h"
+#include "integrators/adaptive.h"
 #include "scene.h"
 
 namespace viewcam::VIEWCAM_ISA::check {
@@ -116,8 +117,9 @@ inline void light(const Scene& scene, const ViewcamLightSettings& given) {
     that(given.coincident >= 0 && given.coincident <= LARGEST, "surfaces in one place are less than 0 roundings apart, or too many");
     that(given.error >= 0 && std::isfinite(given.error), "the error is below 0, or no number");
 }
-inline void tile(const Camera& camera, uint32_t row, uint32_t column, const ViewcamLightPasses& to) {
-    that(row < camera.height && column < camera.width, "a tile is asked for that the picture does not have");
+inline void tile(const TileSampler& light, uint32_t row, uint32_t column, uint32_t samples, const ViewcamLightPasses& to) {
+    that(row < light.camera().height && column < light.camera().width && row % light.TILE == 0 && column % light.TILE == 0, "a tile is asked for that the picture does not have");
+    that(samples >= 1 && samples <= light.samples(), "a tile is asked for more samples than there are");
     that(to.combined, "the pass Combined has no place to go");
 }
 

@@ -36,6 +36,7 @@ template <class Work> int guarded(const Work& work) {
 Scene& scene_of(ViewcamScene* scene) { return *reinterpret_cast<Scene*>(scene); }
 const Scene& scene_of(const ViewcamScene* scene) { return *reinterpret_cast<const Scene*>(scene); }
 const TileSampler& light_of(const ViewcamLight* light) { return *reinterpret_cast<const TileSampler*>(light); }
+TileSampler& light_of(ViewcamLight* light) { return *reinterpret_cast<TileSampler*>(light); }
 
 // (n, 8): origins, directions, t_min, t_max.
 const Ray* rays_of(const double* rows) {
@@ -280,10 +281,10 @@ const ViewcamCore core = {
         return pairs.size();
     },
     .trace_light =
-        [](const ViewcamLight* light, uint32_t row, uint32_t column, const ViewcamLightPasses* passes, const volatile int* stop) {
+        [](ViewcamLight* light, uint32_t row, uint32_t column, uint32_t samples, const ViewcamLightPasses* passes, const volatile int* stop) {
             return guarded([&] {
-                check::tile(light_of(light).camera(), row, column, *passes);
-                trace_light(light_of(light), row, column, *passes, stop);
+                check::tile(light_of(light), row, column, samples, *passes);
+                light_of(light).trace(row, column, samples, *passes, stop);
             });
         },
 

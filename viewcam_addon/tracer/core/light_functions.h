@@ -88,10 +88,6 @@ inline TileSampler* create_light(const Scene& scene, const ViewcamLightSettings&
     Bounces bounces{given.bounces[0], given.bounces[1], given.bounces[2], given.bounces[3], given.bounces[4]};
     return new TileSampler(scene, bounces, given.seed, given.samples, given.error, given.coincident);
 }
-inline void trace_light(const TileSampler& sampler, uint32_t row, uint32_t column, const ViewcamLightPasses& passes, const volatile int* stop) {
-    sampler.trace(row, column, passes, stop);
-}
-
 // Probes: the formulas one by one, for tests. All arrays are rows of so many numbers.
 namespace probe {
 

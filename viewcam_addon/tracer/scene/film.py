@@ -17,7 +17,11 @@ SAMPLES = 64
 MOST_SAMPLES = 4096
 """The most that a pixel gets where an error is wanted in place of a number of samples."""
 
+MOST_REFINED = 2048**2
+"""The most pixels of a picture that refines, of which all tiles are under way at a time: 384 bytes a pixel, 1.6 GB."""
+
 _SEEDS = 8
+_FINE = 16  # samples more from step to step, once there are so many
 
 
 def seeds(level: str, samples: int) -> int:
@@ -27,6 +31,16 @@ def seeds(level: str, samples: int) -> int:
     would be that of the pixels' centers, as that of geometry is.
     """
     return 1 if level == LEVELS[0] else max(min(_SEEDS, samples // 2), 1)
+
+
+def refinement(samples: int, pixels: int) -> tuple[int, ...]:
+    """The numbers of samples after which a picture is shown that refines before somebody's eyes, the last of them all samples.
+
+    Each twice the one before, then 16 more each. None for more pixels than MOST_REFINED.
+    """
+    coarse = (1 << power for power in range(_FINE.bit_length() - 1))
+    steps = (*(step for step in coarse if step < samples), *range(_FINE, samples, _FINE), samples)
+    return steps if pixels <= MOST_REFINED else ()
 
 
 def _filter(_: str, name: object) -> object:

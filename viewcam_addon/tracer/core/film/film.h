@@ -83,11 +83,11 @@ class Pixel {
         return rgb(max(sums, double4{}) / double(batch_size) / double(count_) * (film.exposure * film.exposure));
     }
 
-    // random: whether another seed would give another picture; if so, the variance of a single sample is infinite.
+    // random: whether another seed would give another picture; if so, the variance of a single batch is infinite.
     void write(const ViewcamLightPasses& passes, size_t pixel, const FilmSettings& film, uint32_t batch_size, bool random) const {
         Vec3 unknown;
         if (random) unknown.x = unknown.y = unknown.z = std::numeric_limits<double>::infinity();
-        write(passes, pixel, film, count_ > 1 ? variance(film, batch_size) : unknown);
+        write(passes, pixel, film, count_ >= 2 * batch_size ? variance(film, batch_size) : unknown);
     }
     void write(const ViewcamLightPasses& passes, size_t pixel, const FilmSettings& film, Vec3 variance) const {
         Vec3 color = rgb(totals_[COLOR]) / count_;

@@ -1,6 +1,8 @@
 // The samples of a tile's pixels: the same number for each, or as many as a wanted error takes.
 //
 // A tile is 32 × 32 pixels, counted from the picture's lower left corner; each is computed alone, so that threads change no bit.
+// A picture that refines before somebody's eyes takes a few samples of every tile, then a few more. What a pixel has by then is
+// kept, 384 bytes, and its samples are added in the same order, so that this changes no bit either.
 //
 // As many as an error takes: all pixels get the first few samples, then those whose mean is not yet known well enough get twice
 // as many with every round. Nothing is shared but the decision: a pixel's mean is that of its own samples, all of equal weight.
@@ -20,6 +22,8 @@
 //
 // Rejected: means over neighbours (a denoiser is no reference), and weighing rounds by their variance, which is bias.
 #pragma once
+#include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "path.h"
@@ -35,21 +39,28 @@ class TileSampler {
     // coincident: as of PathIntegrator.
     TileSampler(const Scene& scene, const Bounces& bounces, uint32_t seed, uint32_t samples, double error, double coincident)
         : integrator_(scene, bounces, seed, int(samples), coincident), filter_(scene.illumination.filter, scene.illumination.filter_width), film_(scene.illumination.film),
-          samples_(samples), error_(error), camera_(scene.camera) {}
+          samples_(samples), error_(error), camera_(scene.camera), under_way_(size_t(tiles(camera_.height)) * tiles(camera_.width)) {}
 
     const Camera& camera() const { return camera_; }
     const PathIntegrator& integrator() const { return integrator_; }
-    // Traces the tile whose lowest row and first column are given. `*stop`, if there is one, ends it early.
-    void trace(uint32_t row, uint32_t column, const ViewcamLightPasses& passes, const volatile int* stop) const {
-        Tile tile{row, column, std::min(TILE, camera_.height - row), std::min(TILE, camera_.width - column), {}};
+    uint32_t samples() const { return samples_; }
+    // Traces the tile whose lowest row and first column are given, until its pixels have so many samples: all of them, or fewer,
+    // to which a later call adds. `*stop`, if there is one, ends it early, and then the tile can't be gone on with.
+    void trace(uint32_t row, uint32_t column, uint32_t samples, const ViewcamLightPasses& passes, const volatile int* stop) {
+        std::vector<Pixel>& kept = under_way_[size_t(row / TILE) * tiles(camera_.width) + column / TILE];
+        Tile tile{row, column, std::min(TILE, camera_.height - row), std::min(TILE, camera_.width - column), std::exchange(kept, {})};
         tile.pixels.resize(TILE * TILE);
+        uint32_t taken = tile.pixels[0].count();
+        if (samples <= taken) throw std::invalid_argument("a tile has that many samples already");
         if (error_ > 0 && samples_ > 1) {
+            if (samples != samples_) throw std::invalid_argument("samples that an error asks for are taken all at once");
             trace_until_known(tile, passes, stop);
         } else {
             uint32_t batch = Pixel::batch_size(samples_);
-            sample(tile, all(tile), 0, samples_, batch, stop);
+            sample(tile, all(tile), taken, samples, batch, stop);
             if (stop && *stop) return;
             for (uint32_t place : all(tile)) tile.pixels[place].write(passes, pixel(tile, place), film_, batch, integrator_.is_random());
+            if (samples < samples_) kept = std::move(tile.pixels);
         }
     }
 
@@ -75,6 +86,7 @@ class TileSampler {
         double sample = 0, own = 0, apart = 0;
     };
 
+    static uint32_t tiles(uint32_t pixels) { return (pixels + TILE - 1) / TILE; }
     uint32_t pixel(const Tile& tile, uint32_t place) const {
         return (tile.row + place / TILE) * camera_.width + tile.column + place % TILE;
     }
@@ -196,6 +208,7 @@ class TileSampler {
     uint32_t samples_;
     double error_;
     Camera camera_;
+    std::vector<std::vector<Pixel>> under_way_;  // of each tile, while it has some of its samples
 };
 
 }  // namespace viewcam::VIEWCAM_ISA
