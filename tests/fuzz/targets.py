@@ -285,7 +285,7 @@ def sidecar() -> Feed:
     import painting
 
     from viewcam_addon.cameras.sidecar import record
-    from viewcam_addon.errors import InputError, told
+    from viewcam_addon.errors import InputError, message_of
     from viewcam_addon.jobs import dataset, one, run
     from viewcam_addon.jobs.folder import Folder, Outputs
     from viewcam_addon.jobs.job import Job
@@ -322,7 +322,7 @@ def sidecar() -> Feed:
         try:
             dataset.write(batch(changed), wanted, settings, "png")
         except InputError as error:
-            judge(told(error))
+            judge(message_of(error))
 
     return feed
 
