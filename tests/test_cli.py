@@ -116,9 +116,9 @@ def test_what_is_not_modelled_is_named_with_its_share_and_fails_under_strict(tmp
             "share": seen,
             "shown": seen,
         }
-        assert f"but for 1 object that is not modelled (Ball; {100 * seen:.2g} % of the picture)" in capfd.readouterr().out
+        assert f"but for 1 object that is not modeled (Ball; {100 * seen:.2g} % of the picture)" in capfd.readouterr().out
         page = (tmp_path / "report" / "index.html").read_text(encoding="utf-8")
-        assert 'class="same_but"' in page and "but for 1 object that is not modelled" in page
+        assert 'class="same_but"' in page and "but for 1 object that is not modeled" in page
         assert ("<failure" in (tmp_path / "a.xml").read_text()) == bool(strict)
 
 
@@ -141,7 +141,7 @@ def test_the_size_and_the_stated_camera_can_be_chosen(tmp_path, capfd):
     assert "stated_camera" in fails(capfd, "render", write_scene(tmp_path), tmp_path / "c.exr", "--stated")
 
 
-def test_the_origin_of_a_recentred_scene_is_told(tmp_path, capfd):
+def test_the_origin_of_a_recentered_scene_is_told(tmp_path, capfd):
     scene, picture = write_scene(tmp_path, origin=[4200952.125, 0, -2]), tmp_path / "out.exr"
     assert main(["render", str(scene), str(picture)]) == 0
     report, result = tmp_path / "report", tmp_path / "result.json"

@@ -221,7 +221,7 @@ def test_projecting_a_point_of_a_ray_gives_back_its_pixel(eye, look_at, up, d_x,
     assert depth > 0
 
 
-def test_the_centre_ray_runs_along_the_view_and_columns_and_rows_run_right_and_up():
+def test_the_center_ray_runs_along_the_view_and_columns_and_rows_run_right_and_up():
     camera = Pinhole((3, 0, 0), (0, 0, 0), (0, 0, 1), 100, 4, 2)
     u, v, w = camera.basis()
     assert np.array_equal(camera.ray_directions(2, 1, 0, 0), -w)

@@ -81,8 +81,8 @@ class CameraValues:
             if the values make no camera: eye = look-at, up = 0, distance ≤ 0, zoom ≤ 0, a number that is not finite.
         """
         distance = self.distances(frame, sensor_fit)
-        size, centre = (plane.width, plane.height), plane.principal_point
-        return Pinhole(self.eye, self.look_at, self.up, distance, *size, centre, mirrored)
+        size, center = (plane.width, plane.height), plane.principal_point
+        return Pinhole(self.eye, self.look_at, self.up, distance, *size, center, mirrored)
 
     def distances(self, frame: Frame, sensor_fit: str) -> tuple[float, float]:
         """(d_x, d_y) in pixels of the picture of `frame`, its percentage included."""

@@ -260,14 +260,14 @@ def solve_points(points: Array, pixels: Array, half: float, is_flat: bool, known
 
     is_flat : whether the points lie in a plane, where four are enough. known_distance : see above.
     """
-    centre = points.mean(axis=-2, keepdims=True)
-    scale = np.sqrt(((points - centre) ** 2).sum(axis=-1).mean(axis=-1))[..., None, None]
-    local, scaled = (points - centre) / scale, pixels / half
+    center = points.mean(axis=-2, keepdims=True)
+    scale = np.sqrt(((points - center) ** 2).sum(axis=-1).mean(axis=-1))[..., None, None]
+    local, scaled = (points - center) / scale, pixels / half
     rotation, shift, distance = (_pose_of_a_plane if is_flat else _pose_in_space)(local, scaled)
     if known_distance is not None:  # and farther away by as much as the lens is longer
         shift[..., 2] *= known_distance / half / distance
         distance = np.full_like(distance, known_distance / half)
-    eye = centre[..., 0, :] - scale[..., 0] * np.einsum("...ij,...i->...j", rotation, shift)
+    eye = center[..., 0, :] - scale[..., 0] * np.einsum("...ij,...i->...j", rotation, shift)
 
     start = distance * half if known_distance is None else np.full_like(distance, known_distance)
 

@@ -74,8 +74,8 @@ class ViewPlane:
         pair = self.distance if np.iterable(self.distance) else (self.distance,) * 2
         checked["distance"] = checks.vector("distance", pair, 2)
         check_distance(min(checked["distance"]))
-        centre = (checked["width"] / 2, checked["height"] / 2)
-        point = centre if self.principal_point is None else self.principal_point
+        center = (checked["width"] / 2, checked["height"] / 2)
+        point = center if self.principal_point is None else self.principal_point
         checked["principal_point"] = checks.vector("principal_point", point, 2)
         for name, value in checked.items():
             object.__setattr__(self, name, value)

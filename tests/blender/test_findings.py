@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from viewcam_addon.blender.findings import CENTRE, DISTANCE, EYE, POSE, VIEW, Cause, differences, explain
+from viewcam_addon.blender.findings import CENTER, DISTANCE, EYE, POSE, VIEW, Cause, differences, explain
 from viewcam_addon.pinhole import Pinhole
 
 WANTED = Pinhole((7.0, -6.0, 5.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 1500.0, 1920, 1080)
@@ -21,7 +21,7 @@ def test_a_camera_does_not_differ_from_itself():
         (VIEW, replace(WANTED, mirrored=True)),
         (DISTANCE, replace(WANTED, distance=1500.001)),
         (DISTANCE, replace(WANTED, distance=(1500.0, 1500.001))),
-        (CENTRE, replace(WANTED, principal_point=(960.001, 540.0))),
+        (CENTER, replace(WANTED, principal_point=(960.001, 540.0))),
     ],
 )
 def test_what_is_off_by_more_than_float32_is_named_and_nothing_else(quantity, read_back):
@@ -58,7 +58,7 @@ def test_only_a_suspect_that_acts_on_a_difference_is_blamed():
 
 
 def test_a_difference_that_nobody_explains_is_told_with_what_to_do():
-    (eye, lens, shift) = sentences({EYE: "the eye is 1 away", DISTANCE: "d is 5", CENTRE: "off"}, [])
+    (eye, lens, shift) = sentences({EYE: "the eye is 1 away", DISTANCE: "d is 5", CENTER: "off"}, [])
     assert "moved since, the eye is 1 away" in eye
     assert "lens" in lens
     assert "shift" in shift

@@ -19,7 +19,7 @@ from .conftest import CAMERAS, allowed, picture_error, points_before
 pytestmark = pytest.mark.usefixtures("only_numbers")
 
 SQUARE = [name for name, each in CAMERAS.items() if each.distance[0] == each.distance[1] and not each.mirrored]
-CENTRED = [name for name in SQUARE if CAMERAS[name].principal_point == (CAMERAS[name].width / 2, CAMERAS[name].height / 2)]
+CENTERD = [name for name in SQUARE if CAMERAS[name].principal_point == (CAMERAS[name].width / 2, CAMERAS[name].height / 2)]
 
 
 def called(text):
@@ -64,7 +64,7 @@ def test_a_principal_point_upside_down_would_be_seen():
     assert picture_error(pinhole, *seen_by_vtk(broken, points), points) > 1
 
 
-@pytest.mark.parametrize("name", CENTRED)
+@pytest.mark.parametrize("name", CENTERD)
 def test_a_textbooks_ray_tracer_shoots_the_pinholes_rays(name):
     """direction = x u + y v − d w of the middle of pixels of the size 1."""
     pinhole = CAMERAS[name]
@@ -84,7 +84,7 @@ def test_a_textbooks_ray_tracer_shoots_the_pinholes_rays(name):
 @pytest.mark.parametrize("name", [*CAMERAS])
 def test_read_back_it_is_the_same_camera_or_it_was_refused(form, name):
     pinhole = CAMERAS[name]
-    if name not in (SQUARE if form == "vtk" else CENTRED):
+    if name not in (SQUARE if form == "vtk" else CENTERD):
         with pytest.raises(InputError, match=r"mirrored|shifted|square"):
             cameras.write([Camera(name, pinhole)], form)
         return
@@ -113,9 +113,9 @@ def same(have, pinhole, exact):
 )
 def test_any_camera_comes_back(eye, view, size, d, shift):
     look_at = tuple(a + b for a, b in zip(eye, view, strict=True))
-    centred = Pinhole(eye, look_at, (0, 0, 1), d, *size)
-    (read,) = cameras.read(cameras.write([Camera("a", centred)], "textbook"))
-    same(read.pinhole, centred, exact=True)
+    centered = Pinhole(eye, look_at, (0, 0, 1), d, *size)
+    (read,) = cameras.read(cameras.write([Camera("a", centered)], "textbook"))
+    same(read.pinhole, centered, exact=True)
     shifted = Pinhole(eye, look_at, (0, 0, 1), d, *size, tuple(a * b for a, b in zip(shift, size, strict=True)))
     (read,) = cameras.read(cameras.write([Camera("a", shifted)], "vtk"))
     same(read.pinhole, shifted, exact=False)

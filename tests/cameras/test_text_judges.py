@@ -696,14 +696,14 @@ def test_glm_sees_through_the_frustum_that_we_write_as_we_do(name):
     judged(pinhole, *glm_places(glm, view, glm.frustum(*frustum), size, points), points, FLOAT32)
 
 
-def test_vtks_window_centre_and_horizontal_angle_are_its_formulas():
+def test_vtks_window_center_and_horizontal_angle_are_its_formulas():
     """vtkCamera::ComputeProjectionTransform: xmin = (center − 1) · w, of a w that the angle gives."""
     text = CODE["vtk"] + "\ncamera.SetWindowCenter(0.1, -0.2)\n"
-    centred = cameras.read(text, options=GL)[0].pinhole
+    centered = cameras.read(text, options=GL)[0].pinhole
     half = math.tan(math.radians(20)) * 16 / 9
     left, right = (0.1 - 1) * half, (0.1 + 1) * half
-    assert centred.principal_point[0] == pytest.approx(-left / (right - left) * 640)
-    assert centred.principal_point[1] == pytest.approx((1 + 0.2) / 2 * 360)
+    assert centered.principal_point[0] == pytest.approx(-left / (right - left) * 640)
+    assert centered.principal_point[1] == pytest.approx((1 + 0.2) / 2 * 360)
     across = cameras.read(text + "camera.SetUseHorizontalViewAngle(1)", options=GL)[0].pinhole
     assert across.distance[0] == pytest.approx(320 / math.tan(math.radians(20)))
 

@@ -208,7 +208,7 @@ def test_a_pixels_own_noise_is_not_in_its_weight():
     result = [run(sides_of(grey, rng, 256, 32, 8), 256, 8)[3].errors[0, 0, 0] for _ in range(100)]
     assert abs(np.mean(result)) < 0.4 and 0.5 < np.std(result) < 1.2  # of 100 draws the mean is off by 0.1, times four
     sides = sides_of(grey, rng, 256, 32, 8)
-    assert run(replace(sides, shared=sides.variance), 256, 8)[3].is_open, "neighbours that share noise have no such weights"
+    assert run(replace(sides, shared=sides.variance), 256, 8)[3].is_open, "neighbors that share noise have no such weights"
 
 
 def test_a_pixel_without_noise_may_differ_by_rounding_and_by_no_more():

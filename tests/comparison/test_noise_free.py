@@ -21,10 +21,10 @@ def light(scene, px=0.5, py=0.5, albedo=1.0):
     height, width = scene.pinhole.height, scene.pinhole.width
     position, normal, index = (passes[name].astype(np.float64) for name in ("Position", "Normal", "Object Index"))
     cosine = np.maximum(normal @ SUN, 0.0)
-    for *centre, radius in scene.spheres:
-        to_centre = np.array(centre) + scene.offset - position
-        along = to_centre @ SUN
-        cosine[(along > 1e-6) & ((to_centre**2).sum(axis=-1) - along**2 < radius**2 * (1 - 1e-9))] = 0.0
+    for *center, radius in scene.spheres:
+        to_center = np.array(center) + scene.offset - position
+        along = to_center @ SUN
+        cosine[(along > 1e-6) & ((to_center**2).sum(axis=-1) - along**2 < radius**2 * (1 - 1e-9))] = 0.0
     colour = albedo * COLOURS[index[..., 0].astype(int)]
     direct = 3.0 / np.pi * cosine[..., None] * (index > 0)
     combined = np.concatenate([colour * direct, np.ones((height, width, 1))], axis=-1)

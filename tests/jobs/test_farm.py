@@ -107,7 +107,7 @@ def test_the_parts_of_a_manager_are_the_whole_and_a_repeated_part_renders_nothin
 
     for part in (3, 7, 3):
         run(command.replace(placeholder, str(part)))
-    assert done_in(tmp_path / "renders") == {"shot_2", "shot_10", "shot_6", "shot_14"}, "neighbours are in different parts"
+    assert done_in(tmp_path / "renders") == {"shot_2", "shot_10", "shot_6", "shot_14"}, "neighbors are in different parts"
     assert len(stand_in.diary("render")) == 4
 
 

@@ -196,7 +196,7 @@ def test_more_than_a_hundred_problems_are_counted(tmp_path):
 @pytest.mark.parametrize(
     ("header", "sentence"),
     [
-        ("name,camera,colour", ["line 1, column 'colour' is unknown: take it out"]),
+        ("name,camera,color", ["line 1, column 'color' is unknown: take it out"]),
         ("name,camera,Frame", ["line 1, column 'Frame' is unknown: write frame"]),
         ("name,camera,EYE X", ["line 1, column 'EYE X' is unknown: write eye_x"]),
         ("name,camera,,frame", ["line 1, column '' is unknown: take it out"]),
@@ -226,7 +226,7 @@ def test_what_is_wrong_with_the_header_is_told_once_and_not_in_each_row(tmp_path
 
 def test_with_a_wrong_header_the_rows_are_looked_at_all_the_same(tmp_path):
     problems = problems_in(tmp_path, "list.csv", "name,camera,colour,frame\na,Camera,red,1\nb,Camera,red,x\n")
-    assert [problem.split(" is ")[0] for problem in problems] == ["line 1, column 'colour'", "line 3, column frame"]
+    assert [problem.split(" is ")[0] for problem in problems] == ["line 1, column 'color'", "line 3, column frame"]
 
 
 def test_a_row_of_too_few_or_too_many_cells_is_told_and_rows_and_columns_of_nothing_are_not(tmp_path):
@@ -255,7 +255,7 @@ DEEP = "[" * 100_000 + "]" * 100_000
         ('{"shots": [], "shots": []}', ["key shots is there twice"]),
         ('{"shots": [], "defaults": []}', ["defaults is []: give an object"]),
         ('{"shots": [], "defaults": {"name": "a"}}', ["defaults, key name: take it out"]),
-        ('{"shots": [], "defaults": {"colour": 1}}', ["defaults, key 'colour' is unknown"]),
+        ('{"shots": [], "defaults": {"color": 1}}', ["defaults, key 'color' is unknown"]),
         (
             '{"shots": [{"name": "a"}, {"name": "b"}], "defaults": {"camera": "C", "frame": 0.5}}',
             ["defaults, key frame is 0.5: give a whole number"],
@@ -266,7 +266,7 @@ DEEP = "[" * 100_000 + "]" * 100_000
         ),
         ("[1, [2], null]", ["shot 1 is 1: give an object", "shot 2 is [2]: give", "shot 3 is None: give"]),
         ('[{"name": "a", "camera": "D", "camera": "C"}]', ["shot 1 ('a'), key 'camera' is there twice"]),
-        ('[{"name": "a", "camera": "C", "colour": {}}]', ["shot 1 ('a'), key 'colour' is unknown"]),
+        ('[{"name": "a", "camera": "C", "color": {}}]', ["shot 1 ('a'), key 'color' is unknown"]),
         ('[{"name": 7, "camera": "C"}]', ["shot 1, key name is 7: give a text"]),
         ('[{"name": "", "camera": ""}]', ["shot 1 (''), key name is ''", "shot 1 (''), key camera is ''"]),
         ('[{"name": "a", "camera": ["C"]}]', ["shot 1 ('a'), key camera is ['C']: give a text"]),

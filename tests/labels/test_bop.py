@@ -61,7 +61,7 @@ def turn_of(values):
     return turn
 
 
-def test_each_pixels_point_projects_to_the_pixels_centre_from_the_world_and_from_its_model(written):
+def test_each_pixels_point_projects_to_the_pixels_center_from_the_world_and_from_its_model(written):
     worst = 0.0
     for i, labels in enumerate(written.labels):
         camera = written.scene_camera[str(i)]
@@ -80,7 +80,7 @@ def test_each_pixels_point_projects_to_the_pixels_centre_from_the_world_and_from
                 off = np.abs(points[:, 2] - depths)[depths > 0].max(initial=0.0)
                 # Half a step of the PNG, and in millimeters the rounding that PIXELS is of.
                 assert off <= camera["depth_scale"] / 2 + 0.01, f"depth is off by {off:.3g} mm"
-    assert 0 < worst <= PIXELS, f"a point projects {worst:.3g} pixels beside its pixel's centre"
+    assert 0 < worst <= PIXELS, f"a point projects {worst:.3g} pixels beside its pixel's center"
 
 
 def test_our_reader_of_bop_finds_the_cameras_again(written):

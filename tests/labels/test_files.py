@@ -136,7 +136,7 @@ def test_the_command_writes_what_the_function_finds(written, tmp_path, capfd):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--labels", "colour"], "there is no label 'colour'"),
+        (["--labels", "color"], "there is no label 'color'"),
         (["--labels", "flow"], "flow goes to another frame"),
         (["--labels", "depth", "--next", "SCENE"], "--next is for flow"),
         (["--depth-steps", "0"], "'0' is no number above 0"),

@@ -51,7 +51,7 @@ def test_a_ball_before_a_wall_is_what_it_is_on_paper():
     square = x * x + y * y + 1
     # |t (x, y, −1) − (0, 0, −4)| = 1, the nearer of the two.
     under = 16 - 15 * square
-    assert np.abs(under).min() > 1e-3, "no centre is on the outline, where rounding would decide"
+    assert np.abs(under).min() > 1e-3, "no center is on the outline, where rounding would decide"
     depth = np.where(under > 0, (4 - np.sqrt(np.maximum(under, 0))) / square, 8.0)
     passes = {name: values.astype(float) for name, values in labels.image.passes.items()}
     np.testing.assert_allclose(passes["Depth"][..., 0], depth, rtol=FLOAT32)
@@ -229,7 +229,7 @@ def test_the_pose_takes_an_object_into_the_camera_that_opencv_has():
 @pytest.mark.parametrize(
     ("kinds", "more", "sentence"),
     [
-        (("colour",), {}, "there is no label 'colour'"),
+        (("color",), {}, "there is no label 'color'"),
         (("flow",), {}, "flow goes to another frame"),
         (("flow",), {"next": room(CAMERA.resized(32, 24))}, "32 × 24 pixels and this one 64 × 48"),
     ],
@@ -464,7 +464,7 @@ def test_a_lattice_is_more_even_than_a_grid_of_as_many():
     assert np.abs(shares - places).max() <= STEP / 2 + 1e-6
 
 
-def test_shares_add_up_and_hold_the_masks_at_the_centres():
+def test_shares_add_up_and_hold_the_masks_at_the_centers():
     labels = vp.label(room(), ("masks", "coverage"))
     shares = [soft(labels, each["name"], each["number"]) for each in labels.instances]
     hit = labels.image["Instance"][..., 0] != 0
@@ -472,7 +472,7 @@ def test_shares_add_up_and_hold_the_masks_at_the_centres():
     assert total.max() <= 1 + 1e-6 and (total[hit] > 0).all()
     ids = labels.image["Instance"][..., 0]
     for each, share in zip(labels.instances, shares, strict=True):
-        assert (share[ids == each["id"]] > 0).all(), "what is at the centre covers some of the pixel"
+        assert (share[ids == each["id"]] > 0).all(), "what is at the center covers some of the pixel"
         assert ((share > 0) & (share < 1)).any()
         assert each["coverage"]["area"] == pytest.approx(share.sum(), rel=1e-6)
         if each["visible"]:
@@ -483,7 +483,7 @@ def test_shares_add_up_and_hold_the_masks_at_the_centres():
     assert (np.diff(ranks, axis=-1) <= 0).all() and ranks[..., -2:].any(), "the largest first, and no layer for nothing"
 
 
-def test_another_place_in_the_pixels_is_the_camera_shifted_and_leaves_the_centres_as_they_were(scene):
+def test_another_place_in_the_pixels_is_the_camera_shifted_and_leaves_the_centers_as_they_were(scene):
     surfaces = Surfaces(scene)
     there = surfaces.instances_at((0.2, 0.9))
     aside = replace(scene, camera=CAMERA.cropped(-0.3, 0.4, CAMERA.width, CAMERA.height))

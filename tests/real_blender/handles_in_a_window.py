@@ -183,7 +183,7 @@ def cancel_each_handle():
     moved = everything()
     yield
     yield from undo()
-    assert everything() != moved and everything() != before, "a cancelled drag has pushed a step of undo"
+    assert everything() != moved and everything() != before, "a canceled drag has pushed a step of undo"
     yield from undo(shift=True)
 
 
@@ -203,7 +203,7 @@ def begin(kind):
 
 
 def drag_the_camera():
-    """Orbit, dolly, dolly zoom and truck: with the mouse, by a number, confirmed, cancelled; each is one step of undo."""
+    """Orbit, dolly, dolly zoom and truck: with the mouse, by a number, confirmed, canceled; each is one step of undo."""
     there = (NOWHERE[0] + 40, NOWHERE[1] + 30)
     for kind in ("ORBIT", "DOLLY", "DOLLY_ZOOM", "TRUCK"):
         state_the_values()

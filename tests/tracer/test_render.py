@@ -86,7 +86,7 @@ def test_rows_count_from_the_bottom_and_columns_from_the_left(make_scene, make_s
     camera = Pinhole((0, -10, 0), (0, 0, 0), (0, 0, 1), 100, 60, 40)
     scene = make_scene(camera, make_spheres([[2, 0, 0]], 0.3), make_spheres([[0, 0, 1]], 0.3))
     index = render(scene)["Object Index"][..., 0]
-    assert index[20, 50] == 1 and index[30, 30] == 2, "x = 2 is 20 px right of the centre, z = 1 is 10 px above it"
+    assert index[20, 50] == 1 and index[30, 30] == 2, "x = 2 is 20 px right of the center, z = 1 is 10 px above it"
     mirrored = render(replace(scene, camera=replace(camera, mirrored=True)))["Object Index"][..., 0]
     assert np.array_equal(mirrored, index[:, ::-1])
 
@@ -285,7 +285,7 @@ def test_spheres_that_touch_one_depth_overlap_or_coincide_are_all_found(make_sce
     nested = np.repeat([[0.0, 0.0, -2.0]], 50, axis=0)
     for name, spheres in {
         "equal spheres side by side at one depth, overlapping": make_spheres(lattice, 0.04),
-        "fifty spheres of one centre, each larger by 1e-9": make_spheres(nested, 0.3 * (1 + 1e-9 * np.arange(50))),
+        "fifty spheres of one center, each larger by 1e-9": make_spheres(nested, 0.3 * (1 + 1e-9 * np.arange(50))),
     }.items():
         scene = make_scene(Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 100, 60, 60), spheres)
         number, traced, directions = first_of(scene, *centres(scene))

@@ -283,7 +283,7 @@ def _mistakes() -> list[Mistake]:
     fine = [
         Mistake(
             "half_pixel",
-            "the principal point is half a pixel too small: it counts from the first pixel's centre",
+            "the principal point is half a pixel too small: it counts from the first pixel's center",
             lambda v: replace(v, center=v.center + 0.5),
         ),
         Mistake(

@@ -21,7 +21,7 @@ SUFFIX = ".json"
 FILE = "scene_camera.json"
 
 _FOLDERS = ("rgb", "gray")
-_UNITS = "BOP counts in millimetres: a scale of 0.001 makes them metres"
+_UNITS = "BOP counts in millimeters: a scale of 0.001 makes them meters"
 
 
 def recognises(source: Source) -> bool:

@@ -16,8 +16,8 @@ AXES = {
     "y_down": "Y down in the file, as COLMAP's worlds often have it, Z up here: (x, y, z) there is (x, z, −y) here",
 }
 PIXELS = {
-    "corner": "(0, 0) is the picture's corner and the first pixel's centre is (0.5, 0.5)",
-    "center": "(0, 0) is the centre of the first pixel",
+    "corner": "(0, 0) is the picture's corner and the first pixel's center is (0.5, 0.5)",
+    "center": "(0, 0) is the center of the first pixel",
 }
 POSES = {
     "w2c_opencv": "World to camera, x right, y down, z into the view: OpenCV, COLMAP",

@@ -834,7 +834,7 @@ def _plane(said: _Said, text: str, options: Options) -> tuple:
         )
         if s <= 0 or zoom <= 0:
             raise InputError(f"pixel size and zoom are {s:g} and {zoom:g}: give positive ones")
-        return film.centred(d * zoom / s), film.is_stated, film.notes
+        return film.centered(d * zoom / s), film.is_stated, film.notes
     said_angles = [role for role in ("fov_of_shorter", "fov_y", "fov_x", "view_angle", "fov") if role in values]
     if _plain_number(values, "zoom", 1.0, text) != 1 and not (said.three and said_angles):
         texts.fail(text, values["zoom"][1], "what this zooms differs between programs, write the field of view that it makes")
@@ -886,14 +886,14 @@ def _plane(said: _Said, text: str, options: Options) -> tuple:
     plane = film.plane(radians, axis, name)
     if not film.is_stated and aspect and axis == "x":
         half = math.tan(radians / 2)
-        plane = film.centred(film.height * aspect / 2 / half / film.pixel_aspect)
+        plane = film.centered(film.height * aspect / 2 / half / film.pixel_aspect)
     if size and "aspect_of_lens" in values and aspect and abs(film.aspect / aspect - 1) * film.width > 1:
         d_y = plane.distance[1]
         plane = axes.view_plane(d_y * film.aspect / aspect, d_y, film.width / 2, film.height / 2, size)
     if "window_center" in values:
-        shift = numbers(_known(values, "window_center", text, "write the window's centre in numbers"), 2)
+        shift = numbers(_known(values, "window_center", text, "write the window's center in numbers"), 2)
         if shift is None:
-            texts.fail(text, values["window_center"][1], "write the window's centre in numbers")
+            texts.fail(text, values["window_center"][1], "write the window's center in numbers")
         c_x, c_top = (1 - shift[0]) / 2 * film.width, (1 + shift[1]) / 2 * film.height
         plane = axes.view_plane(*plane.distance, c_x, c_top, (film.width, film.height))
     return plane, film.is_stated, film.notes

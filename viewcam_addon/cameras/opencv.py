@@ -108,7 +108,7 @@ def told_of_half_pixel(options: Options, program: str) -> tuple[str, ...]:
     """The note on it."""
     if options.pixel:
         return ()
-    return (f"{program} counts pixels from the first one's centre: half a pixel was added to the principal point",)
+    return (f"{program} counts pixels from the first one's center: half a pixel was added to the principal point",)
 
 
 def _text(camera: Camera, options: Options) -> str:

@@ -206,7 +206,7 @@ def _plane(values: Values, options: Options, what: str) -> tuple[ViewPlane, bool
         if isinstance(distance, tuple):
             plane = ViewPlane(distance, (film.width / 2, film.height / 2), film.width, film.height)
         else:  # in pixels of a picture of which perhaps only the width is known
-            plane = film.centred(distance * (film.width / width if width else 1.0))
+            plane = film.centered(distance * (film.width / width if width else 1.0))
     else:
         angle, axis = _angle(values, said[0], options)
         plane = film.plane(angle, axis)

@@ -280,8 +280,8 @@ class _Block:
             rays = np.column_stack([right / exact, -up / size[1], direction - right / 2 + up / 2])
             if abs(np.linalg.det(rays)) < 1e-30:
                 raise InputError("right, up and direction of POV-Ray's camera lie in one plane: turn one of them")
-            centred = np.array([[1, 0, (size[0] - exact) / 2], [0, 1, 0], [0, 0, 1]])
-            pinhole, notes = texts.projected(centred @ np.linalg.inv(rays), tuple(eye.tolist()), size, "POV-Ray's camera")
+            centered = np.array([[1, 0, (size[0] - exact) / 2], [0, 1, 0], [0, 0, 1]])
+            pinhole, notes = texts.projected(centered @ np.linalg.inv(rays), tuple(eye.tolist()), size, "POV-Ray's camera")
         camera = Camera("Camera", pinhole, film.is_stated, (*film.notes, *notes))
         return texts.mirroring(camera, "POV-Ray")
 

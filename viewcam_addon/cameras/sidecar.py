@@ -24,7 +24,7 @@ SUFFIX = ".json"
 
 CONVENTION = (
     "K times the first three numbers of worldToCamera times (x, y, z, 1) is depth times (column, row, 1): column vectors; "
-    "camera x right, y down, z into the view; pixels from the upper left corner of the picture, the first one's centre at "
+    "camera x right, y down, z into the view; pixels from the upper left corner of the picture, the first one's center at "
     "(0.5, 0.5). cameraToWorld: camera x right, y up, z away from the view, as Blender's matrix_world"
 )
 

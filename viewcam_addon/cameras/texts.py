@@ -115,9 +115,9 @@ class Film:
             "smaller": min(width, height),
             "larger": max(width, height),
         }[axis]
-        return self.centred(side / 2 / math.tan(angle / 2) / self.pixel_aspect)
+        return self.centered(side / 2 / math.tan(angle / 2) / self.pixel_aspect)
 
-    def centred(self, distance: float) -> ViewPlane:
+    def centered(self, distance: float) -> ViewPlane:
         """The view plane of a distance in pixel widths, its principal point in the middle."""
         if checks.number("the distance", distance) <= 0:
             raise InputError(f"distance is {distance:g} pixels: the view plane must lie before the eye, give d > 0")

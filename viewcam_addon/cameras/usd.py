@@ -57,7 +57,7 @@ def _told(stage: dict[str, Any]) -> tuple[str, ...]:
     unit, notes = stage["metres_per_unit"], []
     if stage["y_up"] or unit != 1:
         turned = "y up was turned to z up" if stage["y_up"] else "its z points up"
-        scaled = f"one unit of it is {unit:g} m" if unit != 1 else "it counts in metres"
+        scaled = f"one unit of it is {unit:g} m" if unit != 1 else "it counts in meters"
         notes.append(f"The world was taken as the stage says it, as Blender's importer does: {turned}, {scaled}")
     if others := stage["left_out"]:
         names = ", ".join(map(checks.quoted, others[:_MOST_NAMED])) + (" …" if len(others) > _MOST_NAMED else "")

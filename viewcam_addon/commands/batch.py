@@ -88,7 +88,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     words = f"ground truth beside each shot: all, or some of {','.join(KINDS)}"
     written.add_argument("--labels", type=types.names, metavar="LABELS", default=(), help=words)
     written.add_argument("--labels-only", action="store_true", help="no pictures: labels alone, and no engine renders")
-    words = "steps of the labels' 16-bit depth in a scene unit (default: 1000, millimetres of metres)"
+    words = "steps of the labels' 16-bit depth in a scene unit (default: 1000, millimeters of meters)"
     written.add_argument("--depth-steps", type=types.above_zero, metavar="N", default=1000.0, help=words)
     written.add_argument("--check", action="store_true", help="compare each shot's geometry with the reference tracer")
     written.add_argument(

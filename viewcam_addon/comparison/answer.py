@@ -135,7 +135,7 @@ def in_the_picture(
 
 
 def but_for(not_modelled: Mapping[str, Any]) -> str:
-    """but for 2 objects that are not modelled and 1 shadow that not all rays see
+    """but for 2 objects that are not modeled and 1 shadow that not all rays see
 
     not_modelled : as of NotModelled.to_json.
     """
@@ -146,7 +146,7 @@ def but_for(not_modelled: Mapping[str, Any]) -> str:
             [name for name in not_modelled["names"] if name not in modelled],
             "object that is not",
             "objects that are not",
-            " modelled",
+            " modeled",
         ),
         (one_place, "object", "objects", " with surfaces in one place"),
         (otherwise, "shadow", "shadows", " that not all rays see"),

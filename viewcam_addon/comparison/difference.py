@@ -116,7 +116,7 @@ def _of_geometry(comparison: GeometryComparison) -> tuple[pictures.Picture, str,
 def _of_light(comparison: RadianceComparison) -> tuple[pictures.Picture, str, dict[str, Any]]:
     values = comparison.maps["Combined: difference"]
     limit = spread(values)
-    words = f"Orange where Cycles is brighter, by {figure(limit)} at the full colour, blue where it is darker"
+    words = f"Orange where Cycles is brighter, by {figure(limit)} at the full color, blue where it is darker"
     scale = {"kind": "signed", "low": -limit, "high": limit, "unit": "of light"}
     return _painted(pictures.signed(values, limit), pictures.signed_scale()), words, scale
 

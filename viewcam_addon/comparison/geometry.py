@@ -88,7 +88,7 @@ def compare(
     # At an edge the ray may meet either surface, so a re-traced one is judged by the steepest slope around.
     steepest = {name: largest_around(slope.reshape(size)).ravel() for name, slope in agreement.slopes.items()}
     # Where an edge has moved, a pixel shows the surface's plane beyond it: as far as edges move, and its slope's worth.
-    beyond = replace(renderer, centre=renderer.centre + renderer.edges)
+    beyond = replace(renderer, center=renderer.center + renderer.edges)
     around = replace(agreement, slopes=steepest, renderer=beyond)
     reach = reach_of(shift.reshape(size)).ravel() + renderer.edges
     mismatches = _mismatches(kinds, seen, reach, around, surfaces_at)
@@ -106,7 +106,7 @@ def compare(
         errors = {"Position": errors["Position"], "Position depth": along_errors} | errors
         if len(chosen):
             off = off_x[chosen], off_y[chosen]
-            systematic = systematic_error(pinhole, chosen, *off, errors["Position"][1], renderer.centre)
+            systematic = systematic_error(pinhole, chosen, *off, errors["Position"][1], renderer.center)
     else:
         del errors["Position"]
     if "Depth" not in measured:

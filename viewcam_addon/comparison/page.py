@@ -179,7 +179,7 @@ def _camera(pinhole: Pinhole, stated: Pinhole | None, origin: Sequence[float]) -
             *([("as typed", stated, _as_typed)] if stated else []),
             ("as read back from Blender" if stated else "", pinhole, "{:.9g}".format),
         ],
-        "centre": ", ".join(f"{c:.9g}" for c in pinhole.principal_point),
+        "center": ", ".join(f"{c:.9g}" for c in pinhole.principal_point),
         "field_of_view": " × ".join(f"{math.degrees(angle):.4g}°" for angle in pinhole.field_of_view()[:2]),
         "angle_to_up": "exactly along up: canonical axes" if pinhole.is_singular else angle,
     }

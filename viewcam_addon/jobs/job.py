@@ -37,7 +37,7 @@ _THREADS = (1, 1024)
 _ASPECTS = (1 / 200, 200.0)
 _LARGEST_FLOAT32, _SMALLEST_FLOAT32 = (2.0 - 2.0**-23) * 2.0**127, 2.0**-126
 
-_STRICT = "exit with 3 if anything is not modelled: of the picture where one is compared, else of the file"
+_STRICT = "exit with 3 if anything is not modeled: of the picture where one is compared, else of the file"
 _SCENE = "the scene that Cycles must show, as viewcam export wrote it (default: what the file holds now)"
 
 FOUR_VALUES = ("eye", "look_at", "up", "d")

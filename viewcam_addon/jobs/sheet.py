@@ -24,7 +24,7 @@ _WORDS = {
     "failed": "failed",
     "left": "left to render",
     "checks_failed": "not what the reference tracer sees",
-    "not_all_modelled": "the same but for objects that are not modelled",
+    "not_all_modelled": "the same but for objects that are not modeled",
 }
 
 

@@ -1,4 +1,4 @@
-"""A comparison beside Blender: the same picture, another one, cancelled, broken; and nothing of it in the file."""
+"""A comparison beside Blender: the same picture, another one, canceled, broken; and nothing of it in the file."""
 
 import contextlib
 import errno
@@ -141,7 +141,7 @@ def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
     assert [share for share, _ in lines] == sorted(share for share, _ in lines) and lines[0][0] == 0
     assert lines[0][1] == "Rendering with Cycles" and lines[-1][1] == "Comparing"
     rows = dict(outcome.rows)
-    assert rows["Median"].endswith(" px") and "Mismatches" in rows and rows["Modelled"] == "1 of 1 objects"
+    assert rows["Median"].endswith(" px") and "Mismatches" in rows and rows["Modeled"] == "1 of 1 objects"
     assert outcome.report.is_file() and all(path.is_file() for path in outcome.pictures.values()) and outcome.colours
     assert "check untitled.blend --camera Camera --level geometry" in outcome.report.read_text()
     exported = json.loads((outcome.folder / "scene.json").read_text())
@@ -192,7 +192,7 @@ def test_light_is_compared_with_as_many_samples_as_said(seen, add_lamp):
     assert outcome.answer == SAME, outcome.verdict
     assert outcome.what == "Camera, frame 1, direct" and "Light, to Tracer's" in dict(outcome.rows)
     assert "Orange where Cycles is brighter" in outcome.colours
-    assert set(outcome.pictures) == {"cycles", "tracer", "difference"}, "all of it is modelled"
+    assert set(outcome.pictures) == {"cycles", "tracer", "difference"}, "all of it is modeled"
     page = outcome.report.read_text(encoding="utf-8")
     assert "--samples 4" in page and "--clay" in page
     assert len(list(outcome.folder.glob("cycles-*.exr"))) == 2
@@ -342,17 +342,17 @@ def test_the_sentence_is_the_childs_own_where_it_has_one(output, status, sentenc
                 ("Median", "0.000052 px"),
                 ("99.9 % within", "0.0028 px"),
                 ("Mismatches", "1,200, 7 explained"),
-                ("Modelled", "1 of 2 objects"),
+                ("Modeled", "1 of 2 objects"),
             ],
         ),
-        ({"passes": [{"name": "Position", "percentiles": {}}], "ledger": []}, [("Modelled", "0 of 0 objects")]),
+        ({"passes": [{"name": "Position", "percentiles": {}}], "ledger": []}, [("Modeled", "0 of 0 objects")]),
         (
             {"quantities": [{"ratio": 1.000123, "ratio_error": 3.1e-4, "noise_free": None}], "ledger": []},
-            [("Light, to Tracer's", "1.00012 ± 0.00031"), ("Modelled", "0 of 0 objects")],
+            [("Light, to Tracer's", "1.00012 ± 0.00031"), ("Modeled", "0 of 0 objects")],
         ),
         (
             {"quantities": [{"noise_free": {"percentiles": {"p50": {"value": 0.0}, "p99.9": {"value": 2e-7}}}}], "ledger": []},
-            [("Median", "0 of the light"), ("99.9 % within", "0.0000002 of the light"), ("Modelled", "0 of 0 objects")],
+            [("Median", "0 of the light"), ("99.9 % within", "0.0000002 of the light"), ("Modeled", "0 of 0 objects")],
         ),
     ],
 )

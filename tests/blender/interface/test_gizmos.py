@@ -92,7 +92,7 @@ def test_cancelling_restores_all_to_the_bit_though_the_camera_was_not_at_its_val
     after = everything(posed_camera)
     assert {key for key in before if after[key] != before[key]} == set()
     gizmos.end_drag()
-    assert steps == [], "a cancelled drag is no step of undo"
+    assert steps == [], "a canceled drag is no step of undo"
 
 
 def test_what_was_stated_in_float64_comes_back_in_float64(posed_camera, scene, steps):

@@ -41,7 +41,7 @@ def stated(posed_camera, scene):
 # --- What each does ---------------------------------------------------------------------------------------------------------
 
 
-def test_looks_at_the_selections_centre(selected_cube, stated):
+def test_looks_at_the_selections_center(selected_cube, stated):
     before = stated()
     assert bpy.ops.viewcam.look_at_selection() == {"FINISHED"}
     after = stated()
@@ -53,9 +53,9 @@ def test_looks_at_the_median_of_the_vertices_if_that_is_asked_for(selected_cube,
     for vertex in selected_cube.data.vertices:
         if vertex.co.x > 0 and not (vertex.co.y > 0 and vertex.co.z > 0):
             vertex.co.x = -1  # seven of eight corners on the left
-    bpy.ops.viewcam.look_at_selection(centre="MEDIAN")
+    bpy.ops.viewcam.look_at_selection(center="MEDIAN")
     assert stated().look_at == pytest.approx((POINT[0] - 0.75, *POINT[1:]))
-    bpy.ops.viewcam.look_at_selection(centre="BOUNDS")
+    bpy.ops.viewcam.look_at_selection(center="BOUNDS")
     assert stated().look_at == POINT
 
 
@@ -524,7 +524,7 @@ def test_modifiers_and_constraints_count(points, empty):
     cube.constraints.new("COPY_LOCATION").target = empty("There", (0, 0, 100))
     positions = points()
     assert len(positions) == 16
-    np.testing.assert_allclose(selection.bounds_centre(positions), (5, 0, 100), atol=200 * 2**-24)
+    np.testing.assert_allclose(selection.bounds_center(positions), (5, 0, 100), atol=200 * 2**-24)
 
 
 def test_the_instances_of_a_collection_count(points, scene):
@@ -552,7 +552,7 @@ def test_metaballs_are_what_is_drawn(points):
     bpy.ops.object.metaball_add(type="BALL", location=(0, 0, 7))
     positions = points()
     assert len(positions) > 20
-    np.testing.assert_allclose(selection.bounds_centre(positions), (0, 0, 7), atol=0.1)
+    np.testing.assert_allclose(selection.bounds_center(positions), (0, 0, 7), atol=0.1)
 
 
 def test_what_has_no_geometry_is_its_origin(points, empty, add_lamp):
@@ -570,7 +570,7 @@ def test_armatures_and_lattices_are_their_boxes(points, kind):
     else:
         bpy.ops.object.add(type="LATTICE", location=(3, 0, 0))
         middle = (3, 0, 0)
-    np.testing.assert_allclose(selection.bounds_centre(points()), middle, atol=0.11)
+    np.testing.assert_allclose(selection.bounds_center(points()), middle, atol=0.11)
 
 
 def test_the_camera_itself_does_not_count(points, posed_camera, empty):
@@ -648,10 +648,10 @@ def test_in_pose_mode_the_selected_bones_count_as_they_are_posed(points):
     np.testing.assert_allclose(points(), [(5, 0, 10), (5, 0, 11)], atol=32 * 2**-24)
 
 
-def test_the_median_is_the_mean_and_the_centre_is_that_of_the_box():
+def test_the_median_is_the_mean_and_the_center_is_that_of_the_box():
     cloud = np.array([[0.0, 0, 0], [0, 0, 0], [3, 6, -9]])
     assert selection.median(cloud) == (1, 2, -3)
-    assert selection.bounds_centre(cloud) == (1.5, 3, -4.5)
+    assert selection.bounds_center(cloud) == (1.5, 3, -4.5)
 
 
 # --- Viewport

@@ -182,7 +182,7 @@ def test_escape_during_playback_ends_the_playback_and_not_the_comparison(monkeyp
                 "not_modelled": {"names": ["Hair"]},
                 "quantities": [{"noise_free": None, "ratio_error": 3e-4}],
             },
-            "The same light, but for noise of 0.03 %, but for 1 object that is not modelled",
+            "The same light, but for noise of 0.03 %, but for 1 object that is not modeled",
         ),
         ({"answer": "different"}, "Cycles renders another picture"),
     ],

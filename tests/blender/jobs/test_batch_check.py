@@ -145,7 +145,7 @@ FAULTS = {
     "half a pixel to the right": changed(data, "shift_x", lambda shift: shift + 0.5 / SIZE[0]),
     "half a pixel upwards": changed(data, "shift_y", lambda shift: shift + 0.5 / SIZE[0]),
     "a mirrored picture": changed(itself, "scale", lambda _: (-1, 1, 1)),
-    "an eye a millimetre off": changed(itself, "location", lambda at: (at[0] + 0.001, at[1], at[2])),
+    "an eye a millimeter off": changed(itself, "location", lambda at: (at[0] + 0.001, at[1], at[2])),
 }
 
 

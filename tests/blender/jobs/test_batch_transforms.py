@@ -48,8 +48,8 @@ def stage(fresh_blender, scene, tmp_path):
     scene.view_settings.view_transform = "Standard"
     scene.render.resolution_x, scene.render.resolution_y = 160, 120
     scene.render.image_settings.color_mode = "RGB"
-    for colour, centre in BALLS.items():
-        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=RADIUS, location=centre)
+    for colour, center in BALLS.items():
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=RADIUS, location=center)
         bpy.context.object.data.materials.append(_shining(colour))
     data = bpy.data.cameras.new("Shifted")
     data.lens, data.shift_x, data.shift_y = 36, 0.11, -0.07
@@ -221,7 +221,7 @@ def test_the_balls_are_in_the_pictures_where_both_formats_say(stage, batch, tmp_
 FAULTS = {
     "half a pixel to the right": lambda camera: {"c": (camera.c[0] + 0.5, camera.c[1])},
     "half a pixel downwards": lambda camera: {"c": (camera.c[0], camera.c[1] + 0.5)},
-    "corners for centres": lambda camera: {"c": (camera.c[0] - 0.5, camera.c[1] - 0.5)},
+    "corners for centers": lambda camera: {"c": (camera.c[0] - 0.5, camera.c[1] - 0.5)},
     "1 % more distance": lambda camera: {"f": (camera.f[0] * 1.01, camera.f[1] * 1.01)},
     "x the other way": lambda camera: {"to_camera": camera.to_camera * [[-1], [1], [1]]},
     "y the other way": lambda camera: {"to_camera": camera.to_camera * [[1], [-1], [1]]},

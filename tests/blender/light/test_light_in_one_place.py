@@ -138,7 +138,7 @@ def test_light_past_what_not_all_rays_see_is_taken_out_and_named(lit_past_a_shee
     assert 0.02 < comparison.taken_out.pixels.mean() < 0.7
     assert comparison.not_modelled.names == (name,)
     if light != "shadowless":  # which the ledger tells as approximated already
-        assert "but for 1 shadow that not all rays see" in comparison.sentence and "not modelled" not in comparison.sentence
+        assert "but for 1 shadow that not all rays see" in comparison.sentence and "not modeled" not in comparison.sentence
     brighter = [replace(image, passes={**image.passes, "Combined": 1.03 * image["Combined"]}) for image in tests]
     assert not compared(exported, "direct", brighter).passed
 

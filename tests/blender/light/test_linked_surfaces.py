@@ -177,7 +177,7 @@ def test_an_instance_shines_for_what_its_object_shines(pictures, panel, painted,
     assert (np.array(off(sides.exported, sides.traced, sides.cycles[0])) <= (1e-3, 1e-6, 2e-5)).all()
 
 
-def test_a_recentred_scene_has_no_links_and_they_are_told(stage, panel, link):
+def test_a_recentered_scene_has_no_links_and_they_are_told(stage, panel, link):
     stage(np.random.default_rng(0))
     link(panel(3, 3, 5.0), receiver_collection={"Monkey": "INCLUDE"})
     exported = jobs.export(Job(level="direct", recenter=True))

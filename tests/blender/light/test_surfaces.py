@@ -231,10 +231,10 @@ ODD_TREES = {
     "a volume in a mixture": ("mix", "ShaderNodeVolumePrincipled", None),
     "a shader of EEVEE": ("mix", "ShaderNodeEeveeSpecular", None),
     "a background": ("mix", "ShaderNodeBackground", None),
-    "a colour in place of a shader": ("mix", "ShaderNodeGamma", None),
+    "a color in place of a shader": ("mix", "ShaderNodeGamma", None),
     "a number in place of a shader": ("mix", "ShaderNodeNewGeometry", "Backfacing"),
-    "a shader as a colour": ("colour", "ShaderNodeBsdfDiffuse", None),
-    "a shader as a colour, by EEVEE": ("colour", "ShaderNodeShaderToRGB", None),
+    "a shader as a color": ("colour", "ShaderNodeBsdfDiffuse", None),
+    "a shader as a color, by EEVEE": ("colour", "ShaderNodeShaderToRGB", None),
 }
 
 
@@ -308,7 +308,7 @@ def bumpy(material):
     tree.links.new(bump.outputs[0], tree.nodes["Shader"].inputs["Normal"])
 
 
-STAND_INS = {toon: "not modelled", noisy: "not modelled", bumpy: "'Texture Coordinate' that makes a height"}
+STAND_INS = {toon: "not modeled", noisy: "not modeled", bumpy: "'Texture Coordinate' that makes a height"}
 
 
 @pytest.mark.parametrize("change", STAND_INS, ids=lambda change: change.__name__)
@@ -450,7 +450,7 @@ def beyond(pinhole, scale) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("scale", [(1, 1, 1), (0.6, 1.3, 1)])
-def test_rays_are_refracted_once_by_a_sphere_and_by_an_ellipsoid_about_the_direction_from_its_centre(
+def test_rays_are_refracted_once_by_a_sphere_and_by_an_ellipsoid_about_the_direction_from_its_center(
     scene, drop, camera, render_positions, scale
 ):
     drop.scale = scale

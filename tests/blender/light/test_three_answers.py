@@ -88,7 +88,7 @@ def test_what_is_not_modelled_and_in_the_picture_makes_it_amber(stage, change, l
     assert (check.answer, check.passed) == ("same_but", True), check.sentence
     names = check.figures["not_modelled"]
     assert names["names"] == [name] and 0.01 < names["share"] < 0.9, names
-    assert f"but for 1 object that is not modelled ({name}; " in check.sentence
+    assert f"but for 1 object that is not modeled ({name}; " in check.sentence
 
 
 @pytest.mark.parametrize(

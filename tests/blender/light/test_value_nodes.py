@@ -87,7 +87,7 @@ def graphs(image, straight):
     for word in KINDS["math"].inputs["operation"]:
         result[f"math {word}"] = N("Math", {"Value": U, "Value_001": V, "Value_002": 0.4}, operation=word.upper())
     warm = N("Gamma", {"Color": (0.8, 0.3, 0.1, 1.0), "Gamma": 1.2})
-    result["a constant colour as a number"] = N("Math", {"Value": warm, "Value_001": U}, operation="MULTIPLY")
+    result["a constant color as a number"] = N("Math", {"Value": warm, "Value_001": U}, operation="MULTIPLY")
     result["math clamp"] = N("Math", {"Value": U, "Value_001": V}, operation="ADD", use_clamp=True)
     for word in KINDS["vector_math"].inputs["operation"]:
         operations = {"fract": "FRACTION"}.get(word, word.upper())
@@ -135,8 +135,8 @@ def graphs(image, straight):
     for name in ("Weight", "Tint", "Byte", "Way", "Second", "Nothing"):
         for word in ("Color", "Vector", "Fac", "Alpha"):
             result[f"attribute {name} {word}"] = N("Attribute", output=word, attribute_name=name)
-    result["colour attribute"] = N("VertexColor", output="Color", layer_name="Byte")
-    result["colour attribute alpha"] = N("VertexColor", output="Alpha", layer_name="Tint")
+    result["color attribute"] = N("VertexColor", output="Color", layer_name="Byte")
+    result["color attribute alpha"] = N("VertexColor", output="Alpha", layer_name="Tint")
     for word in ("Position", "Normal", "True Normal", "Incoming", "Backfacing", "Tangent", "Parametric"):
         result[f"geometry {word}"] = N("NewGeometry", output=word)
     for word in ("Pointiness", "Random Per Island"):
@@ -337,7 +337,7 @@ def check(pairs):
     for name, (traced, cycles) in pairs.items():
         assert len(traced) > 20, (name, len(traced))
         apart = np.abs(traced - cycles).max(axis=1) / np.maximum(np.abs(cycles).max(axis=1), 1)
-        scale = BYTES if name.startswith(("attribute Byte", "colour attribute")) else GLOW if name == "blackbody" else 1
+        scale = BYTES if name.startswith(("attribute Byte", "color attribute")) else GLOW if name == "blackbody" else 1
         apart /= scale
         if np.median(apart) > TYPICAL or (apart > MOST).mean() > JUMPS:
             result.append(

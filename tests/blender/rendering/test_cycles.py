@@ -185,10 +185,10 @@ def test_pictures_of_light_share_samples_and_count_seeds(scene, camera_object, t
     assert [each["seed"] for each in settings_of_renders] == [7, 8, 9]
     assert settings_of_renders[0]["max_bounces"] == 9 and settings_of_renders[0]["diffuse_bounces"] == 3
     assert settings_of_renders[0]["pixel_filter_type"] == "BOX" and settings_of_renders[0]["film_exposure"] == 2.0
-    assert settings_of_renders[0]["passes"] == {"use_pass_emit"}, "what is at the centre needs the first sample"
+    assert settings_of_renders[0]["passes"] == {"use_pass_emit"}, "what is at the center needs the first sample"
 
 
-def test_direct_light_has_no_bounces_and_one_sample_is_the_centre(scene, camera_object, tmp_path, settings_of_renders):
+def test_direct_light_has_no_bounces_and_one_sample_is_the_center(scene, camera_object, tmp_path, settings_of_renders):
     jobs.both_sides(Job(level="direct", samples=1), [tmp_path / "picture.exr"])
     (seen,) = settings_of_renders
     assert (seen["samples"], seen["max_bounces"], seen["diffuse_bounces"]) == (1, 0, 0)

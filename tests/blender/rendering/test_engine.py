@@ -286,7 +286,7 @@ def test_what_can_not_be_modelled_is_one_warning(lit, write, monkey, camera_obje
     camera_object.data.dof.use_dof = True
     monkey.is_shadow_catcher = True
     write()
-    output = [line for line in "".join(capfd.readouterr()).splitlines() if "Not modelled" in line]
+    output = [line for line in "".join(capfd.readouterr()).splitlines() if "Not modeled" in line]
     assert len(output) == 1, output
     assert "Depth of field is on" in output[0] or "a shadow catcher" in output[0]
 

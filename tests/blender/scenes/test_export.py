@@ -325,7 +325,7 @@ def test_a_view_layer_that_is_not_rendered_is_not_compared(two_layers, both_side
 
 def test_strict_names_what_can_not_be_modelled(add, mesh_from):
     add(mesh_from("cube"), "Ghost").is_holdout = True
-    with pytest.raises(NotModelledError, match="'Ghost' can't be modelled, a holdout"):
+    with pytest.raises(NotModelledError, match="'Ghost' can't be modeled, a holdout"):
         jobs.export(Job(strict=True))
 
 
@@ -339,7 +339,7 @@ def test_hair_and_volumes_are_skipped_on_both_sides(add, monkey, both_sides):
     sides.check()
     assert (entry(sides.exported, monkey.name).status, entry(sides.exported, monkey.name).reason) == (
         "approximated",
-        "particle hair is not modelled",
+        "particle hair is not modeled",
     )
     assert entry(sides.exported, "Curves").status == entry(sides.exported, "Volume").status == "skipped"
     assert isinstance(next(iter(sides.exported.geometries.values())), Mesh)
@@ -557,9 +557,9 @@ def test_real_models(scene, camera, both_sides, models_folder, name):
     model.data.polygons.foreach_set("use_smooth", [True] * len(model.data.polygons))
     scene.render.resolution_x, scene.render.resolution_y = 640, 480
     corners = np.array([model.matrix_world @ Vector(corner) for corner in model.bound_box])
-    centre, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
+    center, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
     group = camera.virtual_pinhole
-    group.look_at, group.eye, group.distance = centre, centre + size * np.array((0.9, -1.8, 0.9)), 640
+    group.look_at, group.eye, group.distance = center, center + size * np.array((0.9, -1.8, 0.9)), 640
     group.enabled = True
     camera.data.clip_start, camera.data.clip_end = size / 100, size * 100
     both_sides().check()

@@ -132,7 +132,7 @@ def test_a_box_of_fog_is_left_out_on_both_sides(monkey, material, both_sides):
     sides = both_sides()
     sides.check()
     reasons = {entry.object: (entry.status, entry.reason) for entry in sides.exported.ledger}
-    assert reasons[box.name] == ("skipped", "material 'Fog' is a volume without a surface, which is not modelled")
+    assert reasons[box.name] == ("skipped", "material 'Fog' is a volume without a surface, which is not modeled")
     assert [placed.name for placed in sides.exported.objects] == [monkey.name]
     assert fog.node_tree.nodes.get("Transparent BSDF") is None
 
@@ -308,7 +308,7 @@ def test_grease_pencil_is_skipped(monkey, both_sides):
     sides = both_sides()
     sides.check()
     (entry,) = [entry for entry in sides.exported.ledger if entry.object == pencil.name]
-    assert (entry.status, entry.reason) == ("skipped", "Grease Pencil is not modelled")
+    assert (entry.status, entry.reason) == ("skipped", "Grease Pencil is not modeled")
 
 
 def test_what_geometry_nodes_make_without_a_material(monkey, both_sides):

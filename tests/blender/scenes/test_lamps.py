@@ -186,7 +186,7 @@ def test_whatever_nodes_make_the_same_everywhere_colours_a_lamp(add_lamp, export
         ("LightPath", "Ray Depth", "says the Ray Depth of a light"),
         ("ObjectInfo", "Random", "says the Random of a light"),
         ("NewGeometry", "Pointiness", "says the Pointiness of a light"),
-        ("TexSky", "Color", "'Sky Texture' that is not modelled"),
+        ("TexSky", "Color", "'Sky Texture' that is not modeled"),
     ],
 )
 def test_what_a_lamps_nodes_say_that_is_not_modelled_is_named(add_lamp, export, kind, output, words):

@@ -395,7 +395,7 @@ def test_what_makes_an_input_that_does_not_count_is_not_followed(make_material, 
     link(material, "ShaderNodeAmbientOcclusion", 0, socket)
     exactly(material)
     material.node_tree.nodes["Shader"].inputs[weight].default_value = 0.5
-    approximately(material, "'Ambient Occlusion'", "not modelled")
+    approximately(material, "'Ambient Occlusion'", "not modeled")
 
 
 @pytest.mark.parametrize("kind", ["AmbientOcclusion", "TexGabor", "RadialTiling", "TexSky", "Bevel"])
@@ -404,7 +404,7 @@ def test_a_texture_that_is_not_modelled_leaves_the_color_of_the_viewport_and_is_
         pytest.skip(f"Blender {bpy.app.version_string} has no {kind}")
     diffuse.diffuse_color = (*RED, 1.0)
     link(diffuse, f"ShaderNode{kind}", 0, "Color")
-    assert approximately(diffuse, "not modelled") == Material(diffuse=Colour(RED))
+    assert approximately(diffuse, "not modeled") == Material(diffuse=Colour(RED))
 
 
 def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
@@ -412,20 +412,20 @@ def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
     mixed.name = "Blend"
     link(diffuse, "ShaderNodeAmbientOcclusion", 0, 0, "Blend")
     show(diffuse, mixed)
-    (closure,) = approximately(diffuse, "'Ambient Occlusion'", "not modelled").closures
+    (closure,) = approximately(diffuse, "'Ambient Occlusion'", "not modeled").closures
     assert closure.node["color"] == Colour(tuple(value / 2 for value in RED)) and not closure.factors
 
 
 def test_other_shaders_are_lamberts_of_their_colour(make_material):
     toon = make_material("t", "ShaderNodeBsdfToon", Color=colour(RED))
-    assert approximately(toon, "'Shader'", "not modelled") == Material(diffuse=Colour(RED))
+    assert approximately(toon, "'Shader'", "not modeled") == Material(diffuse=Colour(RED))
 
 
 def test_what_has_no_colour_has_the_viewports(make_material):
     unknown = make_material("s", "ShaderNodeBsdfDiffuse")
     link(unknown, "ShaderNodeAmbientOcclusion", 0, "Color").name = "Wires"
     unknown.diffuse_color = colour(GREEN)
-    assert approximately(unknown, "'Wires'", "not modelled") == Material(diffuse=Colour(GREEN))
+    assert approximately(unknown, "'Wires'", "not modeled") == Material(diffuse=Colour(GREEN))
 
 
 def test_constant_nodes_reroutes_muted_nodes_and_groups_are_looked_through(diffuse):

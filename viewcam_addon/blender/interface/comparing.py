@@ -216,7 +216,7 @@ def _step(event: Mapping[str, Any], pictures: int) -> tuple[int, str]:
     if event["name"] == "rendering":
         number = event["number"]
         if number > pictures:
-            return pictures, "Rendering what is not modelled"
+            return pictures, "Rendering what is not modeled"
         return number - 1, "Rendering with Cycles" + (f", {number} of {pictures}" if pictures > 1 else "")
     return (pictures, "Tracing") if event["name"] == "tracing" else (pictures + 1, "Comparing")
 
@@ -300,7 +300,7 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
             rows.append(("Light, to Tracer's", ratio))
     ledger = result["ledger"]
     whole = sum(entry["status"] == "exported" for entry in ledger)
-    return [*rows, ("Modelled", f"{whole} of {len(ledger)} objects")]
+    return [*rows, ("Modeled", f"{whole} of {len(ledger)} objects")]
 
 
 def failure(printed: str, status: int) -> str:

@@ -109,7 +109,7 @@ def _end_if_over() -> float | None:
 
 
 def end_drag() -> None:
-    """End a drag: what was dragged becomes a keyframe, where auto keying asks for one, and a step of undo; what was cancelled
+    """End a drag: what was dragged becomes a keyframe, where auto keying asks for one, and a step of undo; what was canceled
     does not."""
     global _drag
     ended, _drag = _drag, None

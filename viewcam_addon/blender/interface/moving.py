@@ -80,7 +80,7 @@ class VIEWCAM_OT_look_at_selection(_SelectionMove, bpy.types.Operator):
     bl_label = "Look at Selection"
     bl_description = "Bring the selection's center into the middle of the view. The camera turns and stays where it is"
 
-    centre: bpy.props.EnumProperty(
+    center: bpy.props.EnumProperty(
         name="Center",
         description="Which point of the selection the camera looks at",
         items=(
@@ -92,7 +92,7 @@ class VIEWCAM_OT_look_at_selection(_SelectionMove, bpy.types.Operator):
     def moved(self, pinhole: Pinhole, camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
         points = selection.points(bpy.context, camera_object)
         return replace(
-            pinhole, look_at=selection.median(points) if self.centre == "MEDIAN" else selection.bounds_centre(points)
+            pinhole, look_at=selection.median(points) if self.center == "MEDIAN" else selection.bounds_center(points)
         )
 
 
@@ -294,7 +294,7 @@ class VIEWCAM_OT_frame_selection(_SelectionMove, bpy.types.Operator):
     def moved(self, pinhole: Pinhole, camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
         points = selection.points(bpy.context, camera_object)
         if self.center and "look-at" not in targets.names(camera_object):
-            center = selection.bounds_centre(points)
+            center = selection.bounds_center(points)
             pinhole = replace(pinhole, look_at=center) if self.by == "DISTANCE" else moves.trucked_to(pinhole, center)
         frame = moves.framed_by_distance if self.by == "DISTANCE" else moves.framed_by_eye
         return frame(pinhole, points, self.margin / 100)

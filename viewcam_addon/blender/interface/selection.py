@@ -51,7 +51,7 @@ def points(context: bpy.types.Context, camera_object: bpy.types.Object) -> Array
     return everything
 
 
-def bounds_centre(points: Array) -> Triple:
+def bounds_center(points: Array) -> Triple:
     """The middle of the box about the points, along the world's axes. Pure."""
     return tuple((points.min(axis=0) / 2 + points.max(axis=0) / 2).tolist())
 

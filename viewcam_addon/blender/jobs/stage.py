@@ -124,7 +124,7 @@ def staged(
         if not job.recenter:
             yield stage
             return
-        with recentering.recentred(scene, layer, camera_object, ledger, stage.is_lit) as moved:
+        with recentering.recentered(scene, layer, camera_object, ledger, stage.is_lit) as moved:
             layer = moved.scene.view_layers[0]
             yield Stage(
                 moved.scene, layer, moved.camera, True, level, origin=moved.origin, names=moved.names, file_ledger=ledger

@@ -42,7 +42,7 @@ _SAMPLING = {
     "use_camera_cull": False,
     "use_distance_cull": False,
 }
-_PASSES_OF_CENTRES = ("Depth", "Object Index")
+_PASSES_OF_CENTERS = ("Depth", "Object Index")
 
 # Pixels independent of each other, and nothing left out or guessed.
 _LIGHT = {
@@ -146,7 +146,7 @@ def override_settings(
     if light:
         overrides.set(scene.render, "film_transparent", light.film.transparent)
         override_all(overrides, scene.cycles, _LIGHT | _settings_of(light))
-        passes = LIGHT_PASSES + (_PASSES_OF_CENTRES if light.samples == 1 else ())
+        passes = LIGHT_PASSES + (_PASSES_OF_CENTERS if light.samples == 1 else ())
     _override_passes(overrides, view_layer, passes)
     if not everything:
         override_all(overrides, scene.cycles, _LIGHT_OF_SURFACES if light else {})

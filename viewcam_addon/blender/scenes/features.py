@@ -17,10 +17,10 @@ from .ledger import Ledger
 from .shading import Shading
 
 _NO_SURFACE = {
-    "VOLUME": "volumes are not modelled",
-    "CURVES": "hair and curves without a surface are not modelled",
-    "GREASEPENCIL": "Grease Pencil is not modelled",
-    "GPENCIL": "Grease Pencil is not modelled",
+    "VOLUME": "volumes are not modeled",
+    "CURVES": "hair and curves without a surface are not modeled",
+    "GREASEPENCIL": "Grease Pencil is not modeled",
+    "GPENCIL": "Grease Pencil is not modeled",
 }
 # Blender itself draws them into Cycles' picture, and into its Depth pass.
 _DRAWN_OVER_CYCLES = ("GREASEPENCIL", "GPENCIL")
@@ -134,7 +134,7 @@ def note_object(
         ledger.set_for_cycles(real.original, "hide_render", True)
     for material in filter(None, slots):
         if materials.is_volume_alone(material):
-            ledger.note(name, "skipped", f"material {material.name!r} is a volume without a surface, which is not modelled")
+            ledger.note(name, "skipped", f"material {material.name!r} is a volume without a surface, which is not modeled")
             ledger.call_for_cycles(material.original, materials.make_transparent)
             continue
         if not shading:  # the Normal pass; mirrors and glass bend normals on both sides (scattering.specular_normal)
@@ -184,7 +184,7 @@ def note_hair(instance: bpy.types.DepsgraphObjectInstance, ledger: Ledger) -> No
     if instance.show_particles and any(
         system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in evaluated.particle_systems
     ):
-        ledger.note(evaluated.original.name, "skipped", "particle hair is not modelled")
+        ledger.note(evaluated.original.name, "skipped", "particle hair is not modeled")
 
 
 def _holds_gas(real: bpy.types.Object) -> bool:

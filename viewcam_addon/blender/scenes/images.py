@@ -46,7 +46,7 @@ def obstacle(image: bpy.types.Image | None) -> str | None:
         return f"shows {image.name!r}, which has no pixels"
     space = image.colorspace_settings.name
     if space != "sRGB" and space not in _LINEAR:
-        return f"shows {image.name!r}, whose colours are {space}"
+        return f"shows {image.name!r}, whose colors are {space}"
     return None
 
 

@@ -49,7 +49,7 @@ class LampReader(shaders.Tree):
         return total if isinstance(total, Node) else tuple(max(value, 0.0) for value in total)
 
     def _image(self, output: Output) -> Colour:
-        self._reason(output, "is no colour alone")  # its place is the light's to say
+        self._reason(output, "is no color alone")  # its place is the light's to say
         return self.viewport
 
     def _value(self, output: Output) -> Colour | Node | None:

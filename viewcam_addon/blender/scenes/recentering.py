@@ -72,7 +72,7 @@ _FRAME = (
 
 
 @dataclass(frozen=True)
-class Recentred:
+class Recentered:
     """A scene to render in place of the file's.
 
     origin : the file's point that is the origin here: the eye. names : object here → the object in the file that it shows.
@@ -117,9 +117,9 @@ class _View:
 
 
 @contextlib.contextmanager
-def recentred(
+def recentered(
     scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False
-) -> Iterator[Recentred]:
+) -> Iterator[Recentered]:
     """Give what a render of this view layer shows, as a scene whose origin is the eye; it is gone at the end of the block.
 
     ledger : notes what could not come, as `export.survey` does. lit : whether what only other rays than the camera's see comes
@@ -142,15 +142,15 @@ def recentred(
         camera = _camera(overrides, temporary, view)  # before all others: it asks for a depsgraph
         copies_by_source = _place(overrides, temporary, placed)
         visit_still(temporary, temporary.view_layers[0], camera, lambda depsgraph: _verify(depsgraph, copies_by_source, copies))
-        yield Recentred(
+        yield Recentered(
             temporary, camera, view.actual.eye, {each.name: source.name for each, source in copies_by_source.items()}
         )
 
 
 def as_in_file(objects: Iterable[Object], names: Mapping[str, str]) -> tuple[Object, ...]:
-    """The objects of an exported `Recentred` as the file's own export has them: by their names there, instances as one object.
+    """The objects of an exported `Recentered` as the file's own export has them: by their names there, instances as one object.
 
-    Here each place has an object of its own, and so a name of its own, that the exporter keeps apart. names : of `Recentred`.
+    Here each place has an object of its own, and so a name of its own, that the exporter keeps apart. names : of `Recentered`.
     """
     result: dict[tuple, list[Object]] = {}
     for placed in (replace(each, name=names[each.name]) for each in objects):

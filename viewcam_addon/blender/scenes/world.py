@@ -176,7 +176,7 @@ def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, l
     if not isinstance(surface, Output):
         return (0.0, 0.0, 0.0), None, reasons
     if surface.node.type not in ("BACKGROUND", "EMISSION"):
-        return tuple(world.color), None, [*reasons, f"has a node {surface.node.name!r} that is not modelled"]
+        return tuple(world.color), None, [*reasons, f"has a node {surface.node.name!r} that is not modeled"]
     color = _unmixed(surface.input("Color"), camera)
     rgb = shaders.constant_colour_of(color)
     strength = shaders.constant_number_of(_unmixed(surface.input("Strength"), camera))
@@ -191,7 +191,7 @@ def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, l
         reasons.append("has a strength that varies")
     radiance = shaders.possible(tuple(value * strength for value in rgb))
     if radiance is None:
-        return (0.0, 0.0, 0.0), None, [*reasons, f"has the colour {tuple(rgb)} and the strength {strength:g}"]
+        return (0.0, 0.0, 0.0), None, [*reasons, f"has the color {tuple(rgb)} and the strength {strength:g}"]
     if wrapped and reasons:  # a constant world stands in
         mean = images.mean(wrapped.image)
         return tuple(a * b for a, b in zip(radiance, mean, strict=True)), None, reasons

@@ -141,7 +141,7 @@ class Colour:
     vertex: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rgb", radiance("a colour", self.rgb))
+        object.__setattr__(self, "rgb", radiance("a color", self.rgb))
 
     @property
     def is_black(self) -> bool:

@@ -58,7 +58,7 @@ def _linked(name: str, objects: Collection[str] | None) -> frozenset[str] | None
 
 def _emission(name: str, node: Node | None) -> Node | None:
     if node is not None and not node.is_value:
-        raise InputError(f"the {name} is a shader {node.type!r}: give a node that makes a colour")
+        raise InputError(f"the {name} is a shader {node.type!r}: give a node that makes a color")
     return node
 
 

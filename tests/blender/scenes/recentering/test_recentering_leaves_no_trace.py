@@ -54,7 +54,7 @@ def test_the_ledger_is_that_of_the_file(crowd, scene, add, mesh_from, check):
         jobs.export(Job(strict=True, recenter=True))
 
 
-def test_rendering_alone_recentres_too(look, tmp_path, add_map):
+def test_rendering_alone_recenters_too(look, tmp_path, add_map):
     look(UTM)
     add_map(UTM)
     entries = jobs.cycles(Job(recenter=True), tmp_path / "picture.exr")

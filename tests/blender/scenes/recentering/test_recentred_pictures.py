@@ -50,7 +50,7 @@ def depth_of(comparison):
     return next(row for row in comparison.rows if row.name == "Depth").values[0]
 
 
-def test_a_map_that_was_pulled_home_is_within_the_tolerance_and_exact_when_recentred(look, both_sides, check, add_map):
+def test_a_map_that_was_pulled_home_is_within_the_tolerance_and_exact_when_recentered(look, both_sides, check, add_map):
     """Its vertices are far from its origin, and its origin as far from the world's: Cycles adds the two in float32.
 
     Each of its rays meets the rounded surface where it should, and so only Depth tells.
@@ -272,12 +272,12 @@ def test_the_command_as_its_users_type_it(look, scene, tmp_path, capfd, add_map)
     output = capfd.readouterr().out
     assert plain["far_from_origin"]["error"] > 0.5 and plain["far_from_origin"]["sentence"] in output
     assert main([*words, "--recenter"]) == 0
-    recentred = json.loads(result.read_text())
-    assert recentred["far_from_origin"] is None and recentred["origin"] == np.add(ECEF, (6.2, -7.3, 4.123456789)).tolist()
-    assert recentred["passes"][0]["percentiles"]["p99"]["value"] < 1e-3
+    recentered = json.loads(result.read_text())
+    assert recentered["far_from_origin"] is None and recentered["origin"] == np.add(ECEF, (6.2, -7.3, 4.123456789)).tolist()
+    assert recentered["passes"][0]["percentiles"]["p99"]["value"] < 1e-3
     scene_path = tmp_path / "scene.json"
     assert main(["export", str(path), str(scene_path), "--recenter"]) == 0
-    assert list(scene_file.read(scene_path).origin) == recentred["origin"]
+    assert list(scene_file.read(scene_path).origin) == recentered["origin"]
     assert main(["cycles", str(path), str(tmp_path / "picture.exr"), "--recenter"]) == 0
 
 
