@@ -317,6 +317,25 @@ def test_an_import_of_what_is_not_there_is_seen():
     assert missing_names(trees) == ["a/d.py: gone from a/b"]
 
 
+def vague_beginnings(tree: ast.Module) -> list[str]:
+    """The docstrings that begin with a word after which their subject is still unknown."""
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    texts = [ast.get_docstring(node) or "" for node in ast.walk(tree) if isinstance(node, documented)]
+    vague = re.compile(r"(How|Of|That of|The same|Those|What|When|Where|Whether|Which|Who)\b")
+    return [text.splitlines()[0] for text in texts if vague.match(text)]
+
+
+def test_docstrings_begin_with_what_a_thing_is_or_does():
+    vague = {path.relative_to(ROOT): vague_beginnings(parsed(path)) for path in sources()}
+    assert not (vague := {path: texts for path, texts in vague.items() if texts}), vague
+
+
+def test_a_docstring_that_begins_without_its_subject_is_seen():
+    assert vague_beginnings(ast.parse('def a():\n    """Of a picture."""\n\ndef b():\n    """The area of a picture."""')) == [
+        "Of a picture."
+    ]
+
+
 def test_only_blender_knows_blender():
     outside = {
         path: blender_imports(path.read_text(encoding="utf-8")) for path in sources() if NEEDS_BLENDER not in path.parents
