@@ -1,4 +1,4 @@
-"""The guard of speed, which fails where the tracer has become slower: its speed as a share of bare Embree's on the same rays, in one run, on any machine.
+"""The guard of speed: the tracer's as a share of bare Embree's on the same rays, in one run, on any machine.
 
     python -m benchmarks.guard            # exit status 1 if a ratio has fallen by a third
     python -m benchmarks.guard --record   # write what is measured into guard.json, after a change that is meant

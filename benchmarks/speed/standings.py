@@ -88,7 +88,7 @@ class Contested(Chart):
 
 
 def reached(method: Method, points: Sequence[Point], target: float) -> Reached | None:
-    """The time when the error falls to the target: between neighbors log error goes with log time. None where points don't tell.
+    """The time at which the error is the target: between neighbors log error goes with log time. None where points don't tell.
 
     Where the first point is good enough already, its time.
     """
