@@ -191,7 +191,7 @@ def test_what_is_shown_is_in_its_silhouette_even_if_its_box_seems_beside_the_pic
     surfaces = Surfaces(scene)
     monkeypatch.setattr(Silhouettes, "_reaches", lambda self: np.zeros((len(surfaces.instances), 4), np.intp))
     windows = Silhouettes(surfaces).windows()
-    for number, pixels in surfaces.shown_numbers:
+    for number, pixels in surfaces.visible_numbers:
         left, low, covered = windows[number]
         rows, columns = np.divmod(pixels, scene.camera.width)
         assert covered[rows - low, columns - left].all() and min(rows - low) >= 0 and min(columns - left) >= 0

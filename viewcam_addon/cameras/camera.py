@@ -152,17 +152,17 @@ def choose(cameras: list[Camera], name: str | None = None) -> Camera:
         if there are several and none is named, or none is called so; it has their names.
     """
     names = ", ".join(checks.quoted(camera.name) for camera in cameras[:_NAMED]) + (" …" if len(cameras) > _NAMED else "")
-    found = [camera for camera in cameras if name is None or camera.name == name]
-    if len(found) == 1:
-        return found[0]
-    if not found:
+    chosen = [camera for camera in cameras if name is None or camera.name == name]
+    if len(chosen) == 1:
+        return chosen[0]
+    if not chosen:
         for left_out, sentence in (each for camera in cameras[:1] for each in camera.left_out):
             if left_out == name:
                 raise InputError(sentence)
         raise InputError(f"there is no camera {checks.quoted(name)}: name one of {names}")
     if name is None:
-        raise InputError(f"there are {len(found)} cameras and one is wanted: name one of {names}")
-    raise InputError(f"{len(found)} cameras are called {checks.quoted(name)}: rename all but one")
+        raise InputError(f"there are {len(chosen)} cameras and one is wanted: name one of {names}")
+    raise InputError(f"{len(chosen)} cameras are called {checks.quoted(name)}: rename all but one")
 
 
 class NoPinholeError(InputError):

@@ -40,7 +40,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     nodes = document.records("nodes", "node") if "nodes" in document else []
     worlds = _Worlds(nodes)
     moving = _moving(document)
-    left_out, found = LeftOut(InputError), []
+    left_out, result = LeftOut(InputError), []
     for index, node in enumerate(nodes):
         if "camera" not in node:
             continue
@@ -49,11 +49,11 @@ def read(source: Source, options: Options) -> list[Camera]:
             (text for text in (node.get("name"), camera.get("name")) if isinstance(text, str) and text), f"node {index}"
         )
         with left_out.unless_pinhole(name):
-            found.append(_camera(name, camera, worlds.of(index), options))
+            result.append(_camera(name, camera, worlds.of(index), options))
             if moving & {index, *worlds.above(index)}:
-                found[-1] = found[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
-    names = naming.distinct([camera.name for camera in found])
-    return left_out.with_notes([_renamed(camera, name) for camera, name in zip(found, names, strict=True)])
+                result[-1] = result[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
+    names = naming.distinct([camera.name for camera in result])
+    return left_out.with_notes([_renamed(camera, name) for camera, name in zip(result, names, strict=True)])
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
@@ -149,8 +149,8 @@ def _moving(document: Record) -> set[int]:
     moving = {"nodes": {node for target in targets if isinstance(node := _key(target, "node"), int)}, "cameras": set()}
     for target in targets:
         pointer = _key(_key(_key(target, "extensions"), "KHR_animation_pointer"), "pointer")
-        if isinstance(pointer, str) and (found := re.match(r"/(nodes|cameras)/(\d{1,9})/", pointer)):
-            moving[found[1]].add(int(found[2]))
+        if isinstance(pointer, str) and (match := re.match(r"/(nodes|cameras)/(\d{1,9})/", pointer)):
+            moving[match[1]].add(int(match[2]))
     through = ((number, _key(node, "camera")) for number, node in enumerate(_list(document.get("nodes"))))
     return moving["nodes"] | {number for number, camera in through if isinstance(camera, int) and camera in moving["cameras"]}
 
@@ -193,8 +193,8 @@ def _camera(name: str, camera: Record, matrix: np.ndarray, options: Options) -> 
 def _size(camera: Record, what: str, options: Options) -> tuple[tuple[int, int], bool]:
     extras = camera.get("extras")
     if isinstance(extras, dict) and {"width", "height"} <= extras.keys():
-        said = Record(extras, what)
-        return (said.size("width"), said.size("height")), True
+        stated_size = Record(extras, what)
+        return (stated_size.size("width"), stated_size.size("height")), True
     return options.size_or_refuse(what), False
 
 

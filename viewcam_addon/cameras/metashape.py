@@ -36,7 +36,7 @@ def recognises(source: Source) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    left_out, found, lost = LeftOut(), [], 0
+    left_out, result, lost = LeftOut(), [], 0
     for chunk in source.xml.iter("chunk"):
         whole = _placed(chunk.find("transform"), "the chunk")
         components = {  # in the world, as the chunk's own transform repeats of the active one
@@ -75,12 +75,12 @@ def read(source: Source, options: Options) -> list[Camera]:
                     notes = (*notes, f"{what} is of a rig: it was placed on its master {checks.quoted(master.get('label'))}")
                 pinhole, more = axes.pinhole(_without_scale(axes.of_opencv(matrix)), plane, what)
                 image = label if naming.has_suffix(label) else None
-                found.append(Camera(naming.stem(label), pinhole, True, (*notes, *more), image, lens=lens))
-    found = left_out.with_notes(found)
-    if lost and not found:
+                result.append(Camera(naming.stem(label), pinhole, True, (*notes, *more), image, lens=lens))
+    result = left_out.with_notes(result)
+    if lost and not result:
         raise InputError(f"none of the {lost} cameras of {source.name} is aligned: align them in Metashape first")
-    told = (f"{lost} cameras that are not aligned were left out",) if lost else ()
-    return [camera.noted(*told) for camera in found]
+    lost_note = (f"{lost} cameras that are not aligned were left out",) if lost else ()
+    return [camera.noted(*lost_note) for camera in result]
 
 
 def _transform(camera: ElementTree.Element) -> str | None:
@@ -130,8 +130,8 @@ def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, di
     what = f"sensor {checks.quoted(sensor.get('label') or sensor.get('id'))}"
     if sensor.get("type", "frame") not in ("frame", "fisheye"):
         not_a_pinhole(what, f"of the type {checks.quoted(sensor.get('type'))}")
-    found = [each for each in sensor.findall("calibration") if each.find("f") is not None]
-    adjusted = [each for each in found if each.get("class") == "adjusted"] or found
+    calibrations = [each for each in sensor.findall("calibration") if each.find("f") is not None]
+    adjusted = [each for each in calibrations if each.get("class") == "adjusted"] or calibrations
     if not adjusted and sensor.find("calibration/fx") is not None:
         raise InputError(f"{what} is from before Metashape 1.2, whose numbers mean something else: export it with a newer one")
     if not adjusted:

@@ -114,13 +114,13 @@ class _Model:
 
     def _pose(self, values: dict[str, str], what: str) -> np.ndarray:
         """(4, 4) of pos and the one orientation."""
-        given = [key for key in _ORIENTATIONS if key in values]
-        if len(given) > 1:
-            raise InputError(f"{what} has {' and '.join(given)}: MuJoCo takes one orientation")
+        stated = [key for key in _ORIENTATIONS if key in values]
+        if len(stated) > 1:
+            raise InputError(f"{what} has {' and '.join(stated)}: MuJoCo takes one orientation")
         result = np.eye(4)
         result[:3, 3] = _numbers(values, "pos", 3, what) if "pos" in values else (0, 0, 0)
-        if given:
-            result[:3, :3] = self._turn(given[0], np.array(_numbers(values, given[0], _ORIENTATIONS[given[0]], what)), what)
+        if stated:
+            result[:3, :3] = self._turn(stated[0], np.array(_numbers(values, stated[0], _ORIENTATIONS[stated[0]], what)), what)
         return result
 
     def _turn(self, kind: str, numbers: np.ndarray, what: str) -> np.ndarray:

@@ -46,8 +46,8 @@ def read(source: Source, options: Options) -> list[Camera]:
         inner = document.record("distortion_coefficients")
         numbers = inner.get("data") if "data" in inner else []
         numbers = Record({"data": numbers}, what).numbers("data", len(numbers))
-        lens, told = opencv.settled(numbers[:4] if is_fisheye else numbers, is_fisheye, plane, what, options)
-        notes += told
+        lens, note = opencv.settled(numbers[:4] if is_fisheye else numbers, is_fisheye, plane, what, options)
+        notes += note
     else:
         lens = None
         opencv.refuse_unknown_distortion(document.values, what)

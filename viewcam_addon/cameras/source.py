@@ -288,10 +288,10 @@ def flat(name: str, value: object) -> tuple[float, ...]:
         value = re.split(r"[\s,;]+", value.strip())
     if not isinstance(value, list | tuple):
         raise InputError(f"{name} is {checks.quoted(value)}: give a list of numbers")
-    found: list[float] = []
+    result: list[float] = []
     for item in value:
-        found += flat(name, item) if isinstance(item, list) else [number(name, item)]
-    return tuple(found)
+        result += flat(name, item) if isinstance(item, list) else [number(name, item)]
+    return tuple(result)
 
 
 def numbered_lines(source: Source) -> list[tuple[int, str]]:
@@ -351,8 +351,8 @@ def _size_in(head: bytes) -> tuple[int, int] | None:
 
 
 def _without_comments(text: str) -> str:
-    text = _COMMENT.sub(lambda found: found[0] if found[0][0] == '"' or found["end"] == "" else " ", text)
-    return _TRAILING_COMMA.sub(lambda found: found[0] if found[0][0] == '"' else " ", text)
+    text = _COMMENT.sub(lambda match: match[0] if match[0][0] == '"' or match["end"] == "" else " ", text)
+    return _TRAILING_COMMA.sub(lambda match: match[0] if match[0][0] == '"' else " ", text)
 
 
 def _unique(pairs: list[tuple[str, object]]) -> dict:

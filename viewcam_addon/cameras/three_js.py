@@ -32,16 +32,16 @@ def recognises(source: Source) -> bool:
 def _tops(source: Source) -> list[dict]:
     """The object; of a file of the editor the camera of its window and the scene."""
     among = (source.document, source.document.get("camera"), source.document.get("scene"))
-    found = [each.get("object") for each in among if isinstance(each, dict)]
-    return [top for top in found if isinstance(top, dict) and isinstance(top.get("type"), str)]
+    objects = [each.get("object") for each in among if isinstance(each, dict)]
+    return [top for top in objects if isinstance(top, dict) and isinstance(top.get("type"), str)]
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    found = [camera for top in _tops(source) for camera in _cameras(top, np.eye(4), 0)]
-    if not found:
+    result = [camera for top in _tops(source) for camera in _cameras(top, np.eye(4), 0)]
+    if not result:
         raise InputError(f"{source.name} has no PerspectiveCamera: give a file with one")
     left_out, cameras = LeftOut(), []
-    for number, (item, matrix) in enumerate(found):
+    for number, (item, matrix) in enumerate(result):
         name = str(item.get("name") or f"camera {number + 1}")
         with left_out.unless_pinhole(name):
             if item.get("type") != "PerspectiveCamera":
