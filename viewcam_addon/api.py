@@ -117,6 +117,7 @@ def compare(
     everything: Image | File | None = None,
     keeper: tracing.Keeper | None = None,
     may_be_empty: bool = False,
+    false_alarms: float | None = None,
 ) -> "GeometryComparison | RadianceComparison":
     """The comparison of a picture with the tracer's: what differs, by how much, and whether it is explained.
 
@@ -126,7 +127,8 @@ def compare(
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
     enough. everything : Cycles' picture with all that the scene's ledger says is not modeled, of the first test's seed; it
     tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object are
-    different, and no error.
+    different, and no error. false_alarms : of light, how often the same is called different at most; one in a hundred
+    by default.
 
     Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
@@ -140,6 +142,7 @@ def compare(
     from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
     from .comparison.coincident import CoincidentLight
     from .comparison.everything import not_modelled
+    from .comparison.light_verdict import FALSE_ALARMS
     from .comparison.tolerances import ROUNDINGS
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
@@ -156,8 +159,9 @@ def compare(
     framed = scene and replace(scene, camera=camera)
     stated = scene.stated_camera if scene and camera == scene.camera else None
     if radiance.carries_light(of):
+        alarms = false_alarms or FALSE_ALARMS
         if framed is None:
-            return radiance.compare(of, pictures, camera, test_samples)
+            return radiance.compare(of, pictures, camera, test_samples, None, alarms)
         makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(framed, threads))
 
         def coincident() -> CoincidentLight:
@@ -165,7 +169,7 @@ def compare(
             light, pairs, seen_otherwise = makes_tracer().coincident_light(level, SAMPLES_OF_COINCIDENT, 0, ROUNDINGS[-1])
             return CoincidentLight(Image(light), pairs, seen_otherwise)
 
-        lit = replace(radiance.compare(of, pictures, camera, test_samples, coincident), stated=stated)
+        lit = replace(radiance.compare(of, pictures, camera, test_samples, coincident, alarms), stated=stated)
         names = tuple(dict.fromkeys((*framed.not_modelled, *lit.taken_out.names)))
         if not names:
             return lit

@@ -21,6 +21,18 @@ def above_zero(text: str) -> float:
     return number
 
 
+def percentage(text: str) -> str:
+    """A share in percent as it is written shortest: "0.5%"."""
+    number, percent, rest = text.partition("%")
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.nan
+    if not (percent and not rest.strip() and 0 < value <= 100):
+        raise argparse.ArgumentTypeError(f"{text!r} is no share in percent above 0%, up to 100%: write 0.5%")
+    return f"{value:.12g}%"
+
+
 def share(text: str) -> float:
     try:
         number = float(text)

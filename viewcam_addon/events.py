@@ -3,9 +3,10 @@
 An event is a name and fields. Of every command are told `started` (command, words), `message` (text: a line that it would have
 printed), `error` (command, text, and `problems` where there are several), `note` (command, text: how something was taken, or
 what to know) and `finished` (command, exit_status, seconds); a picture that is traced tells `progress` (share), as do labels
-that become a scene of BOP's (work: written), a check each `step` (name: rendering, with number and of, tracing, comparing),
-and a batch tells of its shots (docs/batch.md). All of it goes to copies of standard output and standard error, so it is heard
-while libraries are silent.
+that become a scene of BOP's (work: written), a check each `step` (name: rendering, with number and of, tracing, comparing)
+and, where it searches for a bias, `forecast` (samples: of a pixel in the end, taken: so far, seconds: left), and a batch tells
+of its shots (docs/batch.md). All of it goes to copies of standard output and standard error, so it is heard while libraries are
+silent.
 
 Rejected: Python's logging, whose levels, loggers and handlers are more than a line of JSON needs, and to which the libraries in
 this process write as well.
@@ -160,6 +161,9 @@ def _sentence(event: str, fields: dict[str, Any]) -> str:
         return "\n".join(map(plain, [f"{command}: {lines[0]}", *lines[1:]]))
     if event == "note":
         return plain(f"viewcam {fields['command']}: note: {fields['text']}")
+    if event == "forecast":
+        samples, taken, seconds = fields["samples"], fields["taken"], fields["seconds"]
+        return f"viewcam check: some {samples:,} samples a pixel, about {seconds:.0f} s more ({taken:,} so far)"
     if event == "shot_failed":
         return plain(f"viewcam batch: {fields['shot']}: {fields['error']}")
     if event == "stopping":

@@ -42,6 +42,14 @@ def check(*words):
         (("--cameras", "Nobody*"), "no camera is called 'Nobody*'"),
         (("--resume",), "--resume is for many checks"),
         (("--workers", "2"), "--workers is for many checks"),
+        (("--find", "0.5%"), "--find is of light, and level geometry has none"),
+        (("--find", "0.5%", "--level", "path", "--samples", "64"), "leave --samples and --error out"),
+        (("--find", "0.5%", "--level", "direct", "--error", "0.1"), "leave --samples and --error out"),
+        (("--find", "0.5%", "--engine", "EEVEE"), "--find is of light"),
+        *(
+            (("--level", "path", f"--find={wrong}"), "is no share in percent above 0%, up to 100%: write 0.5%")
+            for wrong in ("0%", "-1%", "0.5", "nan%", "101%", "much", "1%2")
+        ),
     ],
 )
 def test_words_that_contradict_each_other_are_one_sentence(capfd, words, sentence):
@@ -100,6 +108,45 @@ def test_a_picture_that_differs_fails_its_case_and_the_command(tmp_path, monkeyp
     suite = next(ElementTree.parse(junit).getroot().iter("testsuite"))
     assert (suite.get("tests"), suite.get("failures")) == ("2", "2")
     assert all("Not the same picture" in failure.get("message") for failure in suite.iter("failure"))
+
+
+@pytest.mark.slow
+def test_a_search_for_a_bias_ends_with_the_samples_that_it_takes_and_is_kept_as_any_check(tmp_path, capfd):
+    words = ("--frames", "1..1", "--size", "32x18", "--threads", "1", "--level", "path", "--find", "5%")
+    out, result = tmp_path / "out", tmp_path / "a.json"
+    assert check(FLIGHT, *words, "--report", out, "--json", result) == 0
+    assert "samples a pixel, about" in capfd.readouterr().err
+    (sidecar,) = out.glob("frame_*.json")
+    told = json.loads(sidecar.read_text(encoding="utf-8"))["check"]
+    searched = told["figures"]["find"]
+    assert searched["wanted"] == 0.05 and 0 < searched["least"] <= 0.05 and "seconds" not in searched
+    assert told["figures"]["samples"] == {"reference": searched["samples"], "test": searched["samples"]}
+    assert searched["samples"] == 16 * 2 ** (searched["rounds"] - 1) and "in 99 of 100 cases" in told["verdict"]
+    assert check(FLIGHT, *words, "--report", out, "--resume") == 0
+    assert "1 of them kept" in capfd.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_search_for_a_bias_ends_with_the_first_round_of_a_wrong_picture(tmp_path, monkeypatch):
+    from viewcam_addon.blender.jobs import stage
+
+    render, result, seeds = stage.cycles.render, tmp_path / "a.json", []
+
+    def turned(scene, layer, camera_object, path, remedies, threads, light, *rest):
+        seeds.append(light.seed)
+        scene.camera.data.shift_x += 0.1
+        try:
+            render(scene, layer, camera_object, path, remedies, threads, light, *rest)
+        finally:
+            scene.camera.data.shift_x -= 0.1
+
+    monkeypatch.setattr(stage.cycles, "render", turned)
+    words = ("--size", "32x18", "--threads", "1", "--level", "path", "--find", "0.5%", "--seed", str(2**31 - 4))
+    assert check(FLIGHT, *words, "--json", result, "--report", tmp_path / "out") == 1
+    searched = json.loads(result.read_text(encoding="utf-8"))["find"]
+    assert (searched["samples"], searched["rounds"]) == (16, 1) and searched["seconds"] > 0
+    assert len(set(seeds)) == 8
+    assert len(list((tmp_path / "out").glob("cycles-*.exr"))) == 8
 
 
 @pytest.mark.exhaustive

@@ -155,8 +155,10 @@ def test_the_words_of_a_check_are_the_job(monkeypatch):
     asked = []
     monkeypatch.setattr(check, "check_one", lambda each, *_, **__: asked.append(each) or (0, {}))
     wanted = Job(camera="Left eye", frame=-3, engine="CYCLES", **{**OTHERS, "threads": None})
-    assert cli.main(shlex.split(wanted.check_words())) == 0
-    assert asked == [wanted]
+    searching = Job(engine="CYCLES", level="path", find="0.50 %", seed=0, blend=wanted.blend)
+    for each in (wanted, searching):
+        assert cli.main(shlex.split(each.check_words())) == 0
+    assert asked == [wanted, searching] and searching.find == "0.5%"
 
 
 # --- The hash of what a picture was made from: the same for the same, another for whatever differs, on every machine
@@ -223,6 +225,7 @@ def test_hashes_are_equal_if_and_only_if_the_settings_are(first, second):
         {"recenter": True},
         {"strict": True},
         {"scene": "approved.json"},
+        {"find": "1%"},
     ],
     ids=lambda change: next(iter(change)),
 )
@@ -236,9 +239,9 @@ def test_what_does_not_decide_the_picture_changes_nothing(change):
 
 
 def test_every_field_of_a_job_decides_or_does_not():
-    entries = {"eye", "look_at", "up", "d", "camera", "width", "height", "frame", "engine", "samples", "level", "trust", "seed"}
-    entries |= {"error", "device", "clay", "recenter", "strict", "scene", "name", "blend", "threads"}
-    assert entries | {"principal_point", "pixel_aspect", "mirrored"} == {field.name for field in dataclasses.fields(SHOT)}
+    fields = {"eye", "look_at", "up", "d", "camera", "width", "height", "frame", "engine", "samples", "level", "trust", "seed"}
+    fields |= {"error", "find", "device", "clay", "recenter", "strict", "scene", "name", "blend", "threads"}
+    assert fields | {"principal_point", "pixel_aspect", "mirrored"} == {field.name for field in dataclasses.fields(SHOT)}
 
 
 @pytest.mark.parametrize("value", [b"bytes", {1: 2}, {1, 2}, Path("a"), pytest.param(object(), id="object")], ids=repr)

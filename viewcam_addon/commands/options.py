@@ -73,8 +73,8 @@ def add_light(added: argparse.ArgumentParser, samples: argparse._ActionsContaine
         default="geometry",
         help="how much is modeled; auto is the least that shows the scene's light (default: %(default)s)",
     )
-    words = "samples a pixel, for light (default: %(default)s)"
-    (samples or added).add_argument("--samples", type=types.positive, metavar="N", default=SAMPLES, help=words)
+    words = f"samples a pixel, for light (default: {SAMPLES})"
+    (samples or added).add_argument("--samples", type=types.positive, metavar="N", help=words)
     noise = "another noise for another number (default: 0)"
     added.add_argument("--seed", type=types.seed, metavar="N", default=0, help=noise)
 

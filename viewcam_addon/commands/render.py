@@ -8,6 +8,7 @@ from typing import Any
 from .. import argument_types as types
 from ..errors import InputError
 from ..terminal import say
+from ..tracer.scene.film import SAMPLES
 from . import Result
 from . import options as shared
 
@@ -54,7 +55,7 @@ def run(options: argparse.Namespace) -> Result:
     level = result.get("level", options.level)
     progress = Progress(options.events.tell, scene.camera.height)
     started = time.perf_counter()
-    traced = api.render(scene, level, options.samples, options.seed, options.threads, options.error, progress)
+    traced = api.render(scene, level, options.samples or SAMPLES, options.seed, options.threads, options.error, progress)
     seconds = time.perf_counter() - started
     image.write(options.image, traced)
     say(f"traced {scene.camera.width} × {scene.camera.height} pixels in {seconds:.2f} s")

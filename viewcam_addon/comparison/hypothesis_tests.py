@@ -19,6 +19,7 @@ The two colors share noise among them: the mean of their standard errors is beyo
 Where neighbors share their light even that does not hold, and nothing is asked.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
@@ -31,13 +32,16 @@ from .noise_free import Allowance
 from .sides import CHANNEL_NAMES, Sides
 from .tolerances import Array
 
-PIXELS, CONTOURS, WHOLE = 1, -1, 0
-SIZES = (PIXELS, 8, 32, CONTOURS, WHOLE)
+PIXELS, BLOCKS, CONTOURS, WHOLE = 1, 32, -1, 0
+SIZES = (PIXELS, 8, BLOCKS, CONTOURS, WHOLE)
 """Sides of the tiles, in pixels; 0 is one tile over all, and so is −1, of what is along contours."""
 
 _NEARLY_ALL = tolerances.ROUNDINGS[tolerances.PERCENTILES.index(99.0)]
 # Of the default filter width of 1.5 px; twice the shift, for what the table does beside shifting.
 _FILTER_SHIFT, _FILTER_CONTRAST = 2 * 4.9e-4, 0.0021
+# Of a bias that is told to be found: that of 99 cases in 100, a normal distribution's, since it is a tail that is not far out.
+POWER = 0.99
+_POWER_ERRORS = 2.3263
 # Standard errors of what has no noise at all: beyond any limit, and a number still.
 _CERTAIN = 1e6
 _TINY = np.finfo(float).tiny
@@ -69,6 +73,8 @@ class HypothesisTest:
     negative where the test is softer.
     allowed : (rows, columns, channels) what chance allows. limit : that at the worst place.
     worst : the place that is farthest beyond it, or closest to it.
+    findable : (rows, columns, channels) the least share of its light that a tile may be off and be found with the probability
+    POWER; inf of contours, and where nothing would be.
     """
 
     size: int
@@ -76,6 +82,7 @@ class HypothesisTest:
     allowed: Array
     limit: float
     worst: Place
+    findable: Array
 
     @property
     def name(self) -> str:
@@ -98,6 +105,12 @@ class HypothesisTest:
         return not self.failing.any()
 
     @property
+    def typical_findable(self) -> float:
+        """The bias that is found in half of the tiles that show any, in the channel that tells most; inf where none does."""
+        of_tiles = self.findable.min(axis=-1)
+        return float(np.median(of_tiles[np.isfinite(of_tiles)])) if np.isfinite(of_tiles).any() else math.inf
+
+    @property
     def is_everywhere(self) -> bool:
         """True if half of the tiles differ, so that the place of the worst tells nothing."""
         return bool(self.failing.mean() > 0.5)
@@ -109,6 +122,7 @@ class HypothesisTest:
             "count": self.errors.size,
             "failing": int(self.failing.sum()),
             "allowed": self.limit,
+            "findable": self.typical_findable if math.isfinite(self.typical_findable) else None,
             "worst": asdict(self.worst),
             "ok": self.ok,
         }
@@ -136,11 +150,16 @@ def over_pixels(tiles: NDArray, shape: tuple[int, int], size: int) -> NDArray:
     return tiles
 
 
-def _statistics(sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: float) -> Iterator[tuple[int, Array, Array]]:
-    """Tests by size: (size, errors, what is allowed)."""
-    difference = sides.difference
-    errors, both = _pixel_errors(sides, allowed.most[..., None] + _FILTER_CONTRAST * contrast(sides.reference), freedom)
-    yield PIXELS, errors, noise.student_critical(both, noise.sidak(level, errors.size))
+def _statistics(
+    sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: float
+) -> Iterator[tuple[int, Array, Array, Array]]:
+    """Tests by size: (size, errors, what is allowed, what is findable)."""
+    difference, light = sides.difference, np.abs(sides.reference)
+    most = allowed.most[..., None] + _FILTER_CONTRAST * contrast(sides.reference)
+    variance, both = _pixel_variances(sides, freedom)
+    errors = _errors(_beyond(difference, most), variance)
+    critical = noise.student_critical(both, noise.sidak(level, errors.size))
+    yield PIXELS, errors, critical, findable(light, most, variance, critical)
     rounding = np.repeat((_NEARLY_ALL * allowed.value + allowed.floor)[..., None], difference.shape[2], axis=2)
     shift = _FILTER_SHIFT + _NEARLY_ALL * float(allowed.shift.max())
     across = [np.gradient(sides.reference, axis=axis) for axis in (0, 1) if sides.reference.shape[axis] > 1]
@@ -148,24 +167,44 @@ def _statistics(sides: Sides, allowed: Allowance, freedom: tuple[int, int], leve
         if size == CONTOURS:
             most = rounding + _FILTER_CONTRAST * contrast(sides.reference)
             errors = _contour_errors(sides, most, shift, across)
-            yield size, errors, np.full(errors.shape, noise.sign_critical(noise.sidak(level, 2 * errors.size)))
+            critical = np.full(errors.shape, noise.sign_critical(noise.sidak(level, 2 * errors.size)))
+            yield size, errors, critical, np.full(errors.shape, np.inf)
             continue
         total, square, allowance = (noise.tile_sums(values, size) for values in (difference, difference**2, rounding))
         allowance = allowance + shift * sum(np.abs(noise.tile_sums(slope, size)) for slope in across)
         square = np.maximum(square, noise.mean_around(square))
         square = np.maximum(square, noise.tile_sums(np.broadcast_to(sides.shared, difference.shape), size))
         errors = _errors(_beyond(total, allowance), square)
-        yield size, errors, np.full(errors.shape, noise.sign_critical(noise.sidak(level, errors.size)))
+        critical = np.full(errors.shape, noise.sign_critical(noise.sidak(level, errors.size)))
+        own = noise.tile_sums(light**2, size)
+        yield size, errors, critical, findable(noise.tile_sums(light, size), allowance, square, critical, own)
 
 
-def _pixel_errors(sides: Sides, rounding: Array, freedom: tuple[int, int]) -> tuple[Array, Array]:
-    """Each pixel's difference in standard errors, 0 where they are not known, and Welch's degrees of freedom."""
+def findable(light: Array, allowance: Array, variance: Array, critical: Array, own: Array | float = 0.0) -> Array:
+    """The least share b of the light by which a tile may be off and still be found with the probability POWER.
+
+    A test of a difference D beyond the allowance a, with the variance q, finds b·light + D where b·light − a − z √q is more
+    than critical · √(q + b² own), for z errors of bad luck: a bias adds to the squares of a tile's differences, too. That is a
+    quadratic equation, and its larger root is b. Where the squares grow as fast as the sum does, nothing is ever found: inf.
+
+    own : the sum of the squares of the light of a tile's pixels; 0 of a single one, whose variance its samples tell.
+    """
+    leading = light**2 - critical**2 * own
+    known = (leading > 0.0) & np.isfinite(variance)
+    variance = np.where(known, variance, 0.0)
+    unlucky = allowance + _POWER_ERRORS * np.sqrt(variance)
+    root = critical * np.sqrt(np.maximum(own * unlucky**2 + leading * variance, 0.0))
+    return np.divide(light * unlucky + root, leading, out=np.full(light.shape, np.inf), where=known)
+
+
+def _pixel_variances(sides: Sides, freedom: tuple[int, int]) -> tuple[Array, Array]:
+    """The variance of each pixel's difference, inf where it is not known, and Welch's degrees of freedom."""
     variances = [np.maximum(variance, noise.mean_around(variance)) for variance in (sides.variance, sides.spread)]
     total = variances[0] + variances[1]
     known = np.isfinite(total) & (total > 0.0)
     share = np.divide(variances[0], total, out=np.full(total.shape, 0.5), where=known)
     both = 1.0 / (share**2 / freedom[0] + (1.0 - share) ** 2 / freedom[1])
-    return _errors(_beyond(sides.difference, rounding), total), both
+    return total, both
 
 
 def _contour_errors(sides: Sides, rounding: Array, shift: float, across: Sequence[Array]) -> Array:
@@ -201,7 +240,7 @@ def _beyond(values: Array, allowance: Array) -> Array:
     return np.sign(values) * np.maximum(np.abs(values) - allowance, 0.0)
 
 
-def _hypothesis_test(sides: Sides, size: int, errors: Array, allowed: Array) -> HypothesisTest:
+def _hypothesis_test(sides: Sides, size: int, errors: Array, allowed: Array, findable: Array) -> HypothesisTest:
     index = np.unravel_index(np.argmax(np.abs(errors) / allowed), errors.shape)
     row, column, channel = (int(i) for i in index)
     (bottom, top), (left, right) = (
@@ -211,7 +250,12 @@ def _hypothesis_test(sides: Sides, size: int, errors: Array, allowed: Array) -> 
     means = (float(side[there].mean()) for side in (sides.reference, sides.test))
     name = CHANNEL_NAMES[channel] if errors.shape[2] == len(CHANNEL_NAMES) else ""
     return HypothesisTest(
-        size, errors, allowed, float(allowed[index]), Place((left, right), (bottom, top), name, *means, float(errors[index]))
+        size,
+        errors,
+        allowed,
+        float(allowed[index]),
+        Place((left, right), (bottom, top), name, *means, float(errors[index])),
+        findable,
     )
 
 

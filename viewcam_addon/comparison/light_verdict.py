@@ -80,6 +80,33 @@ class LightRow:
         }
 
 
+@dataclass(frozen=True)
+class Search:
+    """How far a comparison in rounds is that searches for a bias (sequential.py).
+
+    find : the bias, a share of the light. least : that which would be found in 99 of 100 cases so far, if it is everywhere;
+    least_in_blocks : if it is in a typical block of 32 × 32 pixels alone; both 0 without noise.
+    samples : so far, of each side. rounds : so far. is_decided : whether that was the last. expected : samples that it takes.
+    """
+
+    find: float
+    least: float
+    least_in_blocks: float
+    samples: int
+    rounds: int
+    is_decided: bool
+    expected: float
+
+    @property
+    def reached(self) -> bool:
+        """True if the bias that was asked for would have been found."""
+        return self.least <= self.find
+
+    def to_json(self) -> dict:
+        least = {"least": self.least, "least_in_blocks": self.least_in_blocks}
+        return {"wanted": self.find, "reached": self.reached, **least, "samples": self.samples, "rounds": self.rounds}
+
+
 @dataclass(frozen=True, eq=False)
 class RadianceComparison:
     """The comparison of a reference with the mean of some test pictures, in light.
@@ -89,7 +116,7 @@ class RadianceComparison:
     same to the last bit. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
     maps : name to (height, width) float32, rows from the bottom: what differs in Combined and in quantities that fail.
     not_modelled : what of the picture neither side models as it is. taken_out : pixels that the rest says nothing of.
-    stated : the camera that was asked for, or None.
+    stated : the camera that was asked for, or None. search : of a comparison in rounds.
     """
 
     pinhole: Pinhole
@@ -104,6 +131,7 @@ class RadianceComparison:
     not_modelled: NotModelled = field(default_factory=NotModelled)
     taken_out: TakenOut = field(default_factory=TakenOut)
     stated: Pinhole | None = None
+    search: Search | None = None
     renderer = "Cycles"
     """Who made the test: light is compared with Cycles' alone."""
 
@@ -130,7 +158,7 @@ class RadianceComparison:
                 f"{_edges(combined)}{_without(self)}."
             )
             return answered(True, "The same picture", text, self.not_modelled)
-        text = f"no pixel and no tile differs by more than chance; {_mean_text(combined)}{_without(self)}."
+        text = f"no pixel and no tile differs by more than chance; {_mean_text(combined, self.search)}{_without(self)}."
         return answered(True, f"The same within noise at {samples_text(self)}", text, self.not_modelled)
 
     @property
@@ -168,6 +196,7 @@ class RadianceComparison:
             "seeds": self.seeds,
             "noisy": self.is_noisy,
             "false_alarms": FALSE_ALARMS,
+            **({"find": self.search.to_json()} if self.search else {}),
             "quantities": [row.to_json() for row in self.rows],
             "equal": list(self.equal),
             "appearance": asdict(self.appearance),
@@ -294,7 +323,7 @@ def _hint(row: LightRow) -> str:
     return f" (all of it is a factor of {row.factor:.5g}{error}{f', which is {known}' if known else ''})"
 
 
-def _mean_text(row: LightRow) -> str:
+def _mean_text(row: LightRow, search: Search | None = None) -> str:
     if not row.reference:
         return "both are black in the mean"
     error = 100.0 * row.ratio_error
@@ -305,7 +334,25 @@ def _mean_text(row: LightRow) -> str:
         if difference
         else "is the same within"
     )
-    return f"the mean {differs} ± {plain(error)} %, and a difference of {plain(100.0 * row.visible)} % would have been found"
+    would = f"and a difference of {plain(100.0 * row.visible)} % would have been found"
+    if search:
+        everywhere, in_blocks = (plain(100.0 * least) for least in (search.least, search.least_in_blocks))
+        alone = (
+            f", in a typical block of 32 × 32 pixels alone one of {in_blocks} %"
+            if math.isfinite(search.least_in_blocks)
+            else ""
+        )
+        would = f"and a difference of {everywhere} % would have been found in 99 of 100 cases{alone}"
+        if not search.reached:
+            would += f"; to find the {plain(100.0 * search.find)} % asked for takes too many samples"
+            would += f", some {_rounded(search.expected):,} a pixel" if math.isfinite(search.expected) else ""
+    return f"the mean {differs} ± {plain(error)} %, {would}"
+
+
+def _rounded(number: float) -> int:
+    """To one digit, as a forecast is worth."""
+    power = 10 ** math.floor(math.log10(number))
+    return math.ceil(number / power) * power
 
 
 def _few(names: Iterable[str]) -> str:

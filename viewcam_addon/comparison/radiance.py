@@ -39,12 +39,14 @@ def compare(
     pinhole: Pinhole,
     test_samples: int | None = None,
     make_coincident: MakeCoincidentLight | None = None,
+    false_alarms: float = FALSE_ALARMS,
 ) -> RadianceComparison:
     """Compare one reference with one test picture or with several of different seeds.
 
     pinhole : the camera of the reference, which must have the passes Combined and Depth. test_samples : of each test picture,
     where that is not what its file tells (Cycles counts a first sample that it leaves out). make_coincident : traces the light
     that is a renderer's choice, which is taken out; asked where the pictures differ.
+    false_alarms : the probability, at most, that two sides of the same light are called different.
 
     Whatever float32 can hold may stand in the pictures: what is no number is told as broken.
 
@@ -53,11 +55,11 @@ def compare(
     InputError
         if the sizes differ, a pass is missing, or there is no test picture.
     """
-    compared = compare_quantities(reference, tests, pinhole, test_samples)
+    compared = compare_quantities(reference, tests, pinhole, test_samples, false_alarms=false_alarms)
     combined, taken_out = compared.combined, TakenOut()
     if make_coincident is not None and not all(row.ok for row in compared.rows) and (coincident := make_coincident()):
         rest = coincident.rest(combined)
-        compared = compare_quantities(reference, tests, pinhole, test_samples, rest)
+        compared = compare_quantities(reference, tests, pinhole, test_samples, rest, false_alarms)
         taken_out = TakenOut(rest.out, coincident.pairs, coincident.seen_otherwise)
     maps = dict(compared.maps)
     appearance, flip = perception.appearance(combined)
@@ -102,6 +104,7 @@ def compare_quantities(
     pinhole: Pinhole,
     test_samples: int | None = None,
     rest: Rest | None = None,
+    false_alarms: float = FALSE_ALARMS,
 ) -> QuantityComparison:
     """`compare` without what decides nothing. rest : what is compared where light is a renderer's choice."""
     quantities = list(all_sides(reference, tests))
@@ -120,7 +123,7 @@ def compare_quantities(
     maps: dict[str, NDArray] = {}
     for sides in unequal:
         if is_noisy:
-            row, drawn = _noisy(sides, rounding, freedom, FALSE_ALARMS / len(unequal))
+            row, drawn = _noisy(sides, rounding, freedom, false_alarms / len(unequal))
             if rest is not None:
                 hidden = float(rest.tolerance(sides).mean())
                 row = replace(row, visible=row.visible + _relative(hidden, abs(row.reference)))

@@ -55,8 +55,8 @@ def check(
     size : (width, height) in pixels, or "320x180"; the scene's where None.
     report : a folder for the HTML page, the scene and all pictures.
     difference : a PNG of what differs.
-    options : fields of Job: camera, frame, level, samples, seed, error, engine, device, clay, recenter, strict, trust, threads,
-        scene.
+    options : fields of Job: camera, frame, level, samples, find, seed, error, engine, device, clay, recenter, strict, trust,
+        threads, scene.
 
     Raises
     ------

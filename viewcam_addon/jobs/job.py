@@ -5,6 +5,7 @@ alike.
 of jobs (rows.py) asks both for all problems there are, with the place of each. To JSON and back is here and nowhere else.
 """
 
+import argparse
 import dataclasses
 import math
 import os
@@ -38,6 +39,10 @@ _ASPECTS = (1 / 200, 200.0)
 _LARGEST_FLOAT32, _SMALLEST_FLOAT32 = (2.0 - 2.0**-23) * 2.0**127, 2.0**-126
 
 _STRICT = "exit with 3 if anything is not modeled: of the picture where one is compared, else of the file"
+_FIND = (
+    "for light, in place of --samples: as many of them as it takes to find a bias of that size in 99 of 100 cases, as 0.5%%; "
+    "what differs by more is found sooner"
+)
 _SCENE = "the scene that Cycles must show, as viewcam export wrote it (default: what the file holds now)"
 
 FOUR_VALUES = ("eye", "look_at", "up", "d")
@@ -76,6 +81,8 @@ class Job:
     Of a check:
 
     error : the standard error of each of the tracer's pixels, scene-linear, in place of its samples.
+    find : a share in percent, "0.5%": the bias that a check at a level of light takes as many samples to find as it needs, on
+        both sides (comparison/sequential.py).
     device : one of DEVICES, what Cycles renders on.
     clay : whether one matte material covers everything, on both sides.
     recenter : whether both sides see the scene with its origin at the eye.
@@ -110,6 +117,7 @@ class Job:
     seed: int | None = None
     threads: int | None = None
     error: float | None = None
+    find: str | None = _option(_FIND, type=argument_types.percentage, metavar="PERCENT")
     device: str = _option("what Cycles renders on, all of that kind (default: %(default)s)", "CPU", choices=DEVICES)
     clay: bool = _option("the same matte material on everything, on both sides", False)
     recenter: bool = _option("put the origin at the eye: for scenes far from it", False)
@@ -134,10 +142,19 @@ class Job:
         """True if the scene's own camera takes the picture."""
         return self.camera is None and self.eye is None
 
+    @property
+    def bias(self) -> float | None:
+        """`find` as a share of 1."""
+        return None if self.find is None else float(self.find.rstrip("%")) / 100.0
+
     def refuse_unchecked(self) -> None:
         """Raise InputError if no such check can be made."""
         if self.engine not in (None, *TESTED):
             raise InputError(f"engine {self.engine} is the tracer itself: choose from {', '.join(TESTED)}")
+        if self.find and self.level in (None, LEVELS[0]):
+            raise InputError("--find is of light, and level geometry has none: give --level direct, path or auto")
+        if self.find and (self.samples is not None or self.error is not None):
+            raise InputError("--find says how many samples there are: leave --samples and --error out")
         if self.engine in (None, "CYCLES"):
             return
         if self.level not in (None, LEVELS[0]) or self.error:
@@ -216,6 +233,13 @@ def _above_zero(place: str, value: object) -> float:
     if number <= 0:
         raise InputError(f"{place} is {checks.quoted(value)}: give a number above 0")
     return number
+
+
+def _percentage(place: str, value: object) -> str:
+    try:
+        return argument_types.percentage(value if isinstance(value, str) else checks.quoted(value))
+    except argparse.ArgumentTypeError as error:
+        raise InputError(f"{place}: {error}") from error
 
 
 def _name(place: str, value: object) -> str:
@@ -297,6 +321,7 @@ _MORE: dict[str, Callable[[str, object], object]] = {
     "seed": partial(_whole, limits=_SEEDS),
     "threads": partial(_whole, limits=_THREADS),
     "error": _above_zero,
+    "find": _percentage,
     "device": partial(_choice, among=DEVICES),
     "clay": checks.truth,
     "recenter": checks.truth,

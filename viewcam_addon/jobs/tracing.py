@@ -24,6 +24,7 @@ from .job import Job
 
 if TYPE_CHECKING:
     from ..comparison.light_verdict import RadianceComparison
+    from ..comparison.sequential import Rounds
     from ..comparison.verdict import GeometryComparison
     from ..image import Image
     from ..tracer.scene import LedgerEntry, Scene
@@ -81,6 +82,7 @@ class Tracing(child_process.ServerOnDemand):
         written: Written | None = None,
         everything: Path | None = None,
         may_be_empty: bool = False,
+        is_first_round: bool = True,
     ) -> dict[str, Any]:
         """The comparison of an engine's pictures with what the tracer makes of a scene.
 
@@ -88,19 +90,21 @@ class Tracing(child_process.ServerOnDemand):
         ----------
         scene : a scene file; the same path is the same scene, and is not read again.
         tests : the pictures of geometry, or of light with several seeds.
-        job : level (none but the levels of film.py), samples, error, seed, threads.
+        job : level (none but the levels of film.py), samples, error, find, seed, threads.
         camera, clip, stated : the camera that is said to have taken the picture, what it sees and the four values that it was
             made from, in place of the scene's.
         ledger : what is told of the scene.
         written : files beside.
         everything : Cycles' picture with all that is not modeled, where there is any.
         may_be_empty : whether pictures that show no object are different, and no error.
+        is_first_round : of a job that finds a bias: else the samples are added to those of the calls before.
 
         Returns `passed`, `answer`, `sentence` and `not_modelled` as comparison/answer.py has them; `lines` for a terminal;
         `seconds`, how long it was traced; `result`, all that --json has; and `figures`, the few of them that a sidecar keeps:
         of geometry `pixels` compared, `position` in pixels, `share_of_tolerance` of each pass where it is largest,
         `mismatches`, and `conversion`, the stated camera against this one; of light its `samples` and `quantities`. None is
-        what was not compared.
+        what was not compared. Of a job that finds a bias there are `undecided` and `seconds` alone until the last round, where
+        `undecided` has `expected` and `least` of light_verdict.Search; then a report's folder gets the pictures of all rounds.
 
         Raises
         ------
@@ -118,6 +122,7 @@ class Tracing(child_process.ServerOnDemand):
             "written": dataclasses.asdict(written or Written()),
             "everything": everything and str(everything),
             "may_be_empty": may_be_empty,
+            "is_first_round": is_first_round,
         }
         return self.ask({"compare": request})
 
@@ -204,6 +209,7 @@ class _Server:
 
         self._keeper, self._keepers = Keeper(), Keepers(_MOST_SCENES)
         self._files: dict[str, Scene] = {}
+        self._rounds: Rounds | None = None
 
     def answer(self, request: dict[str, Any], tell: Callable[..., None]) -> Any:
         """request : {what is asked for: its arguments}. tell : tells an event to whoever asks."""
@@ -226,10 +232,12 @@ class _Server:
         written: dict[str, Any],
         everything: str | None,
         may_be_empty: bool,
+        is_first_round: bool,
         tell: Callable[..., None],
     ) -> dict[str, Any]:
         from .. import api, image
-        from ..comparison import renderers
+        from ..comparison import renderers, sequential
+        from ..comparison.light_verdict import RadianceComparison
         from ..tracer.scene import LedgerEntry
         from ..tracer.tiles import Progress
 
@@ -250,22 +258,36 @@ class _Server:
         started = time.perf_counter()
         reference = api.render(seen, *spent, watcher, self._keeper)
         seconds = time.perf_counter() - started
-        if files.reference:
-            image.write(files.reference, reference)
-            reference = dataclasses.replace(reference, source=files.reference)
-        else:
-            reference = dataclasses.replace(reference, source="the tracer")
+        reference = dataclasses.replace(reference, source=files.reference or "the tracer")
         tell("step", name="comparing")
         pictures, (renderer, *_) = map(list, zip(*map(renderers.read, tests), strict=True))
         if not files.reference:  # nothing of where they were for a while
             pictures = [dataclasses.replace(picture, source=Path(picture.source).name) for picture in pictures]
         partial = renderer is not renderers.CYCLES
+        whole, alarms = image.read(everything) if everything else None, None
+        if wanted.bias:
+            self._rounds = sequential.Rounds() if is_first_round or self._rounds is None else self._rounds
+            rounds, alarms = self._rounds, sequential.FALSE_ALARMS_OF_EACH
+            rounds.add(samples, reference, pictures, whole)
+            samples, reference, pictures, whole = rounds.samples, rounds.reference, rounds.tests, rounds.everything
         share = max(samples // len(tests), 1)  # Cycles' file counts one that is left out
-        how = (seen, wanted.threads, share, renderer, partial, everything, self._keeper, may_be_empty)
+        how = (seen, wanted.threads, share, renderer, partial, whole, self._keeper, may_be_empty, alarms)
         comparison = api.compare(reference, pictures, *how)
+        if wanted.bias and isinstance(comparison, RadianceComparison):
+            search = sequential.search(comparison, wanted.bias, rounds)
+            if not search.is_decided:
+                return {"undecided": {"expected": search.expected, "least": search.least}, "seconds": seconds}
+            comparison, self._rounds = dataclasses.replace(comparison, search=search), None
+            if files.report:
+                for path, picture in zip(tests, pictures, strict=True):
+                    image.write(path, picture)
+                if everything and whole:
+                    image.write(everything, whole)
+        if files.reference:
+            image.write(files.reference, reference)
         if partial:
             pictures = [renderers.completed(picture, comparison.pinhole) for picture in pictures]
-        result = _to_json(comparison, reference, pictures, entries, files, everything)
+        result = _to_json(comparison, reference, pictures, entries, files, whole)
         return {**result, "seconds": seconds}
 
     def _label(
@@ -303,10 +325,9 @@ def _to_json(
     tests: "Sequence[Image]",
     ledger: "Sequence[LedgerEntry]",
     written: Written,
-    everything: str | None = None,
+    whole: "Image | None" = None,
 ) -> dict[str, Any]:
     """The answer about a comparison, once its files are written."""
-    from .. import image
     from ..comparison import difference, light_report, report
     from ..comparison.light_verdict import RadianceComparison
     from ..tracer.scene import with_pairs
@@ -325,7 +346,6 @@ def _to_json(
     if written.difference:
         result["difference"] = difference.write(comparison, written.difference)
     if written.sides:
-        whole = image.read(everything) if everything else None
         difference.write_sides(comparison, reference, tests, written.sides, whole)
     record = {**comparison.answer.to_json(), "lines": lines}
     return {**record, "result": checks.for_json(result), "figures": checks.for_json(figures)}
@@ -349,7 +369,8 @@ def _geometry_figures(comparison: "GeometryComparison") -> dict[str, Any]:
 def _light_figures(result: Mapping[str, Any]) -> dict[str, Any]:
     kept = ("reference", "test", "ratio", "ratio_error", "ok")
     rows = {row["name"]: {name: row[name] for name in kept} for row in result["quantities"]}
-    return {"samples": result["samples"], "noisy": result["noisy"], "quantities": rows}
+    search = {"find": result["find"]} if "find" in result else {}
+    return {"samples": result["samples"], "noisy": result["noisy"], **search, "quantities": rows}
 
 
 if __name__ == "__main__":

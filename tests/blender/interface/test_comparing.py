@@ -177,16 +177,16 @@ def test_a_camera_that_is_not_where_it_was_put_differs_and_then_is_mended(seen):
     assert again.packed_file.data != bytes_before and not again.is_dirty
 
 
-def test_light_is_compared_with_as_many_samples_as_said(seen, add_lamp):
+def test_light_is_compared_with_as_many_samples_as_it_takes(seen, add_lamp):
     add_lamp("POINT", energy=500)
     seen.render.resolution_percentage = 50
     bpy.context.view_layer.update()
     settings = bpy.context.window_manager.virtual_pinhole_proof
-    settings.level, settings.samples, settings.clay = "DIRECT", 4, True
+    settings.level, settings.clay = "DIRECT", True
     try:
         assert bpy.ops.viewcam.compare_with_cycles() == {"FINISHED"}
     finally:
-        for name in ("level", "said", "samples", "clay"):
+        for name in ("level", "said", "clay"):
             settings.property_unset(name)
     outcome = proof.background.latest
     assert outcome.answer == SAME, outcome.verdict
@@ -194,8 +194,8 @@ def test_light_is_compared_with_as_many_samples_as_said(seen, add_lamp):
     assert "Orange where Cycles is brighter" in outcome.colours
     assert set(outcome.pictures) == {"cycles", "tracer", "difference"}, "all of it is modeled"
     page = outcome.report.read_text(encoding="utf-8")
-    assert "--samples 4" in page and "--clay" in page
-    assert len(list(outcome.folder.glob("cycles-*.exr"))) == 2
+    assert "--find 2%" in page and "--clay" in page
+    assert len(list(outcome.folder.glob("cycles-*.exr"))) == 8
 
 
 def test_cancelled_while_it_renders_it_leaves_no_process_and_no_file(seen):
@@ -230,7 +230,7 @@ def test_its_steps_tell_how_far_it_is(stand_in):
 
 
 def test_light_is_rendered_in_pictures_that_are_counted(stand_in):
-    comparison = stand_in(level="path", samples=64)
+    comparison = stand_in(level="path")
     assert comparison.progress() == (0, "Rendering with Cycles, 1 of 8")
     with open(comparison.folder / "said.txt", "a", encoding="utf-8") as log:
         log.write('{"event": "step", "name": "rendering", "number": 4, "of": 8}\n')
@@ -239,6 +239,18 @@ def test_light_is_rendered_in_pictures_that_are_counted(stand_in):
         log.write('{"event": "step", "name": "tracing"}\n{"event": "progress", "share": 0.25}\n{"event": "pro')
         log.flush()
         assert comparison.progress() == (8.25 / 10, "Tracing"), "half a line is on its way"
+    comparison.cancel()
+
+
+def test_a_search_for_a_bias_tells_how_much_longer_it_takes(stand_in):
+    comparison = stand_in(level="path", find="0.5%")
+    with open(comparison.folder / "said.txt", "a", encoding="utf-8") as said:
+        said.write('{"event": "forecast", "samples": 256, "taken": 64, "seconds": 41.6}\n')
+        said.flush()
+        assert comparison.progress() == (1 / 4, "Rendering with Cycles, 1 of 8, about 42 s more")
+        said.write('{"event": "step", "name": "rendering", "number": 6, "of": 8}\n')
+        said.flush()
+        assert comparison.progress() == (1.5 / 4, "Rendering with Cycles, 6 of 8, about 42 s more")
     comparison.cancel()
 
 

@@ -98,9 +98,9 @@ class Outcome:
 class RunningComparison:
     """One comparison on its way, from the moment it is made.
 
-    scene : the one of the window. level : one of film.LEVELS, or "auto". samples : a pixel, for light. clay : whether one matte
-    material covers everything. keep_in : a folder that gets one for each report, named by file, camera, frame and time; by
-    default the report is gone with Blender.
+    scene : the one of the window. level : one of film.LEVELS, or "auto". find : for light, the bias that is to be found, as of
+    Job. clay : whether one matte material covers everything. keep_in : a folder that gets one for each report, named by file,
+    camera, frame and time; by default the report is gone with Blender.
 
     Raises
     ------
@@ -113,7 +113,7 @@ class RunningComparison:
         camera_object: bpy.types.Object,
         scene: bpy.types.Scene,
         level: str = LEVELS[0],
-        samples: int = SAMPLES,
+        find: str = "2%",
         clay: bool = False,
         keep_in: Path | None = None,
     ) -> None:
@@ -121,9 +121,9 @@ class RunningComparison:
         self._camera, self._seen = camera_object.name, camera_seen(camera_object, scene)
         self._what = f"{camera_object.name}, frame {scene.frame_current}, {level}"
         self._keep_in = keep_in and keep_in / report_name(camera_object.name, scene.frame_current)
-        self._pictures = seeds(level, samples)
+        self._pictures = seeds(level, SAMPLES)
         self._started = time.monotonic()
-        job = Job(camera=camera_object.name, level=level, clay=clay, samples=samples if level != LEVELS[0] else None)
+        job = Job(camera=camera_object.name, level=level, clay=clay, find=find if level != LEVELS[0] else None)
         try:
             self.folder = Path(tempfile.mkdtemp(prefix="viewcam-", dir=bpy.app.tempdir or None))
         except OSError as error:
@@ -149,13 +149,19 @@ class RunningComparison:
     def progress(self) -> tuple[float, str]:
         """The progress, from 0 to 1 in steps of unequal length, and the name of the step."""
         done, words = _step({"name": "rendering", "number": 1}, self._pictures)
-        traced = 0.0
+        traced, taken, expected, left = 0.0, 0, 1, ""
         for event in child_process.events_in(self._said().splitlines()):
             if event["event"] == "step":
                 done, words = _step(event, self._pictures)
             elif event["event"] == "progress":
                 traced = event["share"]
-        return (done + (traced if words == "Tracing" else 0)) / (self._pictures + 2), words
+            elif event["event"] == "forecast":
+                taken, expected = event["taken"], event["samples"]
+                left, done = f", about {event['seconds']:.0f} s more", 0
+        share = (done + (traced if words == "Tracing" else 0)) / (self._pictures + 2)
+        if taken:  # a round has as many samples as all before it
+            share = min((1 + share) * taken / expected, 1.0)
+        return share, words + left
 
     @property
     def seconds(self) -> float:

@@ -11,7 +11,6 @@ import bpy
 
 from ...comparison.answer import DIFFERENT, SAME
 from ...errors import InputError
-from ...tracer.scene.film import SAMPLES
 from .. import datablocks, preferences
 from ..render_settings import LEVELS
 from . import icons, panel_rows, proof_image
@@ -57,12 +56,13 @@ class ProofSettings(bpy.types.PropertyGroup):
         get=lambda group: _NAMES.index(group.said or preferences.get().default_level),
         set=lambda group, number: setattr(group, "said", _NAMES[number]),
     )
-    samples: bpy.props.IntProperty(
-        name="Samples",
-        description="Paths of light through each pixel, on both sides. The more, the smaller a difference is found",
-        default=SAMPLES,
-        min=1,
-        soft_max=4096,
+    find: bpy.props.EnumProperty(
+        name="Find",
+        description="How small a difference of the light is found. It takes as many samples as that needs, on both sides",
+        items=(
+            ("2%", "Quick", "A picture that is 2 % too bright or too dark is found in 99 of 100 cases"),
+            ("0.5%", "Thorough", "A picture that is 0.5 % too bright or too dark is found in 99 of 100 cases; it takes longer"),
+        ),
     )
     clay: bpy.props.BoolProperty(
         name="Clay", description="The same matte material on everything, on both sides: for scenes whose own are not modeled"
@@ -138,7 +138,7 @@ class VIEWCAM_OT_compare_with_cycles(StartsForCamera, bpy.types.Operator):
         try:
             settings = context.window_manager.virtual_pinhole_proof
             folder = Path(bpy.path.abspath(settings.folder)) if settings.folder else None
-            asked = settings.level.lower(), settings.samples, settings.clay, folder
+            asked = settings.level.lower(), settings.find, settings.clay, folder
             background.running = RunningComparison(self.one(context), context.scene, *asked)
         except InputError as error:
             self.report({"ERROR"}, datablocks.sentence(error))
@@ -234,7 +234,7 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     column.active = background.running is None
     panel_rows.field(column, settings, "level")
     if settings.level != "GEOMETRY":
-        column.prop(settings, "samples")
+        panel_rows.field(column, settings, "find")
         column.prop(settings, "clay")
     panel_rows.field(column, settings, "folder")
 

@@ -16,12 +16,13 @@ import contextlib
 import dataclasses
 import functools
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import bpy
 
+from ...comparison.sequential import TOTALS
 from ...events import Events
 from ...files import check_writable
 from ...jobs.job import Job
@@ -34,7 +35,7 @@ from .. import datablocks
 from ..rendering import cycles, displayed, exr
 from ..scenes.export import Lighting
 from ..temporary_settings import numbered_indices
-from . import pictures
+from . import persistent_data, pictures
 from .scene_files import SceneFiles
 from .stage import Stage, staged
 
@@ -118,6 +119,7 @@ class Checker:
             as `check_picture` does.
         """
         job.refuse_unchecked()
+        started = time.perf_counter()
         count = seeds(job.level or LEVELS[0], job.samples or SAMPLES)
         engine = (job.engine if job.engine in ("EEVEE", "WORKBENCH") else "CYCLES").lower()
         folder = keep or self._files.folder
@@ -127,31 +129,42 @@ class Checker:
         if keep:
             for path in (*tests, everything, *(keep / name for name in ("scene.json", "scene.npz", "reference.exr"))):
                 check_writable(path)
-        started = time.perf_counter()
         with numbered_indices(_numbered(job.scene)), staged(job, scene, camera_object, notes) as stage:
             everything.unlink(missing_ok=True)
-            exported = self.both_sides(stage, job, tests, everything)
-        if not keep:  # the page has to be the same bytes each time
-            for path in filter(Path.exists, (*tests, everything)):
-                exr.strip(path, pictures.is_passing)
-        level, rendered = stage.level, time.perf_counter() - started
-        path = Path(job.scene) if job.scene else self._files.file_of(exported)
-        if keep:
-            scene_file.write(exported, keep / "scene.json")
-        if level == LEVELS[0]:
-            tests = tests[:1]
-        whole = everything if everything.exists() else None
-        approved = scene_file.read(path) if job.scene else None
-        of, ledger = dataclasses.replace(job, level=level), (approved or exported).ledger
-        if approved:
-            comparison = self._tracing.compare(path, tests, of, ledger=ledger, written=written, everything=whole)
-        else:
-            camera, clip, stated = exported.camera, exported.clip, exported.stated_camera
-            comparison = self._tracing.compare(path, tests, of, camera, clip, stated, ledger, written, whole)
+            exported = stage.export()
+            level = stage.level
+            path = Path(job.scene) if job.scene else self._files.file_of(exported)
+            if keep:
+                scene_file.write(exported, keep / "scene.json")
+            approved = scene_file.read(path) if job.scene else None
+            of, ledger = dataclasses.replace(job, level=level), (approved or exported).ledger
+            if level == LEVELS[0]:
+                of = dataclasses.replace(of, find=None)
+            camera, clip, stated = (None, None, None) if approved else (exported.camera, exported.clip, exported.stated_camera)
+            if of.find:  # the check before ended with more samples than this one begins with
+                persistent_data.drop(scene)
+            rendered = traced = 0.0
+            for number, part in enumerate(_rounds(of)):
+                begun = time.perf_counter() if number else started
+                self._render(stage, exported, part, tests, everything)
+                if not keep:  # the page has to be the same bytes each time
+                    for file in filter(Path.exists, (*tests, everything)):
+                        exr.strip(file, pictures.is_passing)
+                rendered += time.perf_counter() - begun
+                sides = tests[:1] if level == LEVELS[0] else tests
+                whole = everything if everything.exists() else None
+                about = (camera, clip, stated, ledger, written, whole)
+                comparison = self._tracing.compare(path, sides, part, *about, is_first_round=number == 0)
+                traced += comparison["seconds"]
+                if "undecided" not in comparison:
+                    break
+                self._forecast(comparison["undecided"], TOTALS[number], part.samples or 0, time.perf_counter() - begun)
         for path in sorted(Path(written.sides).glob("*.npy")) if written and written.sides else ():
             displayed.write_png(scene, path)
         result = {"result": comparison["result"], "lines": comparison["lines"], "level": level}
-        result["seconds"] = {"rendered": rendered, "traced": comparison["seconds"]}
+        result["seconds"] = {"rendered": rendered, "traced": traced}
+        if "find" in comparison["result"]:
+            comparison["result"]["find"]["seconds"] = round(time.perf_counter() - started, 3)
         if job.level == "auto":
             result["reason"] = least_level(exported)[1]
         return _brief(comparison, ledger) | result
@@ -162,21 +175,40 @@ class Checker:
         everything : as of Stage.render, written where there is any such thing. A recentered scene has none of it.
         """
 
+        exported = stage.export()
+        self._render(stage, exported, job, paths, everything)
+        return exported
+
+    def _render(self, stage: Stage, exported: Scene, job: Job, paths: Sequence[Path], everything: Path | None = None) -> None:
         def rendering(number: int) -> None:
             if self._events:
                 self._events.tell("step", name="rendering", number=number, of=max(number, len(paths)))
 
-        exported = stage.export()
         lighting = Lighting(exported.lamps, exported.world, exported.film, exported.bounces)
         has_more = exported.not_modelled and job.engine not in ("EEVEE", "WORKBENCH") and not job.recenter
         stage.render(job, paths, lighting, rendering, keep=True, everything=everything if has_more else None)
-        return exported
+
+    def _forecast(self, undecided: dict[str, Any], taken: int, latest: int, seconds: float) -> None:
+        """Tell how much longer a search for a bias takes. taken : samples so far. latest, seconds : of the last round."""
+        if self._events:
+            left = seconds * (undecided["expected"] - taken) / latest
+            self._events.tell("forecast", samples=undecided["expected"], taken=taken, seconds=round(left, 1))
 
     def __enter__(self) -> "Checker":
         return self
 
     def __exit__(self, *_: object) -> None:
         self._ends.close()
+
+
+def _rounds(job: Job) -> Iterator[Job]:
+    """The rounds that the search for a bias may take, each of other seeds; of any other job itself."""
+    if job.find is None:
+        yield job
+        return
+    for number, total in enumerate(TOTALS):
+        samples = total - (TOTALS[number - 1] if number else 0)
+        yield dataclasses.replace(job, samples=samples, seed=((job.seed or 0) + number * seeds(LEVELS[-1], samples)) % 2**31)
 
 
 def _numbered(scene_path: str | None) -> tuple[str, ...]:
