@@ -74,7 +74,8 @@ def in_world(source: Source, options: Options) -> Options:
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
     up = "Y" if options.axes == "y_up" else "Z"
-    blocks, taken = [], set()
+    blocks: list[str] = []
+    taken: set[str] = set()
     for camera in cameras:
         blocks.append(_prim(camera, _identifier(camera.name, taken)))
     doc = f'    doc = "{options.remembered}"\n' if options.remembered else ""

@@ -158,7 +158,7 @@ def test_labels_alone_are_those_beside_a_picture_and_nothing_is_rendered(stage, 
     monkeypatch.setattr(renderer, "render_still", refused)
     shoot(tmp_path / "alone", FRAMES[:1], ALL)
     names = [path.name for path in (tmp_path / "alone").iterdir() if path.name != "frame_1.json"]
-    assert len(names) == 8
+    assert len(names) == 9
     for name in names:
         assert (tmp_path / "alone" / name).read_bytes() == (tmp_path / "with" / name).read_bytes(), name
 
