@@ -71,6 +71,9 @@ def test_what_is_damaged_or_another_png_is_a_value_error():
     for content in (b"", b"no picture", palette, whole[:20], *(whole[:cut] for cut in range(8, len(whole) - 12, 7))):
         with pytest.raises(ValueError):
             png.decoded(content)
+    largest = whole[:16] + b"\xff" * 8 + whole[24:]
+    with pytest.raises(ValueError):
+        png.decoded(largest)
     dice = random.Random(1)
     for _ in range(500):
         mutant = bytearray(whole)

@@ -6,6 +6,7 @@ Rejected: Pillow, which an add-on inside Blender does not have, and which reads 
 
 import os
 import struct
+import sys
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -57,9 +58,9 @@ def decoded(content: bytes) -> NDArray[np.uint8] | NDArray[np.uint16]:
     if depth not in (8, 16) or kind not in _CHANNELS or passes or not width * height:
         raise ValueError("another PNG")
     step = _CHANNELS[kind] * depth // 8  # bytes of a pixel
-    unpacked = zlib.decompressobj()
+    most = min(height * (width * step + 1), sys.maxsize)
     try:
-        data = unpacked.decompress(b"".join(each for name, each in chunks if name == b"IDAT"), height * (width * step + 1))
+        data = zlib.decompressobj().decompress(b"".join(each for name, each in chunks if name == b"IDAT"), most)
         filtered = np.frombuffer(data, np.uint8).reshape(height, width * step + 1)
     except zlib.error as error:
         raise ValueError("a damaged PNG") from error

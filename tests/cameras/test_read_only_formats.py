@@ -443,6 +443,104 @@ def test_gaussian_splattings_principal_point_counts_where_it_is_said():
     assert not any("principal point" in note for note in read.notes)
 
 
+def nerfstudio_path(*known, fov=None):
+    """As get_path_from_json takes it: the focal length is height / 2 / tan(fov / 2)."""
+    path = [
+        {
+            "camera_to_world": [*each.opengl.ravel().tolist(), 0, 0, 0, 1],
+            "fov": fov or np.degrees(2 * np.arctan(each.height / 2 / each.f_y)),
+            "aspect": each.width / each.height,
+        }
+        for each in known
+    ]
+    return {"camera_type": "perspective", "render_width": known[0].width, "render_height": known[0].height, "camera_path": path}
+
+
+@pytest.mark.parametrize("name", CENTRED)
+def test_nerfstudios_path_has_the_degrees_of_the_height(name):
+    known = Known(name)
+    wide = 1 + known.f_y / known.height  # of a telephoto's angle less is kept
+    read = the_same(cameras.read(json.dumps(nerfstudio_path(known))), known, wide * 2.0**-50)
+    assert any("world that nerfstudio trains in" in note for note in read.notes)
+
+
+def test_nerfstudios_world_is_undone_by_the_file_beside_the_path(tmp_path):
+    known = Known(CENTRED[0])
+    turn = pytest.importorskip("scipy.spatial.transform").Rotation.from_rotvec([0.3, -1.2, 0.7]).as_matrix()
+    moved, scale = np.array([0.2, -0.5, 1.1]), 0.37
+    there = Known(CENTRED[0])
+    there.opengl = np.column_stack([turn @ known.opengl[:, :3], scale * (turn @ known.e + moved)])
+    (tmp_path / "path.json").write_text(json.dumps(nerfstudio_path(there)))
+    world = {"transform": np.column_stack([turn, moved]).tolist(), "scale": scale}
+    (tmp_path / "dataparser_transforms.json").write_text(json.dumps(world))
+    the_same(cameras.read(tmp_path / "path.json", options=Options(original_world=True)), known)
+    (as_it_is,) = cameras.read(tmp_path / "path.json")
+    assert as_it_is.pinhole.eye == pytest.approx(tuple(there.opengl[:, 3]))
+
+
+def test_a_path_flies_at_its_frames_a_second_and_other_cameras_are_refused():
+    known = Known(CENTRED[0])
+    read = cameras.read(json.dumps(nerfstudio_path(known, known, known) | {"fps": 10}))
+    assert [camera.time for camera in read] == [0, 0.1, 0.2]
+    with pytest.raises(InputError, match="equirectangular"):
+        cameras.read(json.dumps(nerfstudio_path(known) | {"camera_type": "equirectangular"}))
+    pair = [cameras.Camera("a", known.pinhole), cameras.Camera("b", known.pinhole.resized(64, 36))]
+    with pytest.raises(InputError, match="one size for all cameras"):
+        cameras.write(pair, "nerfstudio_path")
+
+
+def open3d(known):
+    k = np.array([[known.f_x, 0, known.c_x - 0.5], [0, known.f_y, known.c_y - 0.5], [0, 0, 1]])
+    extrinsic = np.vstack([np.column_stack([known.opencv, -known.opencv @ known.e]), [0, 0, 0, 1]])
+    intrinsic = {"width": known.width, "height": known.height, "intrinsic_matrix": k.T.ravel().tolist()}
+    return {"class_name": "PinholeCameraParameters", "extrinsic": extrinsic.T.ravel().tolist(), "intrinsic": intrinsic}
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_open3d_has_column_after_column_and_counts_from_the_first_pixels_centre(name):
+    known = Known(name)
+    alone = cameras.read(json.dumps(open3d(known)))
+    flight = cameras.read(json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": [open3d(known)] * 2}))
+    for read in (alone, flight[:1], flight[1:]):
+        assert any("half a pixel" in note for note in the_same(read, known).notes)
+
+
+def opensfm(known, **camera):
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_matrix(known.opencv).as_rotvec().tolist()
+    longer = max(known.width, known.height)
+    said = {"projection_type": "brown", "width": known.width, "height": known.height}
+    said |= {"focal_x": known.f_x / longer, "focal_y": known.f_y / longer}
+    said |= {"c_x": (known.c_x - known.width / 2) / longer, "c_y": (known.c_y - known.height / 2) / longer}
+    shot = {"rotation": rotation, "translation": (-known.opencv @ known.e).tolist(), "camera": "c"}
+    return [{"cameras": {"c": said | camera}, "shots": {"a.jpg": shot}, "points": {}}]
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_opensfm_counts_in_the_longer_side_from_the_middle(name):
+    known = Known(name)
+    read = the_same(cameras.read(json.dumps(opensfm(known))), known, 2.0**-48)
+    assert (read.name, read.image) == ("a", "a.jpg")
+
+
+def test_opensfms_lenses_are_opencvs_and_panoramas_are_refused():
+    cv2, known = pytest.importorskip("cv2"), Known("plain")
+    points = np.array([[0.1, 0.2], [-0.3, 0.15], [0.25, -0.2]])
+    rays = np.column_stack([points, np.ones(3)])
+    k = {"k1": -0.12, "k2": 0.05, "k3": 0.01, "p1": 0.002, "p2": -0.003}
+    (brown,) = cameras.read(json.dumps(opensfm(known, **k)))
+    theirs, _ = cv2.projectPoints(
+        rays, np.zeros(3), np.zeros(3), np.eye(3), np.array([k[n] for n in ("k1", "k2", "p1", "p2", "k3")])
+    )
+    assert np.abs(brown.lens.distort(points) - theirs[:, 0]).max() < 1e-12
+    (fish,) = cameras.read(json.dumps(opensfm(known, projection_type="fisheye", focal=0.8, k1=-0.02, k2=0.003)))
+    theirs, _ = cv2.fisheye.projectPoints(rays[:, None], np.zeros(3), np.zeros(3), np.eye(3), np.array([-0.02, 0.003, 0, 0]))
+    assert np.abs(fish.lens.distort(points) - theirs[:, 0]).max() < 1e-12
+    with pytest.raises(InputError, match="spherical"):
+        cameras.read(json.dumps(opensfm(known, projection_type="spherical")))
+    with pytest.raises(InputError, match="no shots"):
+        cameras.read(json.dumps([{"cameras": {}, "shots": {}}]))
+
+
 KALIBR = """cam0:
   camera_model: pinhole
   distortion_coeffs: [0.0, 0.0, 0.0, 0.0]

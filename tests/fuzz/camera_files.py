@@ -154,6 +154,12 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "scanner": {"a.json": json.dumps(scanner)},
         "record3d": {"metadata": json.dumps(record)},
         "gaussian_splatting": {"cameras.json": json.dumps([picture | {"fx": 500, "fy": 500}] * 2)},
+        "nerfstudio_path": {
+            "a.json": json.dumps(published.nerfstudio_path(known, known)),
+            "dataparser_transforms.json": json.dumps({"transform": np.eye(4)[:3].tolist(), "scale": 0.5}),
+        },
+        "open3d": {"a.json": json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": [published.open3d(known)]})},
+        "opensfm": {"reconstruction.json": json.dumps(published.opensfm(known, k1=-0.1, k2=0.02))},
         "tum": {"a.txt": "".join(f"{i} 1 2 3 0 0 0 1\n" for i in range(5))},
         "kitti": {"a.txt": "1 0 0 1 0 1 0 2 0 0 1 3\n" * 3},
         "euroc": _euroc(),

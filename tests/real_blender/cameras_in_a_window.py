@@ -78,14 +78,15 @@ def import_colmap():
     yield from until(lambda: len(windows) == 1, "the file browser's end")
     yield from settle()
     (collection,) = [each for each in bpy.data.collections if each.name not in before["collections"]]
-    assert len(collection.objects) == len(eyes) == 100
-    for block in collection.objects:
+    blocks = [block for block in collection.objects if block.type == "CAMERA"]
+    assert len(blocks) == len(eyes) == 100 and all(block.parent.type == "EMPTY" for block in blocks)
+    for block in blocks:
         matrix, eye = np.array(block.matrix_world), np.array(eyes[block.name])
         np.testing.assert_allclose(matrix[:3, 3], eye, atol=9 * 2**-24 * 8)  # float32 of coordinates below 8
         np.testing.assert_allclose(-matrix[:3, 2], -eye / np.linalg.norm(eye), atol=17 * 2**-24)  # all look at the origin
     view, _ = region(*VIEWPORT)
     view.spaces.active.region_3d.view_distance = 22
-    assert all(block.data.background_images for block in collection.objects), "pictures are missing"
+    assert all(block.data.background_images for block in blocks), "pictures are missing"
     yield from picture("colmap")
     yield from once_undone_and_redone(before, "the import of COLMAP's cameras")
 

@@ -45,6 +45,11 @@ def write_picture(path, size=(8, 4)):
     bpy.data.images.remove(image)
 
 
+def imported(name):
+    """The cameras of a collection, without the empty that carries them."""
+    return [block for block in bpy.data.collections[name].objects if block.type == "CAMERA"]
+
+
 def counts():
     kinds = ("objects", "cameras", "collections", "images", "actions")
     return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
@@ -54,13 +59,28 @@ def test_a_folder_of_cameras_becomes_one_collection_and_each_sees_what_the_file_
     cameras_around = around(7)
     formats.save(cameras_around, tmp_path / "sparse", "colmap")
     assert import_(tmp_path / "sparse", set_size=True) == {"FINISHED"}
-    objects = bpy.data.collections["sparse"].objects
+    objects = imported("sparse")
     assert [each.name for each in objects] == [camera.name for camera in cameras_around]
     assert (scene.render.resolution_x, scene.render.resolution_y) == (640, 360)
     for block, camera in zip(objects, cameras_around, strict=True):
         assert block.virtual_pinhole.enabled
         assert_same(cameras.read(block, scene), camera.pinhole)
     assert scene.camera == objects[0]
+
+
+@pytest.mark.parametrize("made", ["EACH", "FLIGHT"])
+def test_the_empty_of_an_import_turns_and_scales_all_of_its_cameras(scene, tmp_path, made):
+    formats.save(around(3), tmp_path / "sparse", "colmap")
+    import_(tmp_path / "sparse", set_size=True, made=made)
+    blocks, (empty,) = imported("sparse"), [block for block in bpy.data.objects if block.type == "EMPTY"]
+    assert empty.name == "sparse World" and all(block.parent == empty for block in blocks)
+    empty.scale, empty.rotation_euler = (2, 2, 2), (0, 0, math.pi / 2)
+    bpy.context.view_layer.update()
+    for i, camera in enumerate(around(3)):
+        scene.frame_set(1 + i * (made == "FLIGHT"))
+        eye, found = camera.pinhole.eye, cameras.read(blocks[i * (made == "EACH")], scene)
+        assert found.eye == pytest.approx((-2 * eye[1], 2 * eye[0], 2 * eye[2]), abs=1e-5)
+        assert found.distance == pytest.approx(camera.pinhole.distance, rel=2.0**-20)
 
 
 def test_without_being_asked_the_scene_keeps_size_and_camera_and_is_told_what_differs(camera_object, scene, tmp_path, capfd):
@@ -87,7 +107,7 @@ def test_pictures_are_backgrounds_where_they_are_found_and_told_where_not(scene,
     for i in (0, 2):
         write_picture(tmp_path / "images" / f"view_{i:03}.png")
     import_(tmp_path / "sparse" / "0")
-    image_names = [[each.image.name for each in block.data.background_images] for block in bpy.data.collections["0"].objects]
+    image_names = [[each.image.name for each in block.data.background_images] for block in imported("0")]
     assert image_names == [["view_000.png"], [], ["view_002.png"]]
     assert "1 of 3 pictures were not found" in capfd.readouterr().out
 
@@ -143,7 +163,7 @@ def trajectory(tmp_path):
 def test_a_trajectory_is_one_camera_that_flies_at_its_times(scene, trajectory):
     scene.render.fps = 24
     import_(trajectory, distance=700)
-    (block,) = bpy.data.collections["flight"].objects
+    (block,) = imported("flight")
     frame = (scene.render.resolution_x, scene.render.resolution_y)
     plane = formats.camera.ViewPlane((700, 700), (frame[0] / 2, frame[1] / 2), *frame)
     for at, wanted in zip((1, 13, 49), formats.read(trajectory, options=Options(view_plane=plane)), strict=True):
@@ -157,7 +177,7 @@ def test_a_trajectory_is_one_camera_that_flies_at_its_times(scene, trajectory):
 def test_a_trajectory_without_a_lens_sees_as_the_scenes_camera_or_asks(posed_camera, scene, trajectory, capfd):
     import_(trajectory)
     assert "it sees as Camera" in capfd.readouterr().out
-    (block,) = bpy.data.collections["flight"].objects
+    (block,) = imported("flight")
     assert cameras.read(block, scene).distance == pytest.approx((1500, 1500), rel=2.0**-22)
     bpy.data.objects.remove(posed_camera)
     bpy.data.objects.remove(block)
@@ -204,7 +224,7 @@ def test_what_is_exported_is_imported_as_the_same_cameras(scene, add_camera, tmp
     assert bpy.ops.viewcam.export_cameras(filepath=str(path), format=format, axes="y_up", scale=0.01) == {"FINISHED"}
     (written,) = tmp_path.iterdir()
     import_(written, axes="y_up", scale=0.01)
-    objects = [each for each in bpy.data.objects if each not in before]
+    objects = [each for each in bpy.data.objects if each not in before and each.type == "CAMERA"]
     assert len(objects) == len(cameras_around)
     for block, camera in zip(objects, cameras_around, strict=True):
         assert_same(cameras.read(block, scene), camera.pinhole)

@@ -1,5 +1,8 @@
 """Other programs' cameras (cameras/) as Blender's, in a collection of their own: one object each, or one that flies.
 
+Several cameras, and one that flies, are children of an empty at the world's origin, by which all of their world is turned and
+scaled by hand.
+
 All of it or nothing: whatever has been made and set is taken back if anything fails. What the artist has set stays, unless
 asked: the scene's camera if it has one, and its size, into which each camera is fitted (picture.py).
 
@@ -75,11 +78,14 @@ class _CameraImport:
         self._collection = bpy.data.collections.new(name)
         overrides.afterwards(bpy.data.batch_remove, [self._collection])
         scene.collection.children.link(self._collection)
+        self._world: bpy.types.Object | None = None
 
     def run(self, cameras: Sequence[Camera], folder: Path | None, set_size: bool, as_flight: bool) -> ImportedCameras:
         if set_size:
             picture.set_size(self._overrides, self._scene, cameras[0].pinhole)
         self._note(note for camera in cameras for note in camera.notes)
+        if len(cameras) > 1:
+            self._world = self._linked(f"{self._name} World", None)
         if as_flight:
             objects = (self._new(self._name),)
             self._fly(objects[0], cameras)
@@ -105,6 +111,11 @@ class _CameraImport:
     def _new(self, name: str) -> bpy.types.Object:
         data = bpy.data.cameras.new(name)
         self._overrides.afterwards(bpy.data.batch_remove, [data])
+        block = self._linked(name, data)
+        block.parent = self._world
+        return block
+
+    def _linked(self, name: str, data: bpy.types.Camera | None) -> bpy.types.Object:
         block = bpy.data.objects.new(name, data)
         self._overrides.afterwards(bpy.data.batch_remove, [block])
         self._collection.objects.link(block)
