@@ -456,7 +456,7 @@ def nerfstudio_path(*known, fov=None):
     return {"camera_type": "perspective", "render_width": known[0].width, "render_height": known[0].height, "camera_path": path}
 
 
-@pytest.mark.parametrize("name", CENTRED)
+@pytest.mark.parametrize("name", CENTERED)
 def test_nerfstudios_path_has_the_degrees_of_the_height(name):
     known = Known(name)
     wide = 1 + known.f_y / known.height  # of a telephoto's angle less is kept
@@ -465,10 +465,10 @@ def test_nerfstudios_path_has_the_degrees_of_the_height(name):
 
 
 def test_nerfstudios_world_is_undone_by_the_file_beside_the_path(tmp_path):
-    known = Known(CENTRED[0])
+    known = Known(CENTERED[0])
     turn = pytest.importorskip("scipy.spatial.transform").Rotation.from_rotvec([0.3, -1.2, 0.7]).as_matrix()
     moved, scale = np.array([0.2, -0.5, 1.1]), 0.37
-    there = Known(CENTRED[0])
+    there = Known(CENTERED[0])
     there.opengl = np.column_stack([turn @ known.opengl[:, :3], scale * (turn @ known.e + moved)])
     (tmp_path / "path.json").write_text(json.dumps(nerfstudio_path(there)))
     world = {"transform": np.column_stack([turn, moved]).tolist(), "scale": scale}
@@ -479,7 +479,7 @@ def test_nerfstudios_world_is_undone_by_the_file_beside_the_path(tmp_path):
 
 
 def test_a_path_flies_at_its_frames_a_second_and_other_cameras_are_refused():
-    known = Known(CENTRED[0])
+    known = Known(CENTERED[0])
     read = cameras.read(json.dumps(nerfstudio_path(known, known, known) | {"fps": 10}))
     assert [camera.time for camera in read] == [0, 0.1, 0.2]
     with pytest.raises(InputError, match="equirectangular"):
