@@ -19,7 +19,7 @@ from .conftest import CAMERAS, allowed, picture_error, points_before
 pytestmark = pytest.mark.usefixtures("only_numbers")
 
 SQUARE = [name for name, each in CAMERAS.items() if each.distance[0] == each.distance[1] and not each.mirrored]
-CENTERD = [name for name in SQUARE if CAMERAS[name].principal_point == (CAMERAS[name].width / 2, CAMERAS[name].height / 2)]
+CENTERED = [name for name in SQUARE if CAMERAS[name].principal_point == (CAMERAS[name].width / 2, CAMERAS[name].height / 2)]
 
 
 def called(text):
@@ -64,7 +64,7 @@ def test_a_principal_point_upside_down_would_be_seen():
     assert picture_error(pinhole, *seen_by_vtk(broken, points), points) > 1
 
 
-@pytest.mark.parametrize("name", CENTERD)
+@pytest.mark.parametrize("name", CENTERED)
 def test_a_textbooks_ray_tracer_shoots_the_pinholes_rays(name):
     """direction = x u + y v − d w of the middle of pixels of the size 1."""
     pinhole = CAMERAS[name]
@@ -84,7 +84,7 @@ def test_a_textbooks_ray_tracer_shoots_the_pinholes_rays(name):
 @pytest.mark.parametrize("name", [*CAMERAS])
 def test_read_back_it_is_the_same_camera_or_it_was_refused(form, name):
     pinhole = CAMERAS[name]
-    if name not in (SQUARE if form == "vtk" else CENTERD):
+    if name not in (SQUARE if form == "vtk" else CENTERED):
         with pytest.raises(InputError, match=r"mirrored|shifted|square"):
             cameras.write([Camera(name, pinhole)], form)
         return

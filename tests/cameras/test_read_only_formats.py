@@ -16,7 +16,7 @@ from .conftest import CAMERAS, allowed, picture_error, points_before
 
 UNMIRRORED = [name for name, pinhole in CAMERAS.items() if not pinhole.mirrored]
 ONE_FOCAL = [name for name in UNMIRRORED if CAMERAS[name].distance[0] == CAMERAS[name].distance[1]]
-CENTERD = [name for name in ONE_FOCAL if CAMERAS[name].principal_point == (CAMERAS[name].width / 2, CAMERAS[name].height / 2)]
+CENTERED = [name for name in ONE_FOCAL if CAMERAS[name].principal_point == (CAMERAS[name].width / 2, CAMERAS[name].height / 2)]
 
 
 class Known:
@@ -264,7 +264,7 @@ def test_openmvg_names_a_type_once_and_numbers_it_then(name):
         cameras.read(json.dumps(sfm))
 
 
-@pytest.mark.parametrize("name", CENTERD)
+@pytest.mark.parametrize("name", CENTERED)
 def test_bundler_looks_along_minus_z(name):
     known = Known(name)
     turn = np.array([known.u, known.v, known.w])
@@ -274,7 +274,7 @@ def test_bundler_looks_along_minus_z(name):
     assert not read.size_stated and any("1 cameras that were not placed" in note for note in read.notes)
 
 
-@pytest.mark.parametrize("name", CENTERD)
+@pytest.mark.parametrize("name", CENTERED)
 def test_llff_has_its_axes_down_right_and_backwards(tmp_path, name):
     known = Known(name)
     matrix = np.column_stack([-known.v, known.u, known.w, known.e, [known.height, known.width, known.f_x]])
@@ -426,7 +426,7 @@ def test_polycams_pictures_are_named_from_whichever_folder_is_given(tmp_path):
     assert cameras.read(tmp_path / "frame_00001.json")[0].image == "frame_00001.jpg"
 
 
-@pytest.mark.parametrize("name", CENTERD)
+@pytest.mark.parametrize("name", CENTERED)
 def test_gaussian_splatting_lists_camera_to_world(name):
     known = Known(name)
     values = {"id": 0, "img_name": "00001", "width": known.width, "height": known.height, "fx": known.f_x, "fy": known.f_y}
