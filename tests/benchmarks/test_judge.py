@@ -1,11 +1,15 @@
 """The chart of the judge: its faults are faults, and what a good renderer makes is not one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks.judge import detection, faults
+from benchmarks.judge import detection, faults, rivals
+from viewcam_addon.comparison import radiance, sequential
+from viewcam_addon.image import Image
 
 
 @pytest.fixture(scope="module")
@@ -50,3 +54,43 @@ def test_alarms_that_come_together_are_counted():
     assert detection.together(scores.ravel() + np.arange(4 * side**2), 0.01) == 0.0
     scores[1, 2] = 1.0  # one picture against all references
     assert detection.together(scores.ravel(), 0.05) == 0.5
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("family", ["light", "picture", "none"])
+def test_a_search_for_half_a_percent_finds_what_a_thousand_samples_find_and_takes_a_quarter_of_them(family):
+    """All but one of the faults of light, and of the picture; geometry is compared without samples."""
+    bench, is_missed = detection.Bench(), "the sun is a fifth wider"
+    right = [None] * 3
+    asked = right if family == "none" else [fault for fault in faults.FAULTS if fault.family == family]
+    took = {}
+    for number, fault in enumerate(asked):
+        found = _searched(bench, fault, 1000 * (1 + number))
+        expected = fault is None or fault.name == is_missed
+        assert found.passed == expected, (fault, found.sentence)
+        took[number] = found.search.samples
+        assert took[number] <= 256, (fault, took[number])
+    if family != "none":
+        assert np.median(list(took.values())) == 16
+
+
+def _searched(bench, fault, seed):
+    """The comparison in rounds of the room with a fault with the room."""
+    rounds, before = sequential.Rounds(), 0
+    tracer = bench.faulty[fault] if fault else bench.tracer
+    for number, total in enumerate(sequential.TOTALS):
+        samples, before = total - before, total
+        reference = Image(bench.tracer.render_light("path", samples, seed + number), bench.camera, {"samples": str(samples)})
+        tests = []
+        for i in range(8):
+            passes = tracer.render_light("path", samples // 8, 10**6 + seed + 8 * number + i)
+            if fault and fault.of_picture:
+                fault.of_picture(passes, np.random.default_rng(seed))  # the same place in all of them
+            tests.append(rivals.without_the_tracers_own(Image(passes, attributes={"samples": str(samples // 8)})))
+        rounds.add(samples, reference, tests, None)
+        shown = rounds.reference, rounds.tests, bench.camera, rounds.samples // 8, None
+        comparison = radiance.compare(*shown, sequential.FALSE_ALARMS_OF_EACH)
+        search = sequential.search(comparison, 0.005, rounds)
+        if search.is_decided:
+            return replace(comparison, search=search)
+    raise AssertionError("unreachable: the last round decides")

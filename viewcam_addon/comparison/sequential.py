@@ -1,14 +1,14 @@
 """A group sequential test: light compared in rounds of samples, until a bias of a wanted size would have been found.
 
-Each round doubles the samples on both sides: 16, 32, 64, … 65,536 a pixel, each with seeds of its own, and its pictures are
-added to those of the rounds before, so that nothing is thrown away. After each, all hypothesis tests are made. Pictures that
-differ end it. The others are the same as soon as the test of all of Combined would have found a picture that is off by
-the wanted share everywhere, with the probability hypothesis_tests.POWER. In the whole most noise cancels; so there are some
-samples at least, for what is wrong in a few pixels alone. Where so few pixels have light that their sum tells nothing, the tile
-or pixel that tells most decides.
+Each round adds samples on both sides, with seeds of its own, to those of the rounds before, so that nothing is thrown away: 16,
+64 and 256 a pixel after the first three, where a round costs more than its samples, and then twice as many after each, up to
+65,536. All hypothesis tests are made after each. Pictures that differ end it. The others are the same as soon as the test of
+all of Combined would have found a picture that is off by the wanted share everywhere, with the probability
+hypothesis_tests.POWER. In the whole most noise cancels; so there are some samples at least, for what is wrong in a few pixels
+alone. Where so few pixels have light that their sum tells nothing, the tile or pixel that tells most decides.
 
-Who looks thirteen times has thirteen chances of a false alarm. The false alarms that are promised are spent over the looks
-(Lan and DeMets, Discrete sequential boundaries for clinical trials, Biometrika 70, 1983), a thirteenth on each. That their sum
+Who looks eleven times has eleven chances of a false alarm. The false alarms that are promised are spent over the looks
+(Lan and DeMets, Discrete sequential boundaries for clinical trials, Biometrika 70, 1983), an eleventh on each. That their sum
 is an upper bound is Boole's inequality, which holds however the looks depend on one another, whatever the noise is, and
 whichever of them is the last; to stop with *the same* can raise no alarm.
 
@@ -29,14 +29,14 @@ from ..image import Image
 from .hypothesis_tests import BLOCKS, WHOLE
 from .light_verdict import FALSE_ALARMS, RadianceComparison, Search
 
-TOTALS = tuple(16 * 2**doubled for doubled in range(13))
+TOTALS = (16, 64, *(256 * 2**doubled for doubled in range(9)))
 """Samples of a pixel after each round, of each side."""
 
 FALSE_ALARMS_OF_EACH = FALSE_ALARMS / len(TOTALS)
 """The probability of a false alarm that each look may spend."""
 
 # Samples at least, for noise to show at all: what a check takes by default.
-_FEWEST_OF_ALL = TOTALS[2]
+_FEWEST_OF_ALL = TOTALS[1]
 # Samples at least, times the bias. Calibrated in the judge's room (benchmarks/judge): with 256 for 0.5 % as many of its sixty
 # faults are found as with 1,024; a block of 8 × 8 pixels that is 5 % brighter is the last of them.
 _FEWEST = 1.28

@@ -250,7 +250,7 @@ def test_a_search_for_a_bias_tells_how_much_longer_it_takes(stand_in):
         assert comparison.progress() == (1 / 4, "Rendering with Cycles, 1 of 8, about 42 s more")
         said.write('{"event": "step", "name": "rendering", "number": 6, "of": 8}\n')
         said.flush()
-        assert comparison.progress() == (1.5 / 4, "Rendering with Cycles, 6 of 8, about 42 s more")
+        assert comparison.progress() == ((64 + 192 / 2) / 256, "Rendering with Cycles, 6 of 8, about 42 s more")
     comparison.cancel()
 
 

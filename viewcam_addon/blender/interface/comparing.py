@@ -24,6 +24,7 @@ import bpy
 
 from ... import child_process
 from ...comparison.answer import DIFFERENT, SAME_BUT, but_for
+from ...comparison.sequential import TOTALS
 from ...comparison.statistics import plain
 from ...errors import InputError
 from ...files import written_whole
@@ -159,8 +160,9 @@ class RunningComparison:
                 taken, expected = event["taken"], event["samples"]
                 left, done = f", about {event['seconds']:.0f} s more", 0
         share = (done + (traced if words == "Tracing" else 0)) / (self._pictures + 2)
-        if taken:  # a round has as many samples as all before it
-            share = min((1 + share) * taken / expected, 1.0)
+        if taken:
+            after = next(total for total in TOTALS if total > taken)
+            share = (taken + share * (after - taken)) / expected
         return share, words + left
 
     @property
