@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewcam_addon import cameras, image
+from viewcam_addon import api, cameras, image
 from viewcam_addon.cli import main
 from viewcam_addon.commands.demo import SCENE as DEMO_SCENE
+from viewcam_addon.errors import InputError
 from viewcam_addon.jobs.folder import Folder
 from viewcam_addon.pinhole import Pinhole
 
@@ -129,6 +130,50 @@ def test_a_picture_of_nothing_is_no_answer_and_says_what_to_look_for(tmp_path, c
     line = fails(capfd, "compare", picture, picture, "--scene", scene, "--report", tmp_path / "report")
     assert "Nothing to compare" in line and all(word in line for word in ("frame", "view layer", "clipping")), line
     assert not (tmp_path / "report").exists()
+
+
+def test_a_picture_whose_light_is_all_a_renderers_choice_is_no_answer_in_shell_json_junit_and_python(tmp_path, capfd):
+    """A room that is lit by a lamp in the plane of its ceiling alone; a renderer to which the ceiling hides half of that."""
+
+    def room(power):
+        square = {"type": "plane", "edges": [[6, 0, 0], [0, 6, 0]]}
+        geometries = {"floor": {**square, "corner": [-3, -3, -1]}, "ceiling": {**square, "corner": [-3, -3, 1]}}
+        lamp = {
+            "type": "area",
+            "name": "Lamp",
+            "location": [0, 0, 1],
+            "size": [1, 1],
+            "power": [power] * 3,
+            "hidden_from": ["camera"],
+        }
+        objects = [{"name": name.capitalize(), "geometry": name, "materials": ["matte"]} for name in geometries]
+        changes = {
+            "geometries": geometries,
+            "objects": objects,
+            "lamps": [lamp],
+            "materials": {"matte": {"diffuse": [0.6] * 3}},
+        }
+        return write_scene(tmp_path, **changes)
+
+    def traced(name, seed):
+        words = ["--level", "direct", "--samples", "16", "--seed", str(seed)]
+        assert main(["render", str(scene), str(tmp_path / name), *words]) == 0
+        return str(tmp_path / name)
+
+    scene = room(50)
+    others = [traced(f"{seed}.exr", seed) for seed in (2, 3)]
+    scene = room(100)
+    sides = [traced("reference.exr", 1), *others]
+    capfd.readouterr()
+    report, result, junit = (tmp_path / name for name in ("report", "out.json", "out.xml"))
+    line = fails(capfd, "compare", *sides, "--scene", scene, "--report", report, "--json", result, "--junit", junit)
+    assert "Nothing to compare: 100 % of the pixels with light" in line and "('Ceiling' and 'Lamp')" in line, line
+    told = json.loads(result.read_text())
+    assert told["exit_status"] == 2 and "Nothing to compare" in told["error"], told
+    assert "<error" in junit.read_text(encoding="utf-8") and "Nothing to compare" in junit.read_text(encoding="utf-8")
+    assert not report.exists()
+    with pytest.raises(InputError, match="Nothing to compare"):
+        api.compare(sides[0], sides[1:], scene)
 
 
 def test_the_size_and_the_stated_camera_can_be_chosen(tmp_path, capfd):

@@ -28,6 +28,9 @@ if TYPE_CHECKING:  # each function imports what no other needs: a picture is tra
 
 File = str | os.PathLike[str]
 
+# From a picture's seed to those of what is traced again beside it: beyond the seeds of all rounds of a search for a bias.
+_OTHER_SEEDS = 1000
+
 
 def read_scene(path: File) -> Scene:
     """A scene file, as docs/scene-file.md has it and `viewcam export` writes it.
@@ -126,23 +129,24 @@ def compare(
     test_samples : of each test picture, where that is not what its file tells. renderer : who made it, one of
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
     enough. everything : Cycles' picture with all that the scene's ledger says is not modeled, of the first test's seed; it
-    tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object are
-    different, and no error. false_alarms : of light, how often the same is called different at most; one in a hundred
-    by default.
+    tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object, or
+    whose light is all a renderer's choice, are different, and no error. false_alarms : of light, how often the same is called
+    different at most; one in a hundred by default.
 
     Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
     Raises
     ------
     InputError
-        if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, or no pixel of
-        either picture shows an object.
+        if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, no pixel of
+        either picture shows an object, or nearly all pixels with light had to be taken out.
     """
     from .comparison import geometry, radiance, renderers
     from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
     from .comparison.coincident import CoincidentLight
     from .comparison.everything import not_modelled
     from .comparison.light_verdict import FALSE_ALARMS
+    from .comparison.sides import samples_of, seed_of
     from .comparison.tolerances import ROUNDINGS
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
@@ -161,15 +165,24 @@ def compare(
     if radiance.carries_light(of):
         alarms = false_alarms or FALSE_ALARMS
         if framed is None:
-            return radiance.compare(of, pictures, camera, test_samples, None, alarms)
+            return radiance.compare(of, pictures, camera, test_samples, false_alarms=alarms)
         makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(framed, threads))
+        level, samples, seed = of.attributes.get("level", "path"), samples_of(of) or 0, seed_of(of)
 
         def coincident() -> CoincidentLight:
-            level = of.attributes.get("level", "path")
-            light, pairs, seen_otherwise = makes_tracer().coincident_light(level, SAMPLES_OF_COINCIDENT, 0, ROUNDINGS[-1])
-            return CoincidentLight(Image(light), pairs, seen_otherwise)
+            spent = (level, SAMPLES_OF_COINCIDENT, seed + _OTHER_SEEDS)
+            light, pairs, seen_otherwise = makes_tracer().coincident_light(*spent, ROUNDINGS[-1])
+            total = makes_tracer().render_light(*spent)["Combined"][..., :3]
+            return CoincidentLight(Image(light), total, pairs, seen_otherwise)
 
-        lit = replace(radiance.compare(of, pictures, camera, test_samples, coincident, alarms), stated=stated)
+        def anew() -> list[Image]:
+            others = (seed + _OTHER_SEEDS + 1 + number for number in range(radiance.SEEDS))
+            return [Image(makes_tracer().render_light(level, samples, other), camera, of.attributes) for other in others]
+
+        trace_anew = anew if 0 < samples <= MOST_SAMPLES and "Sample Count" not in of.passes else None
+        lit = radiance.compare(of, pictures, camera, test_samples, coincident, trace_anew, alarms)
+        lit = replace(lit, stated=stated)
+        _check_not_empty(lit, may_be_empty)
         names = tuple(dict.fromkeys((*framed.not_modelled, *lit.taken_out.names)))
         if not names:
             return lit
@@ -191,6 +204,10 @@ def compare(
         comparison = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, framed.origin, by, partial)
         names = framed.not_modelled
         comparison = replace(comparison, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
-    if comparison.shows_nothing and not may_be_empty:
-        raise InputError(comparison.sentence)
+    _check_not_empty(comparison, may_be_empty)
     return comparison
+
+
+def _check_not_empty(comparison: "GeometryComparison | RadianceComparison", may_be_empty: bool) -> None:
+    if comparison.is_empty and not may_be_empty:
+        raise InputError(comparison.sentence)

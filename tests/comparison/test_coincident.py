@@ -60,7 +60,7 @@ def tracer():
 @pytest.fixture(scope="module")
 def coincident(tracer):
     light, pairs, _ = tracer.coincident_light("path", SAMPLES, 0, ROUNDINGS[-1])
-    return CoincidentLight(Image(light), pairs)
+    return CoincidentLight(Image(light), tracer.render_light("path", SAMPLES, 1)["Combined"][..., :3], pairs)
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,28 @@ def test_nothing_is_taken_out_where_no_two_surfaces_are_in_one_place(honest):
     light, pairs, _ = tracer.coincident_light("path", SAMPLES, 0, ROUNDINGS[-1])
     assert not pairs and not light["Combined"][..., :3].any()
     reference = Image(tracer.render_light("path", 256, 0), CAMERA, {"samples": "256"})
-    assert not radiance.compare(reference, honest, CAMERA, make_coincident=lambda: CoincidentLight(Image(light), pairs)).passed
+    nowhere = CoincidentLight(Image(light), reference["Combined"][..., :3], pairs)
+    assert not radiance.compare(reference, honest, CAMERA, make_coincident=lambda: nowhere).passed
+
+
+@pytest.fixture(scope="module")
+def chosen_nearly_everywhere(reference, coincident):
+    """The same, but that all light of the columns from the third on is a renderer's choice."""
+    passes = {name: values.copy() for name, values in coincident.light.passes.items()}
+    passes["Combined"][:, 2:, :3] = reference["Combined"][:, 2:, :3] + 1e-3
+    return replace(coincident, light=Image(passes))
+
+
+def test_where_nearly_all_is_taken_out_there_is_no_answer_and_the_rest_may_still_differ(
+    reference, honest, chosen_nearly_everywhere
+):
+    found = radiance.compare(reference, honest, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
+    assert found.is_empty and not found.passed
+    assert found.sentence.startswith("Nothing to compare: 9"), found.sentence
+    assert all(words in found.sentence for words in ("'Carpet' and 'Floor'", "move one of two", "level geometry"))
+    dark = [replace(image, passes={**image.passes, "Combined": 0.5 * image["Combined"]}) for image in honest]
+    found = radiance.compare(reference, dark, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
+    assert not found.is_empty and found.sentence.startswith("Different here"), found.sentence
 
 
 FAULTS = {

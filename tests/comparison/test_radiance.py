@@ -36,6 +36,42 @@ def both(truth=TRUTH, seed=0):
     return picture(rng, SAMPLES), tests
 
 
+def with_rare_light(rng):
+    """A picture that has four fifths of its light from one of 640 samples, and of whose noise it tells what it has met."""
+    hits, steady = (
+        rng.binomial(SAMPLES, 1 / 640, (HEIGHT, WIDTH, 1)) / SAMPLES,
+        rng.gamma(SAMPLES, 1 / SAMPLES, (HEIGHT, WIDTH, 1)),
+    )
+    variance = (0.2**2 + (0.8 * 640) ** 2 * hits * (1 - hits)) / SAMPLES
+    image = picture(rng, SAMPLES, Variance=variance * np.ones(3))
+    image.passes["Combined"][..., :3] = 0.2 * steady + 0.8 * 640 * hits
+    return image
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_rare_light_that_the_reference_has_missed_is_no_difference_and_hides_none(seed):
+    """In one pixel of forty neither it nor any beside it has met that light: there it looks dark and quiet."""
+
+    def compared(factor, anew=True):
+        rng = np.random.default_rng(seed)
+        tests = [picture(rng, 50, np.full_like(TRUTH, factor), "cycles.ViewLayer.samples") for _ in range(SEEDS)]
+        made = [with_rare_light(rng) for _ in range(1 + radiance.SEEDS)]
+        return radiance.compare(made[0], tests, PINHOLE, trace_anew=(lambda: made[1:]) if anew else None)
+
+    assert not compared(1.0, anew=False).passed, "else the test proves nothing"
+    found = compared(1.0)
+    assert found.passed and found.samples[0] == SAMPLES * radiance.SEEDS, "\n".join(found.lines())
+    assert not compared(1.1).passed
+
+
+def test_what_differs_beyond_doubt_is_not_traced_anew():
+    def never():
+        raise AssertionError("nobody has to ask")
+
+    assert not radiance.compare(*both(1.2 * TRUTH), PINHOLE, trace_anew=never).passed
+    assert radiance.compare(*both(), PINHOLE, trace_anew=never).passed
+
+
 @pytest.fixture(scope="module")
 def same():
     return radiance.compare(*both(), PINHOLE)

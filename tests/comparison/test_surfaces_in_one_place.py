@@ -10,7 +10,7 @@ from viewcam_addon.comparison.geometry import compare
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import Tracer
-from viewcam_addon.tracer.scene import Mesh, Object, Scene
+from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
 
 # What moves each ray of the renderer on paper, in roundings: as in conftest.py.
 ROUNDINGS_OF_A_RENDERER = 0.35
@@ -201,6 +201,33 @@ def test_sabotage_is_found_amid_surfaces_in_one_place(tracer, reference, fault):
     test = FAULTS[fault](tracer, rendered(tracer))
     comparison = compared(reference, test, tracer)
     assert not comparison.passed, f"{fault} was not found:\n" + "\n".join(comparison.lines())
+
+
+WRONG_NORMALS = {
+    "flipped": lambda n: -n,
+    "of other axes": lambda n: n[..., [1, 2, 0]],
+    "turned by 5°": lambda n: n + np.float32(0.0873) * np.cross(n, np.float32([0.6, 0.0, 0.8])).astype(np.float32),
+}
+
+
+@pytest.mark.parametrize("fault", WRONG_NORMALS)
+def test_each_wrong_normal_amid_thousands_of_spheres_of_a_pixel_is_found(fault):
+    random = np.random.default_rng(4)
+    count, scene = 4000, a_scene()
+    centers = random.uniform((-1.6, -1.6, 0.02), (1.6, 1.6, 0.8), (count, 3))
+    balls = Spheres(centers, random.uniform(0.004, 0.02, count), np.zeros(count, np.int32))
+    objects = (*scene.objects, Object("Balls", "balls", np.eye(4), 5, (16,)))
+    tracer = Tracer(replace(scene, geometries={**scene.geometries, "balls": balls}, objects=objects), 1)
+    reference, test = Image(tracer.render()), rendered(tracer)
+    assert compared(reference, test, tracer).passed
+    is_ball = (test["Object Index"][..., 0] == 5) & (reference["Object Index"][..., 0] == 5)
+    facing = tolerances.facing(CAMERA, reference.passes)
+    rows, columns = np.nonzero(is_ball & (facing > 0.2))  # less is within the tolerance of the rim, where any normal is right
+    chosen = random.choice(len(rows), 40, replace=False)
+    found = compared(reference, harmed(test, "Normal", (rows[chosen], columns[chosen]), WRONG_NORMALS[fault]), tracer)
+    mismatches = found.mismatches
+    unexplained = {*zip(mismatches.rows[~mismatches.explained], mismatches.columns[~mismatches.explained], strict=True)}
+    assert unexplained == {*zip(rows[chosen], columns[chosen], strict=True)}, "\n".join(found.lines())
 
 
 @pytest.mark.parametrize("lift", [HAIR, -HAIR])

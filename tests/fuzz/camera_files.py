@@ -82,6 +82,14 @@ def _crate() -> bytes:
         return (Path(folder) / "a.usdc").read_bytes()
 
 
+def _with_lenses(transforms: dict) -> dict:
+    """The same with a lens of each frame's own."""
+    first, second, *_ = transforms["frames"]
+    first |= {"camera_model": "OPENCV", "k1": -0.1, "k2": 0.02, "p1": 1e-3, "p2": -5e-4}
+    second |= {"camera_model": "OPENCV_FISHEYE", "k1": 0.05, "k2": -0.01, "k3": 1e-3, "k4": -1e-4}
+    return transforms
+
+
 def _lenses() -> dict[str, str]:
     models = [
         "OPENCV 640 360 600 600 320 180 -0.1 0.02 0.001 0.002", "OPENCV_FISHEYE 640 360 300 300 320 180 0.1 0 0 0",
@@ -176,5 +184,6 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "transforms_applied": {"a.json": json.dumps(documents.documents()[1])},
         "metashape_bent": {"a.xml": published.metashape(known, "<k1>-0.01</k1>")},
         "colmap_lenses": _lenses(),
+        "transforms_lenses": {"a.json": json.dumps(_with_lenses(json.loads(_several("transforms", PLAIN, SQUARE))))},
         "opencv_fisheye": {"a.json": json.dumps({**published.K, "model": "fisheye", "dist": [0.1, -0.02, 0.005, 0]})},
     }  # fmt: skip

@@ -30,7 +30,7 @@ import numpy as np
 SECONDS = 20.0
 MEMORY = 4 * 2**30
 SMALL_SECONDS, SMALL_MEMORY = 5.0, 2**30
-"""For a file of cameras or labels; of computing, and beyond what this process has to begin with."""
+"""For a file of cameras, labels or a scene; of computing, and beyond what this process has to begin with."""
 
 LONGEST = 1500  # characters of a sentence, which may name files
 CORNERS = np.array([[x, y] for x in (-0.5, 0.0, 0.5) for y in (-0.3, 0.0, 0.3)])  # of a picture, in the plane at distance 1
@@ -512,7 +512,7 @@ CAMERAS = (
     *("record3d", "gaussian_splatting", "ros", "ros_window", "opencv", "opencv_json", "opencv_xml", "opencv_npz", "kalibr"),
     *("tum", "kitti", "euroc", "chan", "three_js", "mitsuba", "mitsuba_dictionary", "pov_ray", "pbrt", "matrices", "look_at"),
     *("vtk", "textbook", "looks", "looks_gl", "looks_vtk", "text", "text_of_people", "colmap_lenses", "opencv_fisheye"),
-    *("nerfstudio_path", "open3d", "opensfm"),
+    *("transforms_lenses", "nerfstudio_path", "open3d", "opensfm"),
 )
 """The kinds of camera_files.py, which makes them only when it is asked."""
 
@@ -527,7 +527,7 @@ def tell(stream: int, number: int, message: str) -> None:
 def main(kind: str, first: str, count: str, place: str) -> None:
     import resource
 
-    is_small = kind.startswith(("cameras-", "labels"))
+    is_small = kind.startswith(("cameras-", "labels", "scene"))
     descriptor = os.dup(1)  # Blender prints past Python
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     folder = Path(place)

@@ -1,5 +1,5 @@
-"""Files of strangers, by the thousand: each is read, or refused in a sentence, within 20 s and 4 GiB; files of cameras and
-labels within 5 s and 1 GiB.
+"""Files of strangers, by the thousand: each is read, or refused in a sentence, within 20 s and 4 GiB; files of cameras, labels
+and scenes within 5 s and 1 GiB.
 
 A few of each kind with every run, all of them with `make test-exhaustive`, and of each format of cameras MUTANTS
 (MUTANTS=850 are 40,000 of all). One that fails is made again by its number: `python tests/fuzz/targets.py KIND NUMBER 1 FOLDER

@@ -96,3 +96,11 @@ def test_escape_cancels_a_heavy_render_within_a_second(host, lit_file, tmp_path)
 def test_in_rendered_shading_the_viewport_turns_and_light_comes_when_it_rests(real_blender, lit_file, tmp_path):
     in_a_window(real_blender, "view", lit_file, tmp_path / "figures", simulated=True)
     assert json.loads((tmp_path / "figures").read_text())["pictures"] > 0
+
+
+def test_a_swipe_shows_the_reference_as_the_scene_displays_it_and_leaves_nothing(real_blender, lit_file, tmp_path):
+    in_a_window(real_blender, "swipe", lit_file, tmp_path / "figures", simulated=True)
+    figures = json.loads((tmp_path / "figures").read_text())
+    # In the mean, of 1/255: the table of the view transform, and four roundings on the way to the screen. Calibrated: 1.0 of a
+    # Cornell box at 16 samples. Right of the line stands another picture: 40 there.
+    assert figures["left"] < 2 and figures["right"] > 4 and figures["moved"] == 200, figures

@@ -49,6 +49,7 @@ _NOT_READ = ("k", "intrinsic", "intrinsics", "intrinsic_matrix", "camera_intrins
 _LENS = ("k1", "k2", "k3", "k4", "p1", "p2")  # the order of distortion_params, too
 _AXES = ("opengl", "blender", "nerf", "nerfstudio")
 _OTHER_AXES = ("from_mitsuba", "normal_mts_args", "from_na")
+_LEAST_ANGLE = 1e-9  # radians
 _SAME_FOCAL = 1e-3  # relative: what camera_angle_x and fl_x may differ by for the few digits of one
 
 
@@ -268,7 +269,7 @@ def _focal(both: Record, along: str, side: int) -> float | None:
     for key, factor in ((degrees, math.pi / 180), (radians, 1.0)):
         if key in both:
             angle = both.number(key) * factor
-            if not 0 < angle < math.pi:
+            if not _LEAST_ANGLE < angle < math.pi:
                 raise InputError(f"{key} of {both.place} is {both.get(key)}: give an angle between 0 and half a turn")
             focal[key] = side / 2 / math.tan(angle / 2)
     values = [*focal.values()]

@@ -6,7 +6,7 @@ the pixel is explained by the first ring on which some ray sees what the test pi
 
 One thing no exact ray sees: the back of a silhouette. Where a renderer's ray slips through the edge of the front face it
 meets the face behind, at the same place but with another normal and UV. So on a silhouette (the ring sees something else,
-too, or grazes the surface) the same object at the same depth is enough.
+too, or grazes the surface) the same object at the same depth is enough. That a steep surface is elsewhere on the ring is none.
 
 Where several surfaces lie in one place, which of them a ray meets is rounding's choice, and any is a right answer: its own
 object, material, normal and UV, all of the same one. In one place are those as far behind the nearest one as a ray may be off,
@@ -146,13 +146,17 @@ class SurfaceAgreement:
         ]
         return np.max(apart, axis=0, initial=0.0) if apart else np.zeros(len(self.across))
 
-    def same_place(self, expected: Seen, seen: Seen) -> NDArray[np.bool_]:
-        """(n,) bool: a hit on both sides, with equal indices and the same depth within tolerance."""
+    def same_place(self, expected: Seen, seen: Seen, aside: Array | float = 0.0) -> NDArray[np.bool_]:
+        """(n,) bool: a hit on both sides, with equal indices and the same depth within tolerance.
+
+        aside : (n,) pixels by which the rays are beside each other in any case.
+        """
         same = tolerances.is_hit(expected) & tolerances.is_hit(seen)
         for name in ("Object Index", "Material Index"):
             if name in expected and name in seen:
                 same &= expected[name][..., 0] == seen[name][..., 0]
-        return same & _within(*self.errors(expected, seen)["Depth"])
+        error, one_rounding, floor = self.errors(expected, seen)["Depth"]
+        return same & _within(error, one_rounding, floor + aside * tolerances.depth_slope(self.pinhole, expected))
 
 
 def _position_errors(agreement: SurfaceAgreement, expected: Seen, _seen: Seen) -> Errors:
@@ -360,11 +364,17 @@ def _explained_by(
     counts = in_one_place(agreement, rays, traced)
     nearest = np.searchsorted(rays, np.arange(len(each)))
     grazed = (tolerances.facing(agreement.pinhole, traced) < _RIM)[nearest].reshape(-1, _DIRECTIONS)
-    same_surface, same_place = (
+    # To the other side of a ring it is twice its radius, and the surface may bend on the way.
+    aside = 3.0 * radius[each[rays]]
+    same_surface, same_place, continues = (
         np.logical_or.reduceat(same & counts, nearest).reshape(-1, _DIRECTIONS)
-        for same in (here.same_surface(traced, rendered), here.same_place(traced, rendered))
+        for same in (
+            here.same_surface(traced, rendered),
+            here.same_place(traced, rendered),
+            here.same_place(traced, rendered, aside),
+        )
     )
-    on_silhouette = grazed.any(axis=1) | ~same_place.all(axis=1)
+    on_silhouette = grazed.any(axis=1) | ~continues.all(axis=1)
     return same_surface.any(axis=1) | (same_place.any(axis=1) & on_silhouette)
 
 

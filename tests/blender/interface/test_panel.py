@@ -25,6 +25,7 @@ from viewcam_addon.blender.interface import (
     readouts,
     render_panels,
     scene_cameras,
+    swipe,
     view_menu,
 )
 from viewcam_addon.image import SETTINGS
@@ -407,7 +408,7 @@ def test_a_camera_that_is_not_enabled_shows_its_own_values_greyed_and_one_button
     texts = [
         look.get("text", name) for kind, name, look, layout, _ in widgets if kind == "label" and not layout.is_all("active")
     ]
-    assert texts[:4] == ["Camera", "0", "-8 m", "0"], texts
+    assert texts[:2] == ["Camera", "0   -8 m   0"], texts
     assert "50 mm" in texts and "0°" in texts and not any(text.startswith("-0") for text in texts)
     offered = {name: look for kind, name, look, layout, _ in widgets if kind == "prop" and layout.is_all("active")}
     assert list(offered) == ["name", "enabled"] and offered["enabled"] == {"text": "Use", "toggle": True}
@@ -888,7 +889,7 @@ def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(regi
     layout = SimpleNamespace(operator=operator, menu=menus.append, separator=lambda: None)
     view_menu.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
     classes = (*moving.CLASSES, *operators.CLASSES, *baking.CLASSES, *clipboard.IN_MENUS, *scene_cameras.OPERATORS)
-    classes += photo_matching.OPERATORS
+    classes += (*photo_matching.OPERATORS, *swipe.CLASSES)
     assert set(entries) == {each.bl_idname for each in classes} and menus == ["VIEWCAM_MT_copy_camera_as"]
     assert "viewcam.copy_readout" not in entries, "without a text of its own, as from a menu, it would empty the clipboard"
     assert drags == ["Drag: Orbit", "Drag: Dolly", "Drag: Dolly Zoom", "Drag: Truck"]

@@ -217,4 +217,4 @@ def test_what_is_approximated_is_told_by_name():
         {"object": "Suzanne", "status": "exported", "reason": ""},
         {"object": "Hair", "status": "approximated", "reason": "curves as tubes"},
     ]
-    assert comparing.lacking(ledger) == [("Fog", "skipped: a volume"), ("Hair", "approximated: curves as tubes")]
+    assert comparing.lacking(ledger) == [("Fog", "skipped, a volume"), ("Hair", "approximated, curves as tubes")]

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from viewcam_addon import api
 from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.errors import InputError
 from viewcam_addon.image import Image
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
@@ -143,12 +144,40 @@ def test_light_past_what_not_all_rays_see_is_taken_out_and_named(lit_past_a_shee
     assert not compared(exported, "direct", brighter).passed
 
 
+@pytest.fixture
+def lit_from_the_ceiling(scene, camera, add, add_lamp, mesh_from):
+    """A floor, and a lamp exactly in the plane of a ceiling over it, both of them turned."""
+
+    def make(turned):
+        add(mesh_from("plane", size=4), "Floor", (0, 0, -1))
+        add(mesh_from("plane", size=4), "Ceiling", (0, 0, 2), rotation_euler=turned)
+        add_lamp("AREA", (0, 0, 2), turned, energy=100.0)
+        scene.render.resolution_x, scene.render.resolution_y = 96, 64
+
+    return make
+
+
+TURNED = pytest.mark.parametrize("turned", [(0, 0, 0), (0.2, 0.13, 0.4), (-0.31, 0.05, 0)])
+
+
+@TURNED
+def test_a_room_that_is_lit_from_the_plane_of_its_ceiling_alone_is_nothing_to_compare(
+    lit_from_the_ceiling, tmp_path, read_passes, turned
+):
+    lit_from_the_ceiling(turned)
+    paths = [tmp_path / f"cycles-{number}.exr" for number in range(2)]
+    exported = jobs.both_sides(Job(threads=2, level="direct", samples=64), paths)
+    tests = [Image(passes, exported.camera) for passes in read_passes(paths)]
+    with pytest.raises(InputError, match=r"^Nothing to compare: .*'Ceiling' and 'Lamp'.*move one of two"):
+        compared(exported, "direct", tests)
+
+
+@TURNED
 def test_a_lamp_exactly_in_the_plane_of_a_ceiling_is_in_one_place_with_it(
-    scene, camera, add, add_lamp, mesh_from, tmp_path, read_passes
+    lit_from_the_ceiling, add, mesh_from, tmp_path, read_passes, turned
 ):
     """A wall that glows, and that its light does not reach, is compared as ever."""
-    for name, place in (("Floor", (0, 0, -1)), ("Ceiling", (0, 0, 2))):
-        add(mesh_from("plane", size=4), name, place)
+    lit_from_the_ceiling(turned)
     glowing = mesh_from("plane", size=8)
     material = bpy.data.materials.new("Glow")
     material.use_nodes = True
@@ -157,8 +186,6 @@ def test_a_lamp_exactly_in_the_plane_of_a_ceiling_is_in_one_place_with_it(
     inputs["Specular IOR Level"].default_value, inputs["Emission Color"].default_value = 0, (1, 1, 1, 1)
     glowing.materials.append(material)
     add(glowing, "Wall", (0, 5, 0), rotation_euler=(1.57, 0, 0))
-    add_lamp("AREA", (0, 0, 2), energy=100.0)
-    scene.render.resolution_x, scene.render.resolution_y = 96, 64
     paths = [tmp_path / f"cycles-{number}.exr" for number in range(2)]
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=64), paths)
     tests = [Image(passes, exported.camera) for passes in read_passes(paths)]

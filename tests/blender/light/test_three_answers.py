@@ -7,6 +7,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 import viewcam_addon as vp
+from viewcam_addon.commands.options import ledger_lines
 
 pytestmark = pytest.mark.slow
 
@@ -115,6 +116,22 @@ def test_hair_that_is_not_seen_and_casts_a_shadow_into_the_picture_makes_it_ambe
 def test_surface_scattering_below_the_skin_is_no_matter_of_geometry(stage):
     subsurface()
     assert stage("geometry").answer == "same"
+
+
+@pytest.mark.exhaustive  # another Blender renders the world
+def test_a_world_that_varies_by_a_node_is_an_image_that_cycles_renders_which_is_green_and_said(stage):
+    world = bpy.context.scene.world = bpy.data.worlds.new("World")
+    if not world.node_tree:  # new worlds have one from 5.0 on
+        world.use_nodes = True
+    tree = world.node_tree
+    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[1], background.inputs["Color"])
+    check = stage("path", strict=True)
+    assert (check.answer, check.passed) == ("same", True), check.sentence
+    (entry,) = (entry for entry in check.figures["ledger"] if entry["object"] == "World")
+    assert entry["status"] == "exported" and "both sides show an image of it, 2048 × 1024 pixels" in entry["reason"], entry
+    (line,) = (line for line in ledger_lines(check.figures["ledger"]) if "World" in line)
+    assert line == f"  World: exported, {entry['reason']}"
 
 
 def test_strict_fails_what_is_amber_and_lets_pass_what_is_green(stage):

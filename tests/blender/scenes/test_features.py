@@ -302,7 +302,7 @@ def test_triangles_that_are_nowhere_are_left_out_and_told(monkey, both_sides):
     assert len(sides.exported.geometries["Cube"].triangles) < 12
 
 
-def test_grease_pencil_is_skipped(monkey, both_sides):
+def test_grease_pencil_is_skipped(monkey, both_sides, opengl):
     bpy.ops.object.grease_pencil_add(type="MONKEY") if bpy.app.version >= (4, 3) else bpy.ops.object.gpencil_add(type="MONKEY")
     pencil = bpy.context.object
     sides = both_sides()

@@ -90,7 +90,8 @@ def test_each_pixel_is_what_the_world_shows_in_the_middle_of_its_directions(tree
     pixels = exported.images[exported.world.image].pixels
     assert exported.world.radiance == (1, 1, 1) and exported.world.backdrop is None and not exported.lamps
     assert np.abs(pixels - directions(64) - 2).max() < 1e-6  # float32, and 3e-6 of a pixel
-    assert "an image of 64 × 32 that Cycles renders of it stands in" in reasons
+    assert "both sides show an image of it, 64 × 32 pixels, that Cycles renders" in reasons
+    assert not exported.not_modelled
 
 
 def test_a_camera_that_sees_another_world_is_shown_another_image(tree, export):

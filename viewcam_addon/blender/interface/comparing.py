@@ -288,7 +288,7 @@ def _agreement(result: dict[str, Any]) -> str:
 
 def lacking(ledger: Sequence[dict[str, str]]) -> list[tuple[str, str]]:
     """(object, sentence) of each entry of a ledger that is not modeled as it is."""
-    return [(entry["object"], f"{entry['status']}: {entry['reason']}") for entry in ledger if entry["status"] != "exported"]
+    return [(entry["object"], f"{entry['status']}, {entry['reason']}") for entry in ledger if entry["status"] != "exported"]
 
 
 def figures(result: dict[str, Any]) -> list[tuple[str, str]]:

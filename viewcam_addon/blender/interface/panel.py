@@ -70,7 +70,8 @@ def _draw_standing(layout: bpy.types.UILayout, camera_object: bpy.types.Object, 
     column = layout.column(align=True)
     column.active = False
     for label, texts in standing(camera_object, context.scene):
-        panel_rows.described(column, context, label, texts, share=0.25)
+        # One text: a long number takes the room that a short one beside it leaves.
+        panel_rows.described(column, context, label, ("   ".join(texts),), share=0.25)
     row = layout.row()
     row.enabled = camera_object.data.type == "PERSP"
     row.prop(camera_object.virtual_pinhole, "enabled", text="Use", toggle=True)

@@ -13,7 +13,7 @@ from ...comparison.answer import DIFFERENT, SAME
 from ...errors import InputError
 from .. import datablocks, preferences
 from ..render_settings import LEVELS
-from . import icons, panel_rows, proof_image
+from . import icons, panel_rows, proof_image, swipe
 from .background import Background, Cancels, StartsForCamera
 from .comparing import Outcome, RunningComparison
 from .panel_places import BelowProperties, BelowSidebar, CameraPanel
@@ -210,6 +210,7 @@ class _ProofPanel(CameraPanel):
             _draw_progress(self.layout)
         else:
             self.layout.operator("viewcam.compare_with_cycles", icon="PLAY").camera = camera_object.name
+        swipe.draw_button(self.layout)
         if background.latest:
             column = self.layout.column()
             column.active = background.running is None

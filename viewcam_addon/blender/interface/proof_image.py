@@ -10,7 +10,6 @@ Rejected: turning an area of the artist's layout into an Image Editor, and `rend
 
 import functools
 from collections.abc import Collection, Mapping
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...comparison import pictures
 from ...comparison.statistics import plain
+from ..rendering.displayed import stored
 from .comparing import Outcome
 
 NAME = "Virtual Pinhole Proof"
@@ -148,17 +148,7 @@ def _fit() -> None:
                     area.spaces.active.zoom_percentage *= max(0.5, 1 - margin)
 
 
-@functools.lru_cache(maxsize=4)
-def _pixels(path: Path) -> NDArray[np.float32]:
-    """A PNG, (height, width, 4), rows from the bottom, as it is stored."""
-    image = bpy.data.images.load(str(path))
-    try:
-        width, height = image.size
-        pixels = np.empty(width * height * 4, np.float32)
-        image.pixels.foreach_get(pixels)
-    finally:
-        bpy.data.images.remove(image)
-    return pixels.reshape(height, width, 4)
+_pixels = functools.lru_cache(maxsize=4)(stored)
 
 
 def _free_image_editor(manager: bpy.types.WindowManager) -> bpy.types.SpaceImageEditor | None:
@@ -205,11 +195,11 @@ def _draw_labels() -> None:
     swiped, width = settings.view == "SWIPE", context.space_data.image.size[0]
     for number, label in enumerate(words):
         x, y = at(number * settings.swipe if swiped else begins(number, len(words), width), 0.0, clip=False)
-        _write(label, x + _MARGIN * scale, y + _MARGIN * scale, scale)
+        write(label, x + _MARGIN * scale, y + _MARGIN * scale, scale)
         if label == _DIFFERENCE:
             _draw_legend(x + _MARGIN * scale, y - (2 * _MARGIN + 2 * _LETTERS) * scale, scale)
         elif swiped and number:
-            _fill(x - scale, y, 2 * scale, at(0.0, 1.0, clip=False)[1] - y, (1.0, 1.0, 1.0, 0.9))
+            fill(x - scale, y, 2 * scale, at(0.0, 1.0, clip=False)[1] - y, (1.0, 1.0, 1.0, 0.9))
 
 
 def _draw_legend(x: float, y: float, scale: float) -> None:
@@ -221,29 +211,30 @@ def _draw_legend(x: float, y: float, scale: float) -> None:
     width, height = (size * scale for size in _STRIP)
     x = max(_MARGIN * scale, min(x, bpy.context.region.width - width - 2 * _MARGIN * scale))  # whole, where there is room
     for number, colour in enumerate(colours):
-        _fill(x + width * number / len(colours), y, width / len(colours) + 1, height, (*colour, 1.0))
+        fill(x + width * number / len(colours), y, width / len(colours) + 1, height, (*colour, 1.0))
     signed = legend["kind"] == "signed"
     low = f"−{plain(-legend['low'])}: tracer brighter" if signed else f"{plain(legend['low'])} {legend['unit']}"
     high = f"{plain(legend['high'])}: Cycles brighter" if signed else f"{plain(legend['high'])} {legend['unit']}"
     below = y - (_LETTERS + 4) * scale
-    _write(low, x, below, scale)
-    _write(high, x + width, below, scale, before=not signed)
+    write(low, x, below, scale)
+    write(high, x + width, below, scale, before=not signed)
 
 
-def _write(text: str, x: float, y: float, scale: float, before: bool = False) -> None:
+def write(text: str, x: float, y: float, scale: float, before: bool = False) -> None:
     """A line of text that reads on any picture. before : end it there in place of beginning it."""
     import blf
 
     blf.size(0, _LETTERS * scale)
     width, height = blf.dimensions(0, text)
     x -= width if before else 0.0
-    _fill(x - 4 * scale, y - 4 * scale, width + 8 * scale, height + 8 * scale, (0.0, 0.0, 0.0, 0.6))
+    fill(x - 4 * scale, y - 4 * scale, width + 8 * scale, height + 8 * scale, (0.0, 0.0, 0.0, 0.6))
     blf.color(0, 1.0, 1.0, 1.0, 1.0)
     blf.position(0, x, y, 0)
     blf.draw(0, text)
 
 
-def _fill(x: float, y: float, width: float, height: float, colour: tuple[float, ...]) -> None:
+def fill(x: float, y: float, width: float, height: float, colour: tuple[float, ...]) -> None:
+    """A rectangle in the pixels of what is drawn."""
     import gpu
     from gpu_extras.batch import batch_for_shader
 

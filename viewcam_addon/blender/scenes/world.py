@@ -73,7 +73,11 @@ def world_of(
 def _rendered(
     scene: bpy.types.Scene, world: bpy.types.World, reasons: list[str], ledger: Ledger, render: bool
 ) -> world_image.Rendered | None:
-    """The image that stands in for a world that is not modeled, or None where a constant one must."""
+    """The image of a world that is no node of ours, which Cycles renders and both sides show; None where a constant one must
+    stand in.
+
+    Only a sun is another thing then than in the world: its disc shines evenly.
+    """
     obstacle = world_image.obstacle(world)
     result = None
     if obstacle is None:
@@ -84,11 +88,11 @@ def _rendered(
             ledger.note(world.name, "approximated", f"the world {reason}, and a constant one stands in")
         return None
     width = world_image.width(world)
-    image = f"an image of {width} × {width // 2} that Cycles renders of it stands in"
+    image = f"both sides show an image of it, {width} × {width // 2} pixels, that Cycles renders"
     if result.suns:
-        image += ", with lamps that shine evenly for its suns"
+        image += ", and lamps that shine evenly for its suns"
     for reason in reasons:
-        ledger.note(world.name, "approximated", f"the world {reason}, and {image}")
+        ledger.note(world.name, "approximated" if result.suns else "exported", f"the world {reason}: {image}")
     if world_image.tells_rays_apart(world):
         ledger.note(
             world.name, "approximated", "the world tells kinds of rays apart, and all but the camera's see what diffuse ones do"
@@ -97,7 +101,8 @@ def _rendered(
     if scene.render.film_transparent:
         hidden |= {"camera"}
     result = replace(result, suns=tuple(replace(sun, hidden_from=sun.hidden_from | hidden) for sun in result.suns))
-    ledger.call_for_cycles(world.original, world_image.show, scene.original, result)
+    is_another = bool(result.suns) or world_image.tells_rays_apart(world)
+    ledger.call_for_cycles(world.original, world_image.show, scene.original, result, stands_in=is_another)
     return result
 
 
