@@ -39,7 +39,7 @@ def several(names: Sequence[str]) -> str:
     return ", ".join(names[:_MOST_NAMED]) + (f" and {rest:,} more" if rest > 0 else "")
 
 
-def told(error: Exception) -> str:
+def message_of(error: Exception) -> str:
     """The message of any error for a user, in one sentence or, of a list of shots, in a list of them."""
     return str(error) if isinstance(error, InputError) else bug(error)
 

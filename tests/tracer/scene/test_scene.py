@@ -89,11 +89,11 @@ def scene(make_scene, make_mesh):
     """scene(material, field=value, …) → a Scene of one triangle of this material, "object 1"."""
 
     def build(material=None, **changes):
-        made = make_scene(Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 4, 4), make_mesh(np.eye(3), [[0, 1, 2]]))
+        scene = make_scene(Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 4, 4), make_mesh(np.eye(3), [[0, 1, 2]]))
         if material:
-            placed = replace(made.objects[0], materials=("M",))
-            made = replace(made, objects=(placed,), materials={"M": material})
-        return replace(made, **changes)
+            placed = replace(scene.objects[0], materials=("M",))
+            scene = replace(scene, objects=(placed,), materials={"M": material})
+        return replace(scene, **changes)
 
     return build
 
@@ -157,8 +157,8 @@ def test_glass_that_only_reflects_needs_paths(scene):
 
 
 def test_materials_that_nothing_shows_do_not_count(scene):
-    made = scene(sum_of(emission=WHITE))
-    unused = replace(made, materials=made.materials | {"Mirror": sum_of(mirror=WHITE)})
+    material = scene(sum_of(emission=WHITE))
+    unused = replace(material, materials=material.materials | {"Mirror": sum_of(mirror=WHITE)})
     assert least_level(unused)[0] == "direct"
 
 
@@ -179,9 +179,9 @@ def mixed(factor, first, second):
 
 
 @given(st.dictionaries(st.sampled_from(["diffuse", "emission", "mirror", "glass", "refraction"]), COLOURS))
-def test_the_components_of_what_a_material_adds_up_are_its_own(given):
-    material = sum_of(**given, ior=1.3)
-    tree = added(*(closure.node for closure in reversed(material.closures))) if given else None
+def test_the_components_of_what_a_material_adds_up_are_its_own(stated):
+    material = sum_of(**stated, ior=1.3)
+    tree = added(*(closure.node for closure in reversed(material.closures))) if stated else None
     assert simplified(tree) == material.surface
 
 
