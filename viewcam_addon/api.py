@@ -28,6 +28,9 @@ if TYPE_CHECKING:  # each function imports what no other needs: a picture is tra
 
 File = str | os.PathLike[str]
 
+# From a picture's seed to those of what is traced again beside it: beyond the seeds of all rounds of a search for a bias.
+_OTHER_SEEDS = 1000
+
 
 def read_scene(path: File) -> Scene:
     """A scene file, as docs/scene-file.md has it and `viewcam export` writes it.
@@ -126,23 +129,24 @@ def compare(
     test_samples : of each test picture, where that is not what its file tells. renderer : who made it, one of
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
     enough. everything : Cycles' picture with all that the scene's ledger says is not modeled, of the first test's seed; it
-    tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object are
-    different, and no error. false_alarms : of light, how often the same is called different at most; one in a hundred
-    by default.
+    tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object, or
+    whose light is all a renderer's choice, are different, and no error. false_alarms : of light, how often the same is called
+    different at most; one in a hundred by default.
 
     Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
     Raises
     ------
     InputError
-        if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, or no pixel of
-        either picture shows an object.
+        if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, no pixel of
+        either picture shows an object, or nearly all pixels with light had to be taken out.
     """
     from .comparison import geometry, radiance, renderers
     from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
     from .comparison.coincident import CoincidentLight
     from .comparison.everything import not_modelled
     from .comparison.light_verdict import FALSE_ALARMS
+    from .comparison.sides import samples_of, seed_of
     from .comparison.tolerances import ROUNDINGS
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
@@ -156,41 +160,54 @@ def compare(
     if camera is None:
         raise InputError(f"{of.source} does not tell its camera: give its scene with --scene, or trace it with viewcam render")
     # The picture may be of another size than the scene says, or of the stated camera.
-    shown = scene and replace(scene, camera=camera)
+    framed = scene and replace(scene, camera=camera)
     stated = scene.stated_camera if scene and camera == scene.camera else None
     if radiance.carries_light(of):
         alarms = false_alarms or FALSE_ALARMS
-        if shown is None:
-            return radiance.compare(of, pictures, camera, test_samples, None, alarms)
-        makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(shown, threads))
+        if framed is None:
+            return radiance.compare(of, pictures, camera, test_samples, false_alarms=alarms)
+        makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(framed, threads))
+        level, samples, seed = of.attributes.get("level", "path"), samples_of(of) or 0, seed_of(of)
 
         def coincident() -> CoincidentLight:
-            level = of.attributes.get("level", "path")
-            light, pairs, seen_otherwise = makes_tracer().coincident_light(level, SAMPLES_OF_COINCIDENT, 0, ROUNDINGS[-1])
-            return CoincidentLight(Image(light), pairs, seen_otherwise)
+            spent = (level, SAMPLES_OF_COINCIDENT, seed + _OTHER_SEEDS)
+            light, pairs, seen_otherwise = makes_tracer().coincident_light(*spent, ROUNDINGS[-1])
+            total = makes_tracer().render_light(*spent)["Combined"][..., :3]
+            return CoincidentLight(Image(light), total, pairs, seen_otherwise)
 
-        lit = replace(radiance.compare(of, pictures, camera, test_samples, coincident, alarms), stated=stated)
-        names = tuple(dict.fromkeys((*shown.not_modelled, *lit.taken_out.names)))
+        def anew() -> list[Image]:
+            others = (seed + _OTHER_SEEDS + 1 + number for number in range(radiance.SEEDS))
+            return [Image(makes_tracer().render_light(level, samples, other), camera, of.attributes) for other in others]
+
+        trace_anew = anew if 0 < samples <= MOST_SAMPLES and "Sample Count" not in of.passes else None
+        lit = radiance.compare(of, pictures, camera, test_samples, coincident, trace_anew, alarms)
+        lit = replace(lit, stated=stated)
+        _check_not_empty(lit, may_be_empty)
+        names = tuple(dict.fromkeys((*framed.not_modelled, *lit.taken_out.names)))
         if not names:
             return lit
-        surfaces = makes_tracer().pixels_of(shown.not_modelled)
+        surfaces = makes_tracer().pixels_of(framed.not_modelled)
         surfaces |= {name: surfaces.get(name, False) | lit.taken_out.pixels for name in lit.taken_out.names}
         parts = not_modelled(names, surfaces, of, pictures, whole, camera)
         one_place, otherwise = (
-            [name for name in some if name not in shown.not_modelled]
-            for some in (lit.taken_out.in_one_place, lit.taken_out.seen_otherwise)
+            [name for name in group if name not in framed.not_modelled]
+            for group in (lit.taken_out.in_one_place, lit.taken_out.seen_otherwise)
         )
         return replace(lit, not_modelled=parts.sorted_by(one_place, otherwise))
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
     by = renderer or renderers.CYCLES
-    if shown is None:
-        found = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
+    if framed is None:
+        comparison = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
     else:
-        tracer = (keeper or tracing.Keeper()).tracer(shown, threads)
-        found = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, shown.origin, by, partial)
-        names = shown.not_modelled
-        found = replace(found, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
-    if found.shows_nothing and not may_be_empty:
-        raise InputError(found.sentence)
-    return found
+        tracer = (keeper or tracing.Keeper()).tracer(framed, threads)
+        comparison = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, framed.origin, by, partial)
+        names = framed.not_modelled
+        comparison = replace(comparison, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
+    _check_not_empty(comparison, may_be_empty)
+    return comparison
+
+
+def _check_not_empty(comparison: "GeometryComparison | RadianceComparison", may_be_empty: bool) -> None:
+    if comparison.is_empty and not may_be_empty:
+        raise InputError(comparison.sentence)

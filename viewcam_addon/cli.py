@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False, en
             options.events.tell("started", command=options.command, words=options.words)
             status, result = _outcome(options)
         else:
-            status, result = _told(options, InputError.exit_status, _crash(options, ended_by))
+            status, result = _failure(options, InputError.exit_status, _crash(options, ended_by))
         seconds = round(time.monotonic() - started, 3)
         if result:
             status = _write_result(options, status, {"exit_status": status, **result}, seconds) or status
@@ -141,11 +141,11 @@ def _outcome(options: argparse.Namespace) -> Result:
         _check_outputs(options)
         return options.run(options)
     except InputError as error:
-        return _told(options, error.exit_status, str(error), getattr(error, "problems", ()))
+        return _failure(options, error.exit_status, str(error), getattr(error, "problems", ()))
     except KeyboardInterrupt:
         return 130, {"error": "interrupted"}
     except Exception as error:  # in one line, as every other error
-        return _told(options, 2, bug(error))
+        return _failure(options, 2, bug(error))
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
@@ -170,7 +170,7 @@ def _check_output(path: Path, is_text: bool) -> None:
         raise InputError(f"{path} is where viewcam prints: give the name of a file")
 
 
-def _told(options: argparse.Namespace, status: int, sentence: str, problems: Sequence[str] = ()) -> Result:
+def _failure(options: argparse.Namespace, status: int, sentence: str, problems: Sequence[str] = ()) -> Result:
     several = {"problems": list(problems)} if problems else {}
     options.events.tell("error", command=options.command, text=sentence, **several)
     return status, {"error": sentence, **several}
@@ -191,5 +191,5 @@ def _write_result(options: argparse.Namespace, status: int, result: dict[str, An
 
             junit.write(path, options.words, status, result, seconds)
     except InputError as error:
-        return _told(options, error.exit_status, str(error))[0]
+        return _failure(options, error.exit_status, str(error))[0]
     return 0

@@ -31,7 +31,7 @@ def listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def told(error: Exception) -> str:
+def message_of(error: Exception) -> str:
     """The message of any error for a user, in one sentence or, of a list of shots, in a list of them."""
     return str(error) if isinstance(error, InputError) else bug(error)
 

@@ -81,12 +81,12 @@ def fresh(folder: Path, variant: str, threads: int) -> race.Runner:
     """A runner from a fresh process to the EXR."""
 
     def runner(sampling: str, parameter: float, seed: int, path: Path) -> float:
-        theirs = path.with_name("mitsuba.exr")
-        arguments = [folder, variant, sampling, int(parameter), seed, threads, theirs]
+        expected = path.with_name("mitsuba.exr")
+        arguments = [folder, variant, sampling, int(parameter), seed, threads, expected]
         started = time.perf_counter()
         subprocess.run([sys.executable, JOB, *map(str, arguments)], check=True, stdout=subprocess.DEVNULL)
         seconds = time.perf_counter() - started
-        _as_combined(theirs, path)
+        _as_combined(expected, path)
         return seconds
 
     return runner
@@ -158,10 +158,10 @@ def _flat(values: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.ascontiguousarray(values, np.float32).reshape(-1)
 
 
-def _as_combined(theirs: Path, path: Path) -> None:
+def _as_combined(mitsuba_picture: Path, path: Path) -> None:
     """Mitsuba's R, G and B as our Combined."""
     import OpenEXR
 
-    channels = OpenEXR.File(str(theirs), separate_channels=True).channels()
+    channels = OpenEXR.File(str(mitsuba_picture), separate_channels=True).channels()
     rgb = np.dstack([channels[letter].pixels for letter in "RGB"])[::-1]
     image.write(path, image.Image({"Combined": np.dstack([rgb, np.ones_like(rgb[..., :1])])}))

@@ -216,14 +216,14 @@ def read_passes(exr_reader):
     """A function that reads EXRs: paths → a dict of passes each."""
 
     def read(paths):
-        found = []
+        result = []
         for path in paths:
             exr_reader.stdin.write(f"{path}\n")
             exr_reader.stdin.flush()
             assert exr_reader.stdout.readline() == "read\n", f"{path} can't be read"
             with np.load(f"{path}.npz") as archive:
-                found.append(dict(archive))
-        return found
+                result.append(dict(archive))
+        return result
 
     return read
 

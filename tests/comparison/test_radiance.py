@@ -25,15 +25,51 @@ def picture(rng, samples, truth=TRUTH, attribute="samples", **passes):
     """The mean of so many exponential variates in every pixel, gray noise, and its variance."""
     colour = rng.gamma(samples, 1.0 / samples, (HEIGHT, WIDTH, 1)) * truth
     combined = np.concatenate([colour, np.ones((HEIGHT, WIDTH, 1))], axis=-1)
-    made = {"Combined": combined, "Variance": TRUTH**2 / samples, "Depth": np.full((HEIGHT, WIDTH, 1), 8.0), **passes}
-    made = {name: values.astype(np.float32) for name, values in made.items()}
-    return Image(made, PINHOLE, {attribute: str(samples)}, f"{attribute}.exr")
+    channels = {"Combined": combined, "Variance": TRUTH**2 / samples, "Depth": np.full((HEIGHT, WIDTH, 1), 8.0), **passes}
+    channels = {name: values.astype(np.float32) for name, values in channels.items()}
+    return Image(channels, PINHOLE, {attribute: str(samples)}, f"{attribute}.exr")
 
 
 def both(truth=TRUTH, seed=0):
     rng = np.random.default_rng(seed)
     tests = [picture(rng, SAMPLES // SEEDS, truth, "cycles.ViewLayer.samples") for _ in range(SEEDS)]
     return picture(rng, SAMPLES), tests
+
+
+def with_rare_light(rng):
+    """A picture that has four fifths of its light from one of 640 samples, and of whose noise it tells what it has met."""
+    hits, steady = (
+        rng.binomial(SAMPLES, 1 / 640, (HEIGHT, WIDTH, 1)) / SAMPLES,
+        rng.gamma(SAMPLES, 1 / SAMPLES, (HEIGHT, WIDTH, 1)),
+    )
+    variance = (0.2**2 + (0.8 * 640) ** 2 * hits * (1 - hits)) / SAMPLES
+    image = picture(rng, SAMPLES, Variance=variance * np.ones(3))
+    image.passes["Combined"][..., :3] = 0.2 * steady + 0.8 * 640 * hits
+    return image
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_rare_light_that_the_reference_has_missed_is_no_difference_and_hides_none(seed):
+    """In one pixel of forty neither it nor any beside it has met that light: there it looks dark and quiet."""
+
+    def compared(factor, anew=True):
+        rng = np.random.default_rng(seed)
+        tests = [picture(rng, 50, np.full_like(TRUTH, factor), "cycles.ViewLayer.samples") for _ in range(SEEDS)]
+        made = [with_rare_light(rng) for _ in range(1 + radiance.SEEDS)]
+        return radiance.compare(made[0], tests, PINHOLE, trace_anew=(lambda: made[1:]) if anew else None)
+
+    assert not compared(1.0, anew=False).passed, "else the test proves nothing"
+    found = compared(1.0)
+    assert found.passed and found.samples[0] == SAMPLES * radiance.SEEDS, "\n".join(found.lines())
+    assert not compared(1.1).passed
+
+
+def test_what_differs_beyond_doubt_is_not_traced_anew():
+    def never():
+        raise AssertionError("nobody has to ask")
+
+    assert not radiance.compare(*both(1.2 * TRUTH), PINHOLE, trace_anew=never).passed
+    assert radiance.compare(*both(), PINHOLE, trace_anew=never).passed
 
 
 @pytest.fixture(scope="module")
@@ -146,10 +182,10 @@ def test_a_softer_picture_is_said_to_be_softer():
 
 
 def test_the_json_is_plain_and_says_what_the_sentence_says(same):
-    told = json.loads(json.dumps(same.to_json(), allow_nan=False))
-    assert told["passed"] is True and told["sentence"] == same.sentence
-    assert told["quantities"][0]["name"] == "Combined" and len(told["quantities"][0]["hypothesis_tests"]) == 5
-    assert told["samples"] == {"reference": 256, "test": 256} and told["equal"] == ["Alpha"]
+    record = json.loads(json.dumps(same.to_json(), allow_nan=False))
+    assert record["passed"] is True and record["sentence"] == same.sentence
+    assert record["quantities"][0]["name"] == "Combined" and len(record["quantities"][0]["hypothesis_tests"]) == 5
+    assert record["samples"] == {"reference": 256, "test": 256} and record["equal"] == ["Alpha"]
 
 
 def test_the_maps_are_pictures_of_the_same_size(same):
@@ -166,10 +202,10 @@ def test_without_the_package_flip_is_left_out(monkeypatch):
 
 def test_flip_is_nothing_for_equal_pictures_and_much_for_others(same):
     reference, _ = both()
-    one = replace(reference, attributes={"samples": "1"}, passes={**reference.passes, "Variance": 0 * reference["Variance"]})
-    assert radiance.compare(one, [one], PINHOLE).appearance.flip == 0.0
-    black = replace(one, passes={**one.passes, "Combined": 0 * one["Combined"]})
-    assert radiance.compare(one, [black], PINHOLE).appearance.flip > 0.4
+    single = replace(reference, attributes={"samples": "1"}, passes={**reference.passes, "Variance": 0 * reference["Variance"]})
+    assert radiance.compare(single, [single], PINHOLE).appearance.flip == 0.0
+    black = replace(single, passes={**single.passes, "Combined": 0 * single["Combined"]})
+    assert radiance.compare(single, [black], PINHOLE).appearance.flip > 0.4
     assert radiance.compare(black, [black], PINHOLE).passed
     assert 0.0 < same.appearance.flip < 0.3
 

@@ -32,7 +32,7 @@ def quads(*corners, normals=None):
     return Mesh(corners.reshape(-1, 3), triangles, np.zeros(len(triangles), np.int32), normals)
 
 
-def ball(centre, radius, rings=16):
+def ball(center, radius, rings=16):
     """A smooth ball of triangles."""
     theta, phi = np.meshgrid(np.linspace(0, np.pi, rings + 1), np.linspace(0, 2 * np.pi, 2 * rings + 1), indexing="ij")
     points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1).reshape(-1, 3)
@@ -40,7 +40,7 @@ def ball(centre, radius, rings=16):
     first = (np.arange(rings)[:, None] * row + np.arange(2 * rings)).ravel()[:, None]
     triangles = np.concatenate([first + np.array(three) for three in ((0, row, 1), (1, row, row + 1))]).astype(np.int32)
     normals = points[triangles].astype(np.float32)
-    return Mesh(points * radius + centre, triangles, np.zeros(len(triangles), np.int32), normals)
+    return Mesh(points * radius + center, triangles, np.zeros(len(triangles), np.int32), normals)
 
 
 def lambert(*colour):
@@ -86,12 +86,12 @@ def compared(reference, scene, level, samples):
 @pytest.fixture(scope="module")
 def reference():
     """reference(level, samples) → the right picture, rendered once."""
-    scene, made = build(), {}
+    scene, pictures_by_name = build(), {}
 
     def rendered(level, samples):
-        if (level, samples) not in made:
-            made[level, samples] = picture(scene, level, samples, 0)
-        return made[level, samples]
+        if (level, samples) not in pictures_by_name:
+            pictures_by_name[level, samples] = picture(scene, level, samples, 0)
+        return pictures_by_name[level, samples]
 
     return rendered
 
@@ -142,6 +142,32 @@ def test_a_fault_of_the_scene_is_found(reference, fault):
     comparison = compared(reference(level, samples), change(build()), level, samples)
     assert not comparison.passed, f"{fault}: {comparison.sentence}"
     assert comparison.sentence.startswith("Different here: ")
+
+
+def with_a_bulb(strength=3.0, tint=1.0):
+    """A ball of some nine pixels before the walls that shines, and gives next to no light to them."""
+    scene = build()
+    count, bulb = len(scene.objects), Object("bulb", "bulb", np.eye(4), 9, materials=("bulb",))
+    glow = Material(emission=Colour((strength, strength, tint * strength)))
+    return replace(
+        scene,
+        geometries={**scene.geometries, "bulb": ball((1.9, -0.4, 1.2), 0.17)},
+        objects=(*scene.objects[:count], bulb),
+        materials={**scene.materials, "bulb": glow},
+    )
+
+
+@pytest.fixture(scope="module")
+def reference_of_a_bulb():
+    return picture(with_a_bulb(), "direct", 64, 0)
+
+
+@pytest.mark.parametrize("fault", [{}, {"strength": 3.05}, {"tint": 0.98}])
+def test_a_bulb_of_nine_pixels_of_another_strength_is_found(reference_of_a_bulb, fault):
+    seen = render(with_a_bulb(), "geometry")["Object Index"] == 9
+    assert 6 <= seen.sum() <= 12, seen.sum()
+    comparison = compared(reference_of_a_bulb, with_a_bulb(**fault), "direct", 64)
+    assert comparison.passed == (not fault), "\n".join(comparison.lines())
 
 
 def brighter(lamp, factor):
@@ -207,3 +233,9 @@ def artists_reference():
 def test_a_fault_of_artists_materials_is_found(artists_reference, fault):
     comparison = compared(artists_reference, build_artists(**ARTISTS_FAULTS.get(fault, {})), "path", 256)
     assert comparison.passed == (fault is None), f"{fault}: {comparison.sentence}"
+
+
+@pytest.mark.parametrize("change", [{}, {"roughness": 0.29}, {"base_color": (0.707, 0.35, 0.25)}])
+def test_at_64_samples_a_metal_is_found_to_be_rougher_by_four_hundredths_or_redder_by_one(change):
+    comparison = compared(picture(build_artists(), "path", 64, 0), build_artists(PAINT | change), "path", 64)
+    assert comparison.passed == (not change), f"{change}: {comparison.sentence}"

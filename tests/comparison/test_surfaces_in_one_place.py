@@ -10,7 +10,7 @@ from viewcam_addon.comparison.geometry import compare
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import Tracer
-from viewcam_addon.tracer.scene import Mesh, Object, Scene
+from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
 
 # What moves each ray of the renderer on paper, in roundings: as in conftest.py.
 ROUNDINGS_OF_A_RENDERER = 0.35
@@ -109,14 +109,14 @@ def compared(reference, test, tracer):
 
 def test_any_of_several_surfaces_in_one_place_is_right_and_the_objects_are_named(tracer, reference):
     test = rendered(tracer)
-    found = compared(reference, test, tracer)
-    assert found.passed, "\n".join(found.lines())
-    pairs = found.in_one_place.pairs()
+    comparison = compared(reference, test, tracer)
+    assert comparison.passed, "\n".join(comparison.lines())
+    pairs = comparison.in_one_place.pairs()
     assert set(pairs) == {("Carpet", "Floor"), ("Carpet", "Tiles"), ("Floor", "Tiles"), ("Leaves", "Leaves")}
     another = reference["Material Index"] != test["Material Index"]
     assert sum(pairs.values()) == pytest.approx(another.sum(), abs=0.02 * another.sum())
-    assert "pixels show another of several surfaces in one place: " in found.sentence
-    assert found.to_json()["in_one_place"]["pixels"] == len(found.in_one_place.columns)
+    assert "pixels show another of several surfaces in one place: " in comparison.sentence
+    assert comparison.to_json()["in_one_place"]["pixels"] == len(comparison.in_one_place.columns)
 
 
 def test_a_twin_whose_normals_are_a_little_off_is_told_from_the_one_that_is_seen():
@@ -131,9 +131,9 @@ def test_a_twin_whose_normals_are_a_little_off_is_told_from_the_one_that_is_seen
     objects = tuple(Object(name, name.lower(), tilted(np.eye(4)), 1) for name in ("Floor", "Twin"))
     tracer = Tracer(replace(scene, geometries=geometries, objects=objects), 1)
     reference = Image(tracer.render())
-    found = compared(reference, rendered(tracer), tracer)
-    assert found.passed, "\n".join(found.lines())
-    assert {*found.in_one_place.pairs()} == {("Floor", "Twin")}
+    comparison = compared(reference, rendered(tracer), tracer)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert {*comparison.in_one_place.pairs()} == {("Floor", "Twin")}
     assert not len(compared(reference, reference, tracer).in_one_place.columns)
     turned = replace(reference, passes={**reference.passes, "Normal": reference["Normal"] + np.float32([2 * turn, 0, 0])})
     assert not compared(reference, turned, tracer).passed
@@ -141,9 +141,9 @@ def test_a_twin_whose_normals_are_a_little_off_is_told_from_the_one_that_is_seen
 
 def test_leaves_of_a_pixel_are_seen(reference):
     """Else the other tests prove nothing of them."""
-    shown = reference["Object Index"][..., 0] == 4
-    alone = tolerances.at_borders(np.where(shown, 4, -1))
-    assert alone.sum() > 0.5 * shown.sum() > 60
+    on_leaves = reference["Object Index"][..., 0] == 4
+    alone = tolerances.at_borders(np.where(on_leaves, 4, -1))
+    assert alone.sum() > 0.5 * on_leaves.sum() > 60
 
 
 def test_nothing_is_explained_without_the_scene(tracer, reference):
@@ -199,8 +199,35 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_sabotage_is_found_amid_surfaces_in_one_place(tracer, reference, fault):
     test = FAULTS[fault](tracer, rendered(tracer))
-    found = compared(reference, test, tracer)
-    assert not found.passed, f"{fault} was not found:\n" + "\n".join(found.lines())
+    comparison = compared(reference, test, tracer)
+    assert not comparison.passed, f"{fault} was not found:\n" + "\n".join(comparison.lines())
+
+
+WRONG_NORMALS = {
+    "flipped": lambda n: -n,
+    "of other axes": lambda n: n[..., [1, 2, 0]],
+    "turned by 5°": lambda n: n + np.float32(0.0873) * np.cross(n, np.float32([0.6, 0.0, 0.8])).astype(np.float32),
+}
+
+
+@pytest.mark.parametrize("fault", WRONG_NORMALS)
+def test_each_wrong_normal_amid_thousands_of_spheres_of_a_pixel_is_found(fault):
+    random = np.random.default_rng(4)
+    count, scene = 4000, a_scene()
+    centers = random.uniform((-1.6, -1.6, 0.02), (1.6, 1.6, 0.8), (count, 3))
+    balls = Spheres(centers, random.uniform(0.004, 0.02, count), np.zeros(count, np.int32))
+    objects = (*scene.objects, Object("Balls", "balls", np.eye(4), 5, (16,)))
+    tracer = Tracer(replace(scene, geometries={**scene.geometries, "balls": balls}, objects=objects), 1)
+    reference, test = Image(tracer.render()), rendered(tracer)
+    assert compared(reference, test, tracer).passed
+    is_ball = (test["Object Index"][..., 0] == 5) & (reference["Object Index"][..., 0] == 5)
+    facing = tolerances.facing(CAMERA, reference.passes)
+    rows, columns = np.nonzero(is_ball & (facing > 0.2))  # less is within the tolerance of the rim, where any normal is right
+    chosen = random.choice(len(rows), 40, replace=False)
+    found = compared(reference, harmed(test, "Normal", (rows[chosen], columns[chosen]), WRONG_NORMALS[fault]), tracer)
+    mismatches = found.mismatches
+    unexplained = {*zip(mismatches.rows[~mismatches.explained], mismatches.columns[~mismatches.explained], strict=True)}
+    assert unexplained == {*zip(rows[chosen], columns[chosen], strict=True)}, "\n".join(found.lines())
 
 
 @pytest.mark.parametrize("lift", [HAIR, -HAIR])

@@ -26,8 +26,8 @@ plotter.camera_position = [(1, 2, 3), (0, 0, 0), (0, 0, 1)]
 
 
 def _several(form: str, *pinholes, axes: str = "as_is") -> str | dict[str, str | bytes]:
-    given = [Camera(f"c{number}", pinhole, image=f"c{number}.png") for number, pinhole in enumerate(pinholes)]
-    return cameras.write(given, form, Options(axes=axes))
+    written_cameras = [Camera(f"c{number}", pinhole, image=f"c{number}.png") for number, pinhole in enumerate(pinholes)]
+    return cameras.write(written_cameras, form, Options(axes=axes))
 
 
 def _npz() -> bytes:
@@ -80,6 +80,14 @@ def _crate() -> bytes:
         (Path(folder) / "a.usda").write_text(str(_several("usd", SHIFTED, PLAIN)))
         Usd.Stage.Open(f"{folder}/a.usda").Export(f"{folder}/a.usdc")
         return (Path(folder) / "a.usdc").read_bytes()
+
+
+def _with_lenses(transforms: dict) -> dict:
+    """The same with a lens of each frame's own."""
+    first, second, *_ = transforms["frames"]
+    first |= {"camera_model": "OPENCV", "k1": -0.1, "k2": 0.02, "p1": 1e-3, "p2": -5e-4}
+    second |= {"camera_model": "OPENCV_FISHEYE", "k1": 0.05, "k2": -0.01, "k3": 1e-3, "k4": -1e-4}
+    return transforms
 
 
 def _lenses() -> dict[str, str]:
@@ -176,5 +184,6 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "transforms_applied": {"a.json": json.dumps(documents.documents()[1])},
         "metashape_bent": {"a.xml": published.metashape(known, "<k1>-0.01</k1>")},
         "colmap_lenses": _lenses(),
+        "transforms_lenses": {"a.json": json.dumps(_with_lenses(json.loads(_several("transforms", PLAIN, SQUARE))))},
         "opencv_fisheye": {"a.json": json.dumps({**published.K, "model": "fisheye", "dist": [0.1, -0.02, 0.005, 0]})},
     }  # fmt: skip

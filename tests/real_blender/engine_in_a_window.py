@@ -4,7 +4,7 @@ blender [--enable-event-simulate] -p 0 0 1600 1000 --addons … --python engine_
 
 PART is `render`, with simulated events: picks the engine in the properties editor, looks into its panels, presses F12 and saves
 the result to OUT. Or it is `cancel`, without them, since Blender then hears no others: makes FILE heavy, presses F12, then
-Escape by xdotool, and writes the seconds until Blender says that the render was cancelled to OUT, for each of some times. Or it
+Escape by xdotool, and writes the seconds until Blender says that the render was canceled to OUT, for each of some times. Or it
 is `view`: turns the viewport in Rendered shading, and writes to OUT how many pictures a second there are.
 Leaves with status 0, or 5 and a traceback.
 """
@@ -16,15 +16,18 @@ import time
 from pathlib import Path
 
 import bpy
+import numpy as np
 from bpy.app.handlers import persistent
 
 sys.path.append(str(Path(__file__).parent))
 from mathutils import Euler
 from panel_in_a_window import ROW, move, region, start, window
+from tour_hands import SCREEN_HEIGHT
 
 PART, FILE, OUT = sys.argv[sys.argv.index("--") + 1 :]
-TRACED_FOR = 2.0  # seconds that a heavy render goes on before it is cancelled
+TRACED_FOR = 2.0  # seconds that a heavy render goes on before it is canceled
 CANCELLED = 6  # times
+KINDS = ("images", "objects", "scenes", "meshes", "materials", "texts", "cameras", "node_groups")
 TURNS = 20  # of the view
 
 told, ended = [], []
@@ -55,8 +58,8 @@ def pick_the_engine():
         move(x, y)
         yield
         with bpy.context.temp_override(window=window(), area=area, region=where):
-            found = bpy.context.property
-        if found and found[1] == "render.engine":
+            actual = bpy.context.property
+        if actual and actual[1] == "render.engine":
             break
     for _ in range(len(bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items) + 6):
         if bpy.context.scene.render.engine == "VIEWCAM":
@@ -82,7 +85,7 @@ def look_into_the_panels():
 
 def press_f12():
     """The operator that the key is bound to: in a virtual screen without a window manager the key may find no window."""
-    while bpy.app.is_job_running("RENDER"):  # a cancelled one takes a while to go
+    while bpy.app.is_job_running("RENDER"):  # a canceled one takes a while to go
         yield
     ended.clear()
     with bpy.context.temp_override(window=window()):
@@ -155,6 +158,83 @@ def view():
     yield
 
 
+def swipe():
+    """The reference left of a line over solid shading: as the scene displays it, dragged, and gone without a trace."""
+    scene = bpy.context.scene
+    area, part = region("VIEW_3D", "WINDOW")
+    space = area.spaces.active
+    scene.virtual_pinhole_reference.samples = 16
+    space.region_3d.view_perspective, space.shading.type = "CAMERA", "SOLID"
+    space.overlay.show_overlays = space.show_gizmo = False
+    yield
+    package = type(scene.virtual_pinhole_reference).__module__.removesuffix("blender.render_settings")
+    module = sys.modules[f"{package}blender.interface.swipe"]
+    displays = sys.modules[f"{package}blender.rendering.displayed"]
+    with bpy.context.temp_override(window=window(), area=area, region=part):
+        before = datablocks()
+        assert bpy.ops.viewcam.swipe_reference("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    running, ends = module._running, time.monotonic() + 140
+    longest = 0.0
+    while running.live.samples < 16 and time.monotonic() < ends:
+        step = time.monotonic()
+        yield
+        longest = max(longest, time.monotonic() - step)
+    for _ in range(10):
+        yield
+    shown = screenshot("before")[part.y : part.y + part.height, part.x : part.x + part.width]
+    expected = displays.displayed(scene, np.ascontiguousarray(running.live.picture[..., :3]))
+    line = round(running.line())
+    rows, columns = slice(60, part.height - 80), slice(120, line - 20)  # between header, tools and words
+    left = np.abs(shown[rows, columns, :3] - expected[rows, columns, :3])
+    right = np.abs(shown[rows, line + 20 :, :3] - expected[rows, line + 20 :, :3])
+    y = part.y + part.height // 2
+    move(part.x + line, y)
+    yield
+    window().event_simulate(type="LEFTMOUSE", value="PRESS", x=part.x + line, y=y)
+    yield
+    for step in range(1, 5):
+        move(part.x + line + 50 * step, y)
+        yield
+    window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=part.x + line + 200, y=y)
+    yield
+    moved = running.line() - line
+    yield
+    screenshot("dragged")
+    number = running.live.number
+    space.region_3d.view_perspective = "PERSP"
+    space.region_3d.view_rotation.rotate(Euler((0.0, 0.0, 0.3)))
+    area.tag_redraw()
+    while (running.live.number == number or running.live.samples < 16) and time.monotonic() < ends:
+        yield
+    for _ in range(10):
+        yield
+    screenshot("turned")
+    window().event_simulate(type="ESC", value="PRESS", x=part.x + 100, y=y)
+    yield
+    window().event_simulate(type="ESC", value="RELEASE", x=part.x + 100, y=y)
+    yield
+    assert module._running is None, "Escape does not end it"
+    assert datablocks() == before, "it leaves something in the file"
+    figures = {"left": float(left.mean() * 255), "right": float(right.mean() * 255), "moved": moved, "longest": longest}
+    Path(OUT).write_text(json.dumps(figures))
+
+
+def datablocks():
+    return {name: [block.name for block in getattr(bpy.data, name)] for name in dir(bpy.data) if name in KINDS}
+
+
+def screenshot(name):
+    """The window, (height, width, 4), rows from the bottom; also a file beside OUT."""
+    path, height = f"{OUT}-{name}.png", window().height
+    crop = f"{window().width}x{height}+0+{SCREEN_HEIGHT - height}"
+    subprocess.run(["import", "-window", "root", "-crop", crop, "+repage", "-depth", "8", path], check=True)
+    image = bpy.data.images.load(path)
+    width, height = image.size
+    pixels = np.array(image.pixels[:], np.float32).reshape(height, width, 4)
+    bpy.data.images.remove(image)
+    return pixels
+
+
 def wait_for(end):
     while not ended:
         yield
@@ -168,7 +248,7 @@ def steps():
     bpy.app.handlers.render_complete.append(on_complete)
     bpy.app.handlers.render_cancel.append(on_cancel)
     yield
-    yield from {"render": render, "cancel": cancel, "view": view}[PART]()
+    yield from {"render": render, "cancel": cancel, "view": view, "swipe": swipe}[PART]()
 
 
 start(steps)

@@ -79,24 +79,27 @@ def add_mesh(draw, calls):
     with np.errstate(over="ignore"):
         floats = [numbers(draw, width * count).astype(np.float32) for width in (9, 6, 9)]
     optional = [calls.at(values, np.float32) if draw(st.booleans()) else None for values in floats]
-    given = calls.at(numbers(draw, 3 * vertices), np.float64), calls.at(triangles, np.int32), calls.at(materials, np.int32)
-    if calls("add_mesh", calls.scene, native._Mesh(vertices, count, *given, *optional)):
+    arrays = calls.at(numbers(draw, 3 * vertices), np.float64), calls.at(triangles, np.int32), calls.at(materials, np.int32)
+    if calls("add_mesh", calls.scene, native._Mesh(vertices, count, *arrays, *optional)):
         calls.counts.append(int(materials.max(initial=0)) + 1)
 
 
 def add_spheres(draw, calls):
     count = draw(st.integers(0, 12))
     radii, materials = np.abs(numbers(draw, count, LENGTH)), np.full(count, draw(mostly(st.just(0), WHOLE)))
-    given = calls.at(numbers(draw, 3 * count), np.float64), calls.at(radii, np.float64), calls.at(materials, np.int32)
-    if calls("add_spheres", calls.scene, native._Spheres(count, *given)):
+    arrays = calls.at(numbers(draw, 3 * count), np.float64), calls.at(radii, np.float64), calls.at(materials, np.int32)
+    if calls("add_spheres", calls.scene, native._Spheres(count, *arrays)):
         calls.counts.append(int(materials.max(initial=0)) + 1)
 
 
 def add_objects(draw, calls):
     geometry, slots, count = draw(mostly(st.integers(0, 3), [2**32 - 1])), draw(st.integers(1, 3)), draw(st.integers(0, 5))
-    given = calls.at(np.zeros(slots), np.float32), calls.at(np.full(slots, draw(mostly(st.just(0), [1, 2**32 - 1]))), np.uint32)
+    arrays = (
+        calls.at(np.zeros(slots), np.float32),
+        calls.at(np.full(slots, draw(mostly(st.just(0), [1, 2**32 - 1]))), np.uint32),
+    )
     info = calls.at(numbers(draw, 5 * max(count, 1)), np.float32) if draw(st.booleans()) else None
-    calls("add_objects", calls.scene, native._Object(geometry, draw(st.integers(0, 63)), slots, count, 1.0, *given, info=info))
+    calls("add_objects", calls.scene, native._Object(geometry, draw(st.integers(0, 63)), slots, count, 1.0, *arrays, info=info))
     return count
 
 
@@ -105,8 +108,8 @@ def commit(draw, calls, objects):
     for _ in range(min(objects, 4)):
         matrices[draw(st.integers(0, 12 * objects - 1))] = draw(NUMBER)
     origin = [draw(NUMBER) for _ in range(3)]
-    given = calls.at(matrices, np.float64), calls.at(origin, np.float64), draw(mostly(st.just(2), WHOLE))
-    return calls("commit", calls.scene, *given)
+    arrays = calls.at(matrices, np.float64), calls.at(origin, np.float64), draw(mostly(st.just(2), WHOLE))
+    return calls("commit", calls.scene, *arrays)
 
 
 def look(draw, calls):
@@ -158,12 +161,12 @@ def make_nodes(draw, calls):
         inputs = []
         for name, default in VALUES.get(kind, {}).items():
             words = default if isinstance(default, tuple) and isinstance(default[0], str) else ("true", "false")
-            given = native._Input(name.encode(), draw(mostly(st.sampled_from(words), ["guess"])).encode())
-            given.color.rgb[:] = [draw(NUMBER) for _ in range(3)]
-            given.color.image, given.color.node = (draw(mostly(st.integers(-1, 1), WHOLE)) for _ in range(2))
-            inputs.append(given)
-        given = native._Node(kind.encode(), (native._Input * len(inputs))(*inputs), draw(mostly(st.just(len(inputs)), [0])))
-        if calls("add_node", calls.scene, given):
+            entry = native._Input(name.encode(), draw(mostly(st.sampled_from(words), ["guess"])).encode())
+            entry.color.rgb[:] = [draw(NUMBER) for _ in range(3)]
+            entry.color.image, entry.color.node = (draw(mostly(st.integers(-1, 1), WHOLE)) for _ in range(2))
+            inputs.append(entry)
+        entry = native._Node(kind.encode(), (native._Input * len(inputs))(*inputs), draw(mostly(st.just(len(inputs)), [0])))
+        if calls("add_node", calls.scene, entry):
             rows, values = calls.at(numbers(draw, 6 * 5), np.float64), np.empty((5, 4))
             calls("probe_nodes", calls.scene, 5, rows, values.ctypes.data)
             calls("constant_node", calls.scene, values.ctypes.data, byref(c_int()))
@@ -173,8 +176,8 @@ def trace(draw, calls):
     rays = calls.at(numbers(draw, 8 * 70), np.float64)
     t, objects, primitives, hidden = np.empty(70), np.empty(70, np.uint32), np.empty(70, np.uint32), np.empty(70, np.uint8)
     for packets in (0, 1):
-        found = t.ctypes.data, objects.ctypes.data, primitives.ctypes.data
-        assert calls("closest", calls.scene, 70, rays, draw(st.integers(0, 63)), packets, *found)
+        actual = t.ctypes.data, objects.ctypes.data, primitives.ctypes.data
+        assert calls("closest", calls.scene, 70, rays, draw(st.integers(0, 63)), packets, *actual)
         assert calls("occluded", calls.scene, 70, rays, packets, hidden.ctypes.data)
     width, height = calls.size
     planes = np.empty((20, max(width * height, 1)), np.float32)
@@ -241,8 +244,8 @@ TRIANGLE = [0, 0, -1, 1, 0, -1, 0, 1, -1]
 
 
 def mesh_of(calls, vertices=TRIANGLE, triangles=(0, 1, 2), materials=(0,)):
-    given = calls.at(vertices, np.float64), calls.at(triangles, np.int32), calls.at(materials, np.int32)
-    return native._Mesh(len(vertices) // 3, len(materials), *given, None, None, None)
+    arrays = calls.at(vertices, np.float64), calls.at(triangles, np.int32), calls.at(materials, np.int32)
+    return native._Mesh(len(vertices) // 3, len(materials), *arrays, None, None, None)
 
 
 @pytest.mark.parametrize(
@@ -270,8 +273,8 @@ def test_an_object_that_its_matrix_flattens_does_no_harm(matrix):
     calls("add_objects", calls.scene, native._Object(0, 31, 1, 2, 1.0, indices, materials))
     assert calls("commit", calls.scene, calls.at([matrix, matrix], np.float64), calls.at(np.zeros(3), np.float64), 2)
     rays = calls.at(np.random.default_rng(1).normal(size=(64, 8)), np.float64)
-    found = np.empty(64), np.empty(64, np.uint32), np.empty(64, np.uint32)
-    assert calls("closest", calls.scene, 64, rays, 1, 1, *(values.ctypes.data for values in found))
+    actual = np.empty(64), np.empty(64, np.uint32), np.empty(64, np.uint32)
+    assert calls("closest", calls.scene, 64, rays, 1, 1, *(values.ctypes.data for values in actual))
     calls.close()
 
 

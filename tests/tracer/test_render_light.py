@@ -196,9 +196,9 @@ def test_variance_is_that_of_pictures_with_other_seeds_or_somewhat_more(lively, 
     scene = lively(SEED, 24, 14)
     pictures = [render(scene, "direct", samples, seed, threads=1) for seed in range(24)]
     true = np.var([passes["Combined"][..., :3] for passes in pictures], axis=0, ddof=1).mean(dtype=float)
-    told = np.mean([passes["Variance"] for passes in pictures], dtype=float)
+    stated = np.mean([passes["Variance"] for passes in pictures], dtype=float)
     # 24 seeds of some 300 pixels, most of whose variance is that of a few: the truth is known to a fifth.
-    assert 0.8 <= told / true <= 6, f"{told / true:.2f}"
+    assert 0.8 <= stated / true <= 6, f"{stated / true:.2f}"
 
 
 def test_a_transparent_film_shows_the_world_in_its_pass_and_in_alpha_only(lively):

@@ -27,19 +27,20 @@ def _rooms() -> list[ModuleType]:
         render_all,
         render_panels,
         scene_cameras,
+        swipe,
         view_menu,
     )
     from .rendering import engine
 
     buttons = [operators, moving, clipboard, baking, converting, presets]
-    shown = [panel, scene_cameras, photo_matching, proof, render_all, labels, overlay, gizmos]
+    interface = [panel, scene_cameras, photo_matching, swipe, proof, render_all, labels, overlay, gizmos]
     followers = [animation, resolution, own_picture]
     return [
         preferences,
         properties,
         render_settings,
         *buttons,
-        *shown,
+        *interface,
         engine,
         render_panels,
         file_menu,

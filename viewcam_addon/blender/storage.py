@@ -102,10 +102,10 @@ def animated(camera_object: bpy.types.Object, before: CameraValues) -> CameraVal
 
 def _numbers(group: bpy.types.PropertyGroup) -> tuple[tuple[float, ...], bool]:
     """Eye, look-at, up and distance, ten numbers, and whether all of them are known in float64."""
-    exact, shown = _parsed(group.exact, 10), (*group.eye, *group.look_at, *group.up, group.distance)
+    exact, rounded = _parsed(group.exact, 10), (*group.eye, *group.look_at, *group.up, group.distance)
     if not exact:
-        return shown, False
-    columns = zip(*exact, _shown_values(exact[0]), shown, strict=True)
+        return rounded, False
+    columns = zip(*exact, _shown_values(exact[0]), rounded, strict=True)
     numbers = tuple([full if value in (short, zeroed) else value for full, short, zeroed, value in columns])
     return numbers, numbers == exact[0]
 
@@ -234,9 +234,9 @@ def _as_shown(vector: tuple[float, ...]) -> tuple[float, ...]:
 @functools.lru_cache(maxsize=4096)
 def _shown_values(numbers: tuple[float, ...]) -> tuple[float, ...]:
     """The numbers that the properties hold where the ten numbers of `exact` are stored."""
-    shown = [*_as_shown(numbers[0:3]), *_as_shown(numbers[3:6]), *_as_shown(numbers[6:9]), numbers[9]]
+    rounded = [*_as_shown(numbers[0:3]), *_as_shown(numbers[3:6]), *_as_shown(numbers[6:9]), numbers[9]]
     with np.errstate(over="ignore"):
-        return tuple(np.array(shown, dtype=np.float32).tolist())
+        return tuple(np.array(rounded, dtype=np.float32).tolist())
 
 
 @functools.lru_cache(maxsize=4096)

@@ -92,7 +92,7 @@ def check_image(file: object) -> None:
     """
     if not isinstance(file, str) or any(map(_is_unseen, file)) or "\\" in file or {"", ".", ".."} & set(file.split("/")):
         raise InputError(
-            f"file is {checks.shown(file)}: give the picture's path inside the folder of the batch, as in images/left.png"
+            f"file is {checks.quoted(file)}: give the picture's path inside the folder of the batch, as in images/left.png"
         )
 
 

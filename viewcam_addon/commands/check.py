@@ -64,15 +64,15 @@ def check_one(
     written = Written(report, difference, sides, reference, command)
     plan = Plan(Path(), blend=Path(job.blend) if job.blend else None, trust=job.trust)
     with silent_libraries(), carry_out.opened(plan, options.events) as renderer:
-        found = renderer.check(job, has_picture=False, written=written, keep=Path(report) if report else None)
-    if "reason" in found:
-        say(f"level {found['level']} is enough. {found['reason']}")
-    seconds, (width, height) = found["seconds"], found["result"]["size"]
+        result = renderer.check(job, has_picture=False, written=written, keep=Path(report) if report else None)
+    if "reason" in result:
+        say(f"level {result['level']} is enough. {result['reason']}")
+    seconds, (width, height) = result["seconds"], result["result"]["size"]
     engine = (job.engine or "Cycles").capitalize()
     say(f"exported and rendered with {engine} in {seconds['rendered']:.1f} s")
     say(f"traced {width} × {height} pixels in {seconds['traced']:.2f} s")
-    say(*shared.ledger_lines(found["result"]["ledger"]), *found["lines"])
-    return exit_status(found["answer"], job.strict), found["result"]
+    say(*shared.ledger_lines(result["result"]["ledger"]), *result["lines"])
+    return exit_status(result["answer"], job.strict), result["result"]
 
 
 def _check_many(options: argparse.Namespace, job: Any) -> Result:

@@ -27,6 +27,6 @@ def run(options: argparse.Namespace) -> Result:
     report, difference = (path and str(path) for path in (options.report, options.difference))
     written = Written(report, difference, command=f"viewcam {options.words}")
     channels = dict(options.channels) if options.channels else None
-    found = compare_files(options.reference, options.tests, options.scene, options.threads, channels, written)
-    say(*shared.ledger_lines(found["result"]["ledger"]), *found["lines"])
-    return exit_status(found["answer"], options.strict), found["result"]
+    result = compare_files(options.reference, options.tests, options.scene, options.threads, channels, written)
+    say(*shared.ledger_lines(result["result"]["ledger"]), *result["lines"])
+    return exit_status(result["answer"], options.strict), result["result"]

@@ -71,7 +71,7 @@ def add_light(added: argparse.ArgumentParser, samples: argparse._ActionsContaine
         "--level",
         choices=[*LEVELS, "auto"],
         default="geometry",
-        help="how much is modelled; auto is the least that shows the scene's light (default: %(default)s)",
+        help="how much is modeled; auto is the least that shows the scene's light (default: %(default)s)",
     )
     words = f"samples a pixel, for light (default: {SAMPLES})"
     (samples or added).add_argument("--samples", type=types.positive, metavar="N", help=words)
@@ -145,9 +145,14 @@ def say_level(scene: Any) -> dict[str, str]:
 
 
 def ledger_lines(ledger: Sequence[dict[str, str]]) -> list[str]:
-    """The ledger of a scene, for a terminal. ledger : as --json has it."""
+    """The ledger of a scene, for a terminal: what did not come whole, and what is said of the world. ledger : as --json has
+    it."""
     exported = sum(entry["status"] == "exported" for entry in ledger)
-    rest = [f"  {entry['status']}: {entry['object']}: {entry['reason']}" for entry in ledger if entry["status"] != "exported"]
+    rest = [
+        f"  {entry['object']}: {entry['status']}, {entry['reason']}"
+        for entry in ledger
+        if entry["status"] != "exported" or entry["reason"].startswith("the world ")
+    ]
     return [f"{exported} of {len(ledger)} objects exported whole", *rest] if ledger else []
 
 

@@ -27,7 +27,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     for other in ("previous", "next"):
         words = f"the {other} frame, for --labels flow"
         added.add_argument(f"--{other}", metavar="SCENE.json", type=types.path, help=words)
-    words = "steps of the labels' 16-bit depth in a scene unit (default: 1000, millimetres of metres)"
+    words = "steps of the labels' 16-bit depth in a scene unit (default: 1000, millimeters of meters)"
     added.add_argument("--depth-steps", type=types.above_zero, metavar="N", default=1000.0, help=words)
 
 

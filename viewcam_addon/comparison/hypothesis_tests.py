@@ -3,7 +3,8 @@
 The noise that a difference is held against is the larger of what a pixel or tile shows itself and what its 3 × 3 neighborhood
 shows in the mean. By itself, a place that rare light has missed so far looks both darker and quieter than it is, and an edge
 that crosses the corner of a pixel may have been missed by all of its samples. Where neighbors share their light, a tile shows
-less noise than its sum has: then what the samples of its pixels tell counts as well.
+less noise than its sum has: then what the samples of its pixels tell counts as well. Only of pixels that show what shines,
+alike in all samples of both sides, nothing was missed: there a lamp of a few pixels is compared as where there is no noise.
 
 What is within rounding is no difference: a pixel's is taken beyond the largest tolerance, a tile's sum beyond that of the 99th
 percentile of each pixel, since a mean of rounding errors can't exceed what nearly all of them stay below. Nor is what Cycles'
@@ -199,7 +200,10 @@ def findable(light: Array, allowance: Array, variance: Array, critical: Array, o
 
 def _pixel_variances(sides: Sides, freedom: tuple[int, int]) -> tuple[Array, Array]:
     """The variance of each pixel's difference, inf where it is not known, and Welch's degrees of freedom."""
-    variances = [np.maximum(variance, noise.mean_around(variance)) for variance in (sides.variance, sides.spread)]
+    variances = [
+        np.where(sides.certain, 0.0, np.maximum(variance, noise.mean_around(variance)))
+        for variance in (sides.variance, sides.spread)
+    ]
     total = variances[0] + variances[1]
     known = np.isfinite(total) & (total > 0.0)
     share = np.divide(variances[0], total, out=np.full(total.shape, 0.5), where=known)

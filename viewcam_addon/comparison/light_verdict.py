@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import listed
 from ..pinhole import Pinhole
-from .answer import Answer, NotModelled, answered
+from .answer import Answer, NotModelled, answered, percent_of
 from .coincident import TakenOut
 from .hypothesis_tests import CONTOURS, PIXELS, WHOLE, HypothesisTest, Place
 from .noise_free import Edges
@@ -45,7 +45,7 @@ class LightRow:
     """The result for one quantity.
 
     reference, test : means over the picture and its channels. ratio : test over reference, nan where that is 0.
-    ratio_error : its standard error. visible : the relative bias of the whole picture that is found half of the time.
+    ratio_error : its standard error. visible : the relative bias of all that is compared that is found half of the time.
     hypothesis_tests : none where there is no noise. noise_free, edges : the exact comparison, None where there is noise.
     broken : pixels that are no numbers on one side or both. factor : the one that explains all of the difference, or None.
     """
@@ -82,7 +82,7 @@ class LightRow:
 
 @dataclass(frozen=True)
 class Search:
-    """How far a comparison in rounds is that searches for a bias (sequential.py).
+    """The state of a comparison in rounds that searches for a bias (sequential.py).
 
     find : the bias, a share of the light. least : that which would be found in 99 of 100 cases so far, if it is everywhere;
     least_in_blocks : if it is in a typical block of 32 × 32 pixels alone; both 0 without noise.
@@ -141,6 +141,11 @@ class RadianceComparison:
         return tuple(self.taken_out.pairs)
 
     @property
+    def is_empty(self) -> bool:
+        """True if nothing differs and next to nothing was compared, so that there is no answer."""
+        return self.taken_out.is_nearly_all and all(row.ok for row in self.rows)
+
+    @property
     def answer(self) -> Answer:
         """True if the light is the same, in one sentence, which says where and by how much where it is not."""
         combined = self.rows[0]
@@ -150,6 +155,8 @@ class RadianceComparison:
             return answered(
                 False, "Different here", f"{_difference(worst[0])}{_hint(worst[0])}{others}{_without(self)}.", self.not_modelled
             )
+        if self.is_empty:
+            return answered(False, "Nothing to compare", _nothing_left(self.taken_out), self.not_modelled)
         if not self.is_noisy:
             row = combined.noise_free
             text = (
@@ -163,7 +170,8 @@ class RadianceComparison:
 
     @property
     def passed(self) -> bool:
-        """True if nothing of what is modeled differs by more than chance and rounding."""
+        """True if nothing of what is modeled differs by more than chance and rounding. False, too, where next to nothing was
+        compared."""
         return self.answer.passed
 
     @property
@@ -206,13 +214,27 @@ class RadianceComparison:
 
 def _without(comparison: RadianceComparison) -> str:
     taken_out = comparison.taken_out
+    return f"; the {taken_out.count:,} pixels that {_which(taken_out)}, are taken out" if taken_out else ""
+
+
+def _which(taken_out: TakenOut) -> str:
     which = []
     if taken_out.pairs:
         which.append(f"show surfaces in one place, or are lit by them ({pairs_text(taken_out.pairs)})")
     if taken_out.seen_otherwise:
         names = _few(taken_out.seen_otherwise)
         which.append(f"are lit past what shadow rays see and scattered rays do not, or the reverse ({names})")
-    return f"; the {taken_out.count:,} pixels that {', and that '.join(which)}, are taken out" if which else ""
+    return ", and that ".join(which)
+
+
+def _nothing_left(taken_out: TakenOut) -> str:
+    remedies = ["move one of two that lie in one place aside"] if taken_out.pairs else []
+    if taken_out.seen_otherwise:
+        remedies.append("let shadow rays see what other rays see")
+    return (
+        f"{percent_of(taken_out.share_of_lit)} of the pixels with light {_which(taken_out)}, which is a renderer's choice: "
+        f"{' and '.join(remedies)}, or check level geometry, where any such choice is right"
+    )
 
 
 def samples_text(comparison: RadianceComparison) -> str:

@@ -4,7 +4,8 @@ of both.
 Several test pictures are one picture rendered with several seeds: their mean is the test, and their spread tells its noise. The
 reference brings the variance of its Combined pass along. Of the other passes only the spread is known, and that the reference
 has none where its Combined has none and is one pass's light alone. A sum of several may never change while they do: where rays
-go on to glass that shines as brightly as the world, light that is direct once is indirect another time.
+go on to glass that shines as brightly as the world, light that is direct once is indirect another time. A reference that was
+traced anew with several seeds tells its noise as the tests do.
 
 Cycles divides Diffuse Direct and Diffuse Indirect by the surface's color, each a mean over the pixel: a quotient of means,
 which on edges depends on the number of samples. So their products with Diffuse Color are compared, the light itself.
@@ -28,6 +29,8 @@ CHANNEL_NAMES = ("red", "green", "blue")
 
 # A standard error below so many roundings of float32 of the value itself is no noise but rounding.
 _QUIET = 16.0
+# Of test pictures, so that their means tell whether all samples agree.
+_MANY_SEEDS = 8
 # Of a number of samples: more than anybody renders, and that Python refuses to read.
 _MOST_DIGITS = 9
 
@@ -38,7 +41,8 @@ class Sides:
 
     spread : variance of `test`, which is a mean, from the test pictures' differences; inf where there is one picture only.
     variance : variance of `reference`; inf where it is not known. broken : (height, width) bool, no number on one side or both;
-    there both are 0. shared : variance of `reference` that its pixels may have shared with their neighbors, or 0.
+    there both are 0. shared : variance of `reference` that its pixels may have shared with their neighbors, or 0. certain :
+    (height, width, 1) bool, pixels that have no noise, whatever is beside them.
     """
 
     name: str
@@ -48,6 +52,7 @@ class Sides:
     spread: Array
     broken: NDArray[np.bool_]
     shared: Array | float = 0.0
+    certain: NDArray[np.bool_] | bool = False
 
     @property
     def difference(self) -> Array:
@@ -61,16 +66,27 @@ class Sides:
 
 def samples_of(image: Image) -> int | None:
     """Samples a pixel, as the file tells: the tracer's own attribute, or the one that Cycles writes for each view layer."""
-    told = [
+    counts = [
         value
         for name, value in image.attributes.items()
         if name == "samples" or (name.startswith("cycles.") and name.endswith(".samples"))
     ]
-    return int(told[0]) if told and told[0].isdecimal() and len(told[0]) <= _MOST_DIGITS else None
+    return _whole(counts[0]) if counts else None
 
 
-def all_sides(reference: Image, tests: Sequence[Image]) -> Iterator[Sides]:
+def seed_of(image: Image) -> int:
+    """The seed of the tracer's picture, as its file tells, else 0."""
+    return _whole(image.attributes.get("seed", "")) or 0
+
+
+def _whole(text: str) -> int | None:
+    return int(text) if text.isdecimal() and len(text) <= _MOST_DIGITS else None
+
+
+def all_sides(reference: Image, tests: Sequence[Image], anew: Sequence[Image] = ()) -> Iterator[Sides]:
     """Every quantity that all pictures have, Combined first.
+
+    anew : the reference with several other seeds, whose mean and spread count in place of its own.
 
     Raises
     ------
@@ -88,18 +104,21 @@ def all_sides(reference: Image, tests: Sequence[Image]) -> Iterator[Sides]:
     variance = _variance(reference)
     # Where there are as many samples as a wanted error takes, neighbors' noise is not independent, but adds up to what it was.
     shared = np.where(np.isfinite(variance), variance, 0.0) if "Sample Count" in reference.passes else 0.0
-    combined = replace(_sides("Combined", reference, tests, variance), shared=shared)
-    yield combined
-    unknown = np.array(np.inf)
+    references = anew or [reference]
+    combined = replace(_sides("Combined", references, tests, None if anew else variance), shared=shared)
+    unknown = None if anew else np.array(np.inf)
     parts = [
-        _sides(name, reference, tests, unknown)
+        _sides(name, references, tests, unknown)
         for name in QUANTITIES[1:]
-        if all(_has(image, name) for image in (reference, *tests))
+        if all(_has(image, name) for image in (*references, *tests))
     ]
+    emission = [part for part in parts if part.name == "Emission"]
+    has_many = bool(emission) and len(tests) >= _MANY_SEEDS
+    yield replace(combined, certain=_is_certain(combined, emission[0])) if has_many else combined
     alone = np.any([_is_all(part, combined) for part in parts if part.name in _LIGHT], axis=0)
-    variance = np.where(quiet(combined.reference, combined.variance) & alone, 0.0, np.inf)
+    is_quiet = quiet(combined.reference, combined.variance) & alone
     for part in parts:
-        known = np.broadcast_to(variance, part.reference.shape)
+        known = np.where(is_quiet, 0.0, part.variance)
         yield replace(part, variance=known, shared=shared if part.name in _TIMES_COLOUR else 0.0)
 
 
@@ -112,14 +131,32 @@ def _is_all(part: Sides, combined: Sides) -> NDArray[np.bool_]:
     return (rest[0] & rest[1])[..., None]
 
 
+def _is_certain(combined: Sides, emission: Sides) -> NDArray[np.bool_]:
+    """(height, width, 1) bool: where all samples of either side have seen surfaces that shine, alike, and nothing else.
+
+    Had some seen an edge, the values of one side would differ among themselves, or as many samples of every seed have; so only
+    pixels count that nothing beside them outshines, as a pixel that is covered in part is outshone by one that is whole.
+    """
+    certain = _is_all(emission, combined) & ~combined.broken[..., None]
+    for values, variance in ((combined.reference, combined.variance), (combined.test, combined.spread)):
+        brightest = values.max(axis=-1)
+        outshone = largest_around(brightest) - brightest > _QUIET * FLOAT32 * brightest
+        certain &= ~(outshone | (_noise(values, variance) > 0.0))[..., None]
+    return certain
+
+
 def quiet(values: Array, variance: Array) -> NDArray[np.bool_]:
     """(height, width, 1) bool: where neither a pixel nor any around it has noise above float32's rounding.
 
     The surroundings count because the variance of a pixel is an estimate: where an edge crosses a corner of it, all of its
     samples may miss the corner.
     """
-    noise = np.sqrt(variance.max(axis=-1))
-    return ~(largest_around(noise - _QUIET * FLOAT32 * np.abs(values).max(axis=-1)) > 0.0)[..., None]
+    return ~(largest_around(_noise(values, variance)) > 0.0)[..., None]
+
+
+def _noise(values: Array, variance: Array) -> Array:
+    """(height, width): by how much the standard error is more than rounding; negative where it is not."""
+    return np.sqrt(variance.max(axis=-1)) - _QUIET * FLOAT32 * np.abs(values).max(axis=-1)
 
 
 def _variance(reference: Image) -> Array:
@@ -130,20 +167,26 @@ def _variance(reference: Image) -> Array:
     return np.full((*reference["Combined"].shape[:2], 3), 0.0 if samples_of(reference) == 1 else np.inf)
 
 
-def _sides(name: str, reference: Image, tests: Sequence[Image], variance: Array) -> Sides:
-    expected = values_of(reference, name)
-    mean, squares = np.zeros_like(expected), np.zeros_like(expected)
+def _sides(name: str, references: Sequence[Image], tests: Sequence[Image], variance: Array | None) -> Sides:
+    """variance : of the reference; None where the spread of several tells it."""
+    expected, own = _mean_and_spread(name, references)
+    mean, spread = _mean_and_spread(name, tests)
+    broken = ~(np.isfinite(expected).all(axis=-1) & np.isfinite(mean).all(axis=-1))
+    if broken.any():
+        expected, mean, spread, own = (np.where(broken[..., None], 0.0, array) for array in (expected, mean, spread, own))
+    return Sides(name, expected, mean, own if variance is None else np.broadcast_to(variance, expected.shape), spread, broken)
+
+
+def _mean_and_spread(name: str, images: Sequence[Image]) -> tuple[Array, Array]:
+    """A quantity's mean over pictures with several seeds, and that mean's variance: inf where there is one picture only."""
+    mean = np.zeros_like(values_of(images[0], name))
+    squares, seeds = np.zeros_like(mean), len(images)
     with np.errstate(invalid="ignore"):
-        for count, image in enumerate(tests, 1):  # Welford's running mean and sum of squares
+        for count, image in enumerate(images, 1):  # Welford's running mean and sum of squares
             step = values_of(image, name) - mean
             mean = mean + step / count
             squares += step**2 * (count - 1) / count
-    seeds = len(tests)
-    spread = squares / (seeds * (seeds - 1)) if seeds > 1 else np.full_like(mean, np.inf)
-    broken = ~(np.isfinite(expected).all(axis=-1) & np.isfinite(mean).all(axis=-1))
-    if broken.any():
-        expected, mean, spread = (np.where(broken[..., None], 0.0, array) for array in (expected, mean, spread))
-    return Sides(name, expected, mean, np.broadcast_to(variance, expected.shape), spread, broken)
+    return mean, squares / (seeds * (seeds - 1)) if seeds > 1 else np.full_like(mean, np.inf)
 
 
 def _has(image: Image, name: str) -> bool:

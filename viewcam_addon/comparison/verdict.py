@@ -80,14 +80,14 @@ class GeometryComparison:
         return not_a_number == 0 and self.mismatches.unexplained_count <= self.allowed_unexplained
 
     @property
-    def shows_nothing(self) -> bool:
+    def is_empty(self) -> bool:
         """True if no pixel of either picture shows an object, so that there is nothing to compare."""
         return self.hits == (0, 0)
 
     @property
     def answer(self) -> Answer:
         """True if the two are the same picture, in one sentence, which names the gravest fault where there is one."""
-        if self.shows_nothing:
+        if self.is_empty:
             return answered(False, "Nothing to compare", NOTHING_TO_COMPARE, self.not_modelled)
         systematic_ok = self.systematic is None or self.systematic.ok  # where nothing is compared no row is
         conversion_ok = self.conversion is None or self.conversion.ok
@@ -195,8 +195,8 @@ def _agreement(comparison: GeometryComparison) -> str:
     first = comparison.rows[0]
     count = len(comparison.mismatches.kinds)
     edges = f"; {count:,} on edges, {_explained(comparison)}" if count else ""
-    if shown := len(comparison.in_one_place.columns):
-        edges += f"; {shown:,} {in_one_place_text(comparison.in_one_place)}"
+    if coincident := len(comparison.in_one_place.columns):
+        edges += f"; {coincident:,} {in_one_place_text(comparison.in_one_place)}"
     median, nearly_all = (first.values[PERCENTILES.index(p)] for p in (50.0, 99.9))
     unit = first.unit if first.name == "Position" else "of the depth"
     return (

@@ -30,13 +30,13 @@ def light(add_lamp, set_world, scene):
 
 def deviation(sides, name="Combined"):
     """By how many standard errors, and by what share, all light of all scenes differs from Cycles'."""
-    ours = theirs = variance = 0.0
+    traced = cycles = variance = 0.0
     for each in sides:
         pictures = np.array([passes[name][..., :3] for passes in each.cycles], np.float64)
-        ours += each.traced[name][..., :3].sum(dtype=np.float64)
-        theirs += pictures.mean(axis=0).sum()
+        traced += each.traced[name][..., :3].sum(dtype=np.float64)
+        cycles += pictures.mean(axis=0).sum()
         variance += each.traced["Variance"].sum(dtype=np.float64) + (pictures.var(axis=0, ddof=1) / len(pictures)).sum()
-    return (ours - theirs) / np.sqrt(variance), ours / theirs - 1
+    return (traced - cycles) / np.sqrt(variance), traced / cycles - 1
 
 
 def check(sides):
@@ -201,8 +201,8 @@ def test_a_see_through_film_with_its_own_exposure_and_filter(take, scene, shape)
     sides = take()
     check(sides)
     for each in sides:
-        theirs = np.mean([passes["Combined"][..., 3] for passes in each.cycles])
-        assert each.traced["Combined"][..., 3].mean() == pytest.approx(theirs, rel=0.05) and 0 < theirs < 0.9
+        cycles = np.mean([passes["Combined"][..., 3] for passes in each.cycles])
+        assert each.traced["Combined"][..., 3].mean() == pytest.approx(cycles, rel=0.05) and 0 < cycles < 0.9
 
 
 @pytest.mark.parametrize("sabotage", ["albedo", "bounce"])

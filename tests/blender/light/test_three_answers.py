@@ -7,6 +7,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 import viewcam_addon as vp
+from viewcam_addon.commands.options import ledger_lines
 
 pytestmark = pytest.mark.slow
 
@@ -86,9 +87,9 @@ def test_what_is_not_modelled_and_in_the_picture_makes_it_amber(stage, change, l
     change()
     check = stage(level)
     assert (check.answer, check.passed) == ("same_but", True), check.sentence
-    told = check.figures["not_modelled"]
-    assert told["names"] == [name] and 0.01 < told["share"] < 0.9, told
-    assert f"but for 1 object that is not modelled ({name}; " in check.sentence
+    names = check.figures["not_modelled"]
+    assert names["names"] == [name] and 0.01 < names["share"] < 0.9, names
+    assert f"but for 1 object that is not modeled ({name}; " in check.sentence
 
 
 @pytest.mark.parametrize(
@@ -107,14 +108,30 @@ def test_hair_that_is_not_seen_and_casts_a_shadow_into_the_picture_makes_it_ambe
     ball, lamp = bpy.data.objects["Ball"], bpy.data.objects["Area"]
     ball.location, lamp.location, lamp.data.size = (0, 0, 6), (0, 0, 9), 0.1  # above what the camera sees
     bpy.context.view_layer.update()
-    told = stage("path").figures
-    assert told["answer"] == "same_but" and told["not_modelled"]["names"] == ["Ball"], told["sentence"]
-    assert told["not_modelled"]["shown"] == 0.0 and told["not_modelled"]["share"] > 0.005, told["not_modelled"]
+    figures = stage("path").figures
+    assert figures["answer"] == "same_but" and figures["not_modelled"]["names"] == ["Ball"], figures["sentence"]
+    assert figures["not_modelled"]["shown"] == 0.0 and figures["not_modelled"]["share"] > 0.005, figures["not_modelled"]
 
 
 def test_surface_scattering_below_the_skin_is_no_matter_of_geometry(stage):
     subsurface()
     assert stage("geometry").answer == "same"
+
+
+@pytest.mark.exhaustive  # another Blender renders the world
+def test_a_world_that_varies_by_a_node_is_an_image_that_cycles_renders_which_is_green_and_said(stage):
+    world = bpy.context.scene.world = bpy.data.worlds.new("World")
+    if not world.node_tree:  # new worlds have one from 5.0 on
+        world.use_nodes = True
+    tree = world.node_tree
+    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[1], background.inputs["Color"])
+    check = stage("path", strict=True)
+    assert (check.answer, check.passed) == ("same", True), check.sentence
+    (entry,) = (entry for entry in check.figures["ledger"] if entry["object"] == "World")
+    assert entry["status"] == "exported" and "both sides show an image of it, 2048 × 1024 pixels" in entry["reason"], entry
+    (line,) = (line for line in ledger_lines(check.figures["ledger"]) if "World" in line)
+    assert line == f"  World: exported, {entry['reason']}"
 
 
 def test_strict_fails_what_is_amber_and_lets_pass_what_is_green(stage):

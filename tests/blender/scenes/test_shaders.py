@@ -132,11 +132,11 @@ VALUES = [
 
 @pytest.mark.parametrize("value", VALUES)
 def test_the_stand_in_of_a_value_is_read_as_that_value(diffuse, image, value):
-    made = Material(surface=node("emission", color=value, strength=2.0))
+    material = Material(surface=node("emission", color=value, strength=2.0))
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made, {"Checks": image}))
+        materials.stand_in(overrides, diffuse, shaders.Reading(material, {"Checks": image}))
         read = exactly(diffuse)
-    assert read == made
+    assert read == material
 
 
 def test_every_node_that_makes_values_is_made_for_blender():
@@ -148,26 +148,30 @@ def test_every_node_that_makes_values_is_made_for_blender():
 
 def test_an_ies_text_is_made_for_blender_and_gone_with_the_stand_in(diffuse):
     text = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 100\n0 90\n0\n100 50\n"
-    made = Material(surface=node("emission", color=node("ies", text=text, strength=0.5)))
+    material = Material(surface=node("emission", color=node("ies", text=text, strength=0.5)))
     before = len(bpy.data.texts)
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made))
+        materials.stand_in(overrides, diffuse, shaders.Reading(material))
         read = shaders.read(diffuse)
         assert len(bpy.data.texts) == before + 1
-    assert not read.reasons and read.material == made and len(bpy.data.texts) == before
+    assert not read.reasons and read.material == material and len(bpy.data.texts) == before
 
 
 def test_a_displacement_is_read_as_the_height_that_it_is_made_of(diffuse):
     """And as what it is made into along the normal, where it is a Vector Displacement, or goes along other axes."""
     height = node("noise", vector=node("texture_coordinate"), scale=3.0)
-    made = Material(diffuse=Colour(RED), displacement=height)
+    material = Material(diffuse=Colour(RED), displacement=height)
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made))
-        assert exactly(diffuse) == made
+        materials.stand_in(overrides, diffuse, shaders.Reading(material))
+        assert exactly(diffuse) == material
         raised = next(each for each in diffuse.node_tree.nodes if each.type == "DISPLACEMENT")
         raised.space, raised.inputs["Midlevel"].default_value, raised.inputs["Scale"].default_value = "OBJECT", 0.5, 0.25
-        found = exactly(diffuse).displacement
-        assert (found["operation"], found["b"].type, found["a"]["b"]) == ("multiply", "vector_math", (0.25,) * 3)
+        read_height = exactly(diffuse).displacement
+        assert (read_height["operation"], read_height["b"].type, read_height["a"]["b"]) == (
+            "multiply",
+            "vector_math",
+            (0.25,) * 3,
+        )
         diffuse.displacement_method = "BOTH"
         assert exactly(diffuse).displacement is None and materials.departures(diffuse, lit=True) == ["is displaced"]
         diffuse.displacement_method = "BUMP"
@@ -187,13 +191,13 @@ def test_curves_are_drawn_that_have_the_table_again(diffuse, image, kind, extrap
     table.pixels.foreach_set(np.append(wanted, np.ones((1, 257, 1), np.float32), axis=2).ravel())
     settings = {"table": Colour((1.0, 1.0, 1.0), "Table"), "least": -0.25, "most": 1.5, "extrapolate": extrapolate}
     value = node(kind, **{CURVES[kind]: CHECKS}, factor=0.75, **settings)
-    made = Material(surface=node("emission", color=value))
+    material = Material(surface=node("emission", color=value))
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made, {"Checks": image, "Table": table}))
+        materials.stand_in(overrides, diffuse, shaders.Reading(material, {"Checks": image, "Table": table}))
         read = shaders.read(diffuse)
-    found = read.material.surface["color"]
-    assert not read.reasons and {**dict(found.inputs), "table": None} == {**dict(value.inputs), "table": None}
-    assert read.tables[found["table"].image].pixels == pytest.approx(wanted, abs=2e-5)
+    read_color = read.material.surface["color"]
+    assert not read.reasons and {**dict(read_color.inputs), "table": None} == {**dict(value.inputs), "table": None}
+    assert read.tables[read_color["table"].image].pixels == pytest.approx(wanted, abs=2e-5)
 
 
 def test_what_light_path_says_of_light_is_named_where_both_ways_to_find_it_are_told_otherwise(diffuse, make_material):
@@ -214,16 +218,16 @@ def test_what_light_path_says_of_light_is_named_where_both_ways_to_find_it_are_t
 def test_a_value_of_more_nodes_than_are_followed_is_named(diffuse, count, both, words):
     """Each of them feeds the next; or both of its inputs, so that 2^count are asked for."""
     tree = diffuse.node_tree
-    made = tree.nodes.new("ShaderNodeTexCoord").outputs["UV"]
+    value = tree.nodes.new("ShaderNodeTexCoord").outputs["UV"]
     for number in range(count):
         node = tree.nodes.new("ShaderNodeMath")
         for socket in node.inputs[: 1 + both]:
-            tree.links.new(made, socket)
-        made = node.outputs[0]
+            tree.links.new(value, socket)
+        value = node.outputs[0]
         if number == 6:
-            tree.links.new(made, tree.nodes["Shader"].inputs["Color"])
+            tree.links.new(value, tree.nodes["Shader"].inputs["Color"])
             exactly(diffuse)
-    tree.links.new(made, tree.nodes["Shader"].inputs["Color"])
+    tree.links.new(value, tree.nodes["Shader"].inputs["Color"])
     approximately(diffuse, "Math", words)
 
 
@@ -244,10 +248,10 @@ def test_the_stand_in_of_a_shader_is_read_as_that_shader(diffuse, image, surface
         read = exactly(diffuse)
     if surface.type in ("diffuse", "emission", "glass", "refraction"):  # which are components while they are not rough
         read = Material(surface=read.closures[0].node)
-    for found, wanted in zip(read.closures, Material(surface=surface).closures, strict=True):
-        assert (found.node.type, found.factors) == (wanted.node.type, wanted.factors)
+    for read_closure, wanted in zip(read.closures, Material(surface=surface).closures, strict=True):
+        assert (read_closure.node.type, read_closure.factors) == (wanted.node.type, wanted.factors)
         for name in KINDS[wanted.node.type].inputs:
-            assert name == "distribution" or rounded(found.node[name]) == rounded(wanted.node[name]), name
+            assert name == "distribution" or rounded(read_closure.node[name]) == rounded(wanted.node[name]), name
 
 
 def rounded(colour):
@@ -391,7 +395,7 @@ def test_what_makes_an_input_that_does_not_count_is_not_followed(make_material, 
     link(material, "ShaderNodeAmbientOcclusion", 0, socket)
     exactly(material)
     material.node_tree.nodes["Shader"].inputs[weight].default_value = 0.5
-    approximately(material, "'Ambient Occlusion'", "not modelled")
+    approximately(material, "'Ambient Occlusion'", "not modeled")
 
 
 @pytest.mark.parametrize("kind", ["AmbientOcclusion", "TexGabor", "RadialTiling", "TexSky", "Bevel"])
@@ -400,7 +404,7 @@ def test_a_texture_that_is_not_modelled_leaves_the_color_of_the_viewport_and_is_
         pytest.skip(f"Blender {bpy.app.version_string} has no {kind}")
     diffuse.diffuse_color = (*RED, 1.0)
     link(diffuse, f"ShaderNode{kind}", 0, "Color")
-    assert approximately(diffuse, "not modelled") == Material(diffuse=Colour(RED))
+    assert approximately(diffuse, "not modeled") == Material(diffuse=Colour(RED))
 
 
 def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
@@ -408,20 +412,20 @@ def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
     mixed.name = "Blend"
     link(diffuse, "ShaderNodeAmbientOcclusion", 0, 0, "Blend")
     show(diffuse, mixed)
-    (closure,) = approximately(diffuse, "'Ambient Occlusion'", "not modelled").closures
+    (closure,) = approximately(diffuse, "'Ambient Occlusion'", "not modeled").closures
     assert closure.node["color"] == Colour(tuple(value / 2 for value in RED)) and not closure.factors
 
 
 def test_other_shaders_are_lamberts_of_their_colour(make_material):
     toon = make_material("t", "ShaderNodeBsdfToon", Color=colour(RED))
-    assert approximately(toon, "'Shader'", "not modelled") == Material(diffuse=Colour(RED))
+    assert approximately(toon, "'Shader'", "not modeled") == Material(diffuse=Colour(RED))
 
 
 def test_what_has_no_colour_has_the_viewports(make_material):
     unknown = make_material("s", "ShaderNodeBsdfDiffuse")
     link(unknown, "ShaderNodeAmbientOcclusion", 0, "Color").name = "Wires"
     unknown.diffuse_color = colour(GREEN)
-    assert approximately(unknown, "'Wires'", "not modelled") == Material(diffuse=Colour(GREEN))
+    assert approximately(unknown, "'Wires'", "not modeled") == Material(diffuse=Colour(GREEN))
 
 
 def test_constant_nodes_reroutes_muted_nodes_and_groups_are_looked_through(diffuse):
@@ -457,9 +461,9 @@ def test_a_value_is_a_grey_and_a_colour_has_a_luminance(make_material):
 
 @pytest.fixture
 def image(fresh_blender):
-    made = bpy.data.images.new("Checks", 4, 2)
-    made.pixels.foreach_set([0.5, 0.25, 1.0, 1.0] * 8)
-    return made
+    block = bpy.data.images.new("Checks", 4, 2)
+    block.pixels.foreach_set([0.5, 0.25, 1.0, 1.0] * 8)
+    return block
 
 
 def test_an_image_and_the_meshs_colours_are_factors(diffuse, image):
@@ -513,7 +517,7 @@ def test_without_nodes_or_without_an_output_the_viewports_colour_counts(diffuse)
 
 def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image):
     """What Cycles is shown is what the tracer is given, or the shader below would be another."""
-    made = Material(
+    material = Material(
         diffuse=Colour(RED),
         emission=Colour((1.0, 2.0, 3.0)),
         mirror=Colour(GREEN),
@@ -523,21 +527,21 @@ def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image
     )
     before = [node.name for node in diffuse.node_tree.nodes]
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made))
-        assert exactly(diffuse) == made
+        materials.stand_in(overrides, diffuse, shaders.Reading(material))
+        assert exactly(diffuse) == material
     assert [node.name for node in diffuse.node_tree.nodes] == before
     assert exactly(diffuse) == Material(diffuse=Colour(RED))
 
 
 def test_products_of_colours_are_read_as_what_they_stand_for(diffuse, image):
-    made = Material(
+    material = Material(
         diffuse=Colour((0.5, 0.25, 0.0), image.name_full, closest=True, vertex=True),
         emission=Colour((4.0, 2.0, 1.0), vertex=True),
         mirror=Colour((0.5, 0.5, 0.5), image.name_full),
     )
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made, {image.name_full: image}))
-        assert exactly(diffuse) == made
+        materials.stand_in(overrides, diffuse, shaders.Reading(material, {image.name_full: image}))
+        assert exactly(diffuse) == material
 
 
 def test_the_plain_material_is_the_tracers(fresh_blender):

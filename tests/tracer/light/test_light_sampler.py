@@ -145,11 +145,13 @@ def test_a_coated_surface_beside_a_lamp_and_a_sky_has_the_sum_of_both(make_lit, 
         return pixels.mean(), np.sqrt(passes["Variance"][..., 0].sum(dtype=float)) / pixels.size
 
     sky = World((0.3,) * 3)
-    (one, one_error), (other, other_error) = measure((lamp,), World(), 64), measure((), sky, 64)
+    (first, one_error), (other, other_error) = measure((lamp,), World(), 64), measure((), sky, 64)
     mean, error = measure((lamp,), sky, 64)
     assert error < 0.002 * mean and other > 0.02 * mean, "that would tell nothing"
-    off = mean - one - other
-    assert abs(off) <= 4 * np.sqrt(error**2 + one_error**2 + other_error**2), f"{mean:.6g} for {one + other:.6g} ± {error:.2g}"
+    off = mean - first - other
+    assert abs(off) <= 4 * np.sqrt(error**2 + one_error**2 + other_error**2), (
+        f"{mean:.6g} for {first + other:.6g} ± {error:.2g}"
+    )
 
 
 def test_shining_surfaces_beside_lamps_are_found_as_often_as_it_takes(lit, make_mesh):
@@ -178,8 +180,8 @@ def test_what_a_lamp_hides_from_it_does_not_light_and_is_not_seen_by(make_lit, f
     for hidden in (frozenset(), frozenset({kind})):
         lamp = Area("area", matrix=matrix, size=(900, 900), power=(1e6,) * 3, hidden_from=hidden)
         for ray, (camera, things) in views.items():
-            shown = replace(lamp, hidden_from=hidden | {"camera"}) if ray == "transmission" else lamp
-            bright = render(make_lit(camera, *things, lamps=(shown,)), "path", 1)["Combined"][..., :3].any()
+            seen_lamp = replace(lamp, hidden_from=hidden | {"camera"}) if ray == "transmission" else lamp
+            bright = render(make_lit(camera, *things, lamps=(seen_lamp,)), "path", 1)["Combined"][..., :3].any()
             assert bright == (ray not in hidden), (ray, hidden)
 
 

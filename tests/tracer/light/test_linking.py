@@ -132,7 +132,7 @@ def test_links_to_what_is_not_there_and_too_many_of_them_are_refused(halves, wha
     scene = halves((OVERHEAD,))
     objects = tuple(replace(scene.objects[0], name=name) for name in names)
     sets = [frozenset(name for bit, name in enumerate(names) if number >> bit & 1) for number in range(MOST_LINKS[what] + 1)]
-    lamps = tuple(replace(OVERHEAD, **{what: some}) for some in sets)
+    lamps = tuple(replace(OVERHEAD, **{what: linked_names}) for linked_names in sets)
     replace(scene, objects=objects, lamps=lamps[:-1])
     with pytest.raises(InputError, match=f"different sets of {what}"):
         replace(scene, objects=objects, lamps=lamps)

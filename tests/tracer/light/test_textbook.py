@@ -108,9 +108,9 @@ def traced(make_lit, make_mesh):
     return trace
 
 
-def off_by(one, other):
+def off_by(actual, expected):
     """Standard errors between two pictures: (height, width, 3), and of their means."""
-    (mean, variance), (other_mean, other_variance) = one, other
+    (mean, variance), (other_mean, other_variance) = actual, expected
     rounding = 2.0**-23 * np.abs(other_mean)  # of pixels without noise
     apart, error = mean - other_mean, np.sqrt(variance + other_variance + rounding**2)
     return apart / error, apart.sum() / np.sqrt((error**2).sum())

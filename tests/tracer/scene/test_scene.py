@@ -89,11 +89,11 @@ def scene(make_scene, make_mesh):
     """scene(material, field=value, …) → a Scene of one triangle of this material, "object 1"."""
 
     def build(material=None, **changes):
-        made = make_scene(Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 4, 4), make_mesh(np.eye(3), [[0, 1, 2]]))
+        scene = make_scene(Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 4, 4), make_mesh(np.eye(3), [[0, 1, 2]]))
         if material:
-            placed = replace(made.objects[0], materials=("M",))
-            made = replace(made, objects=(placed,), materials={"M": material})
-        return replace(made, **changes)
+            placed = replace(scene.objects[0], materials=("M",))
+            scene = replace(scene, objects=(placed,), materials={"M": material})
+        return replace(scene, **changes)
 
     return build
 
@@ -157,8 +157,8 @@ def test_glass_that_only_reflects_needs_paths(scene):
 
 
 def test_materials_that_nothing_shows_do_not_count(scene):
-    made = scene(Material(emission=WHITE))
-    unused = replace(made, materials=made.materials | {"Mirror": Material(mirror=WHITE)})
+    material = scene(Material(emission=WHITE))
+    unused = replace(material, materials=material.materials | {"Mirror": Material(mirror=WHITE)})
     assert least_level(unused)[0] == "direct"
 
 
@@ -179,12 +179,12 @@ def mixed(factor, first, second):
 
 
 @given(st.dictionaries(st.sampled_from(["diffuse", "emission", "mirror", "glass", "refraction"]), COLOURS))
-def test_the_components_of_what_a_material_adds_up_are_its_own(given):
-    material = Material(**given, ior=1.3)
-    tree = added(*(closure.node for closure in material.closures)) if given else None
-    found = components(tree)
-    assert Material(**found).colours == given
-    assert found.get("ior", 1.3) == 1.3
+def test_the_components_of_what_a_material_adds_up_are_its_own(stated):
+    material = Material(**stated, ior=1.3)
+    tree = added(*(closure.node for closure in material.closures)) if stated else None
+    actual = components(tree)
+    assert Material(**actual).colours == stated
+    assert actual.get("ior", 1.3) == 1.3
 
 
 def test_a_mixture_shares_out_colours_and_adds_those_that_are_alike():

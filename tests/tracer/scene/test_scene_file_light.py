@@ -42,8 +42,8 @@ def differences(first, second, where="scene"):
         for key in first:
             yield from differences(first[key], second[key], f"{where}[{key!r}]")
     elif isinstance(first, tuple) and len(first) == len(second):
-        for index, (one, other) in enumerate(zip(first, second, strict=True)):
-            yield from differences(one, other, f"{where}[{index}]")
+        for index, (left, other) in enumerate(zip(first, second, strict=True)):
+            yield from differences(left, other, f"{where}[{index}]")
     elif first != second:
         yield f"{where}: {first!r} became {second!r}"
 
@@ -187,8 +187,8 @@ def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mes
     path = tmp_path_factory.mktemp("scene") / "light.json"
     scene_file.write(scene, path)
     back = scene_file.read(path)
-    found = list(differences(scene, back))
-    assert not found, "\n".join(found)
+    errors = list(differences(scene, back))
+    assert not errors, "\n".join(errors)
 
 
 def test_in_a_list_numbers_are_what_they_say_and_in_an_array_bytes_are_shares_of_255(random_scene, tmp_path):
@@ -241,7 +241,7 @@ def test_every_key_of_light_is_documented():
 
 def in_a_row(count):
     """So many nodes, each of which feeds the next."""
-    return functools.reduce(lambda made, _: {"type": "math", "a": made}, range(count), 0.5)
+    return functools.reduce(lambda node, _: {"type": "math", "a": node}, range(count), 0.5)
 
 
 @pytest.mark.parametrize(

@@ -121,8 +121,12 @@ def buttons(column: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types
 def described(
     column: bpy.types.UILayout, context: bpy.types.Context, label: str, texts: tuple[str, ...], share: float
 ) -> bpy.types.UILayout:
-    """A label and what it describes, never translated; the row of these. share : of the width, the label's."""
-    if is_narrow(context):
+    """A label and what it describes, never translated; the row of these, below the label where they don't fit beside it.
+
+    share : of the width, the label's.
+    """
+    room = (1.0 - share) * (_width(context) - _BESIDE_TEXT) / max(len(texts), 1)
+    if is_narrow(context) or (len(texts) > 1 and not all(readouts.fits(text, room) for text in texts)):
         column.label(text=label)
         row = column.row()
         where = row.column(align=True) if texts else row

@@ -13,7 +13,7 @@ from ...comparison.answer import DIFFERENT, SAME
 from ...errors import InputError
 from .. import datablocks, preferences
 from ..render_settings import LEVELS
-from . import icons, panel_rows, proof_image
+from . import icons, panel_rows, proof_image, swipe
 from .background import Background, Cancels, StartsForCamera
 from .comparing import Outcome, RunningComparison
 from .panel_places import BelowProperties, BelowSidebar, CameraPanel
@@ -94,7 +94,7 @@ class VIEWCAM_OT_compare_with_cycles(StartsForCamera, bpy.types.Operator):
     )
     background, busy = background, "A comparison is on its way"
 
-    _shown = ("", 0)  # the step and the second that were drawn last
+    _last_drawn = ("", 0)  # the step and the second that were drawn last
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background:
@@ -148,9 +148,9 @@ class VIEWCAM_OT_compare_with_cycles(StartsForCamera, bpy.types.Operator):
     def _show(self, context: bpy.types.Context) -> None:
         """Draw what has changed since the last look."""
         step, second = background.running.progress()[1], int(background.running.seconds)
-        if (step, second) != self._shown:
-            _redraw(context, status_bar=step != self._shown[0])
-        self._shown = step, second
+        if (step, second) != self._last_drawn:
+            _redraw(context, status_bar=step != self._last_drawn[0])
+        self._last_drawn = step, second
 
     def _leave(self, context: bpy.types.Context) -> None:
         _stop_timer()
@@ -210,6 +210,7 @@ class _ProofPanel(CameraPanel):
             _draw_progress(self.layout)
         else:
             self.layout.operator("viewcam.compare_with_cycles", icon="PLAY").camera = camera_object.name
+        swipe.draw_button(self.layout)
         if background.latest:
             column = self.layout.column()
             column.active = background.running is None

@@ -9,12 +9,14 @@ from ...comparison import tolerances
 from ...pinhole import Pinhole, Triple
 from .. import findings
 
+_CHARACTER = 6.8  # pixels, in the mean of a panel's text
+
 
 class Readout(NamedTuple):
-    """A row. shown : one text, or three for the vectors. exact : what is copied, with all digits and without units."""
+    """A row. texts : one text, or three for the vectors. exact : what is copied, with all digits and without units."""
 
     label: str
-    shown: tuple[str, ...]
+    texts: tuple[str, ...]
     exact: str
 
 
@@ -104,6 +106,11 @@ def _corner(camera: Pinhole) -> float:
     return max(math.dist((x, y), corner) for corner in product((0, camera.width), (0, camera.height)))
 
 
+def fits(text: str, width: float) -> bool:
+    """True if a region of so many pixels holds a text in one line."""
+    return len(text) <= width / _CHARACTER
+
+
 def wrapped(sentence: str, width: float) -> list[str]:
-    """The lines of a sentence in a region of so many pixels, at the panel's mean character width."""
-    return textwrap.wrap(sentence, max(8, int(width / 6.8)))
+    """The lines of a sentence in a region of so many pixels."""
+    return textwrap.wrap(sentence, max(8, int(width / _CHARACTER)))

@@ -5,7 +5,7 @@ Blender's search (F3) looks through menus; what stands in none is found by devel
 
 import bpy
 
-from . import baking, clipboard, dragging, moving, operators, photo_matching, scene_cameras
+from . import baking, clipboard, dragging, moving, operators, photo_matching, scene_cameras, swipe
 
 
 class VIEWCAM_MT_cameras(bpy.types.Menu):
@@ -20,6 +20,7 @@ class VIEWCAM_MT_cameras(bpy.types.Menu):
             clipboard.IN_MENUS,
             scene_cameras.OPERATORS,
             photo_matching.OPERATORS,
+            swipe.CLASSES,
         ):
             for each in group:
                 if each is moving.VIEWCAM_OT_drag_camera:

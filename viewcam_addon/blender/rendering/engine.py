@@ -10,8 +10,7 @@ Light refines over the whole picture, step by step, the final one with the bits 
 What is prepared for one picture serves all passes of a frame, and the next frames as well where Blender's "Persistent Data" is
 on, which keeps the engine. The scene is read anew for each, except in a batch (`keeps_scene`).
 
-In the viewport's Rendered shading live_view.py traces; here it is told of scene and view, and its picture is drawn. The scene
-is read as the viewport's graph has it, whenever Blender tells of a change of more than cameras.
+In the viewport's Rendered shading live_view.py traces; here it is told of scene and view, and its picture is drawn.
 
 Rejected: a result that is begun once and updated, which Blender would copy whole for each band of rows.
 """
@@ -36,7 +35,7 @@ from ..scenes import export
 from ..scenes.depsgraph import only_cameras_changed
 from ..scenes.ledger import Ledger
 from . import live_view, tracing
-from .live_view import LiveView, camera_of, lit_from_the_eye
+from .live_view import LiveView, lit_from_the_eye, of_clay
 
 _GEOMETRY = LEVELS[0]
 
@@ -55,9 +54,8 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
     warnings: tuple[str, ...] = ()
     _keeper = None
     _read = None  # what it was read for, and the scene
-    # Of a viewport: what traces it, what it is asked to show, and what was drawn last as a texture, with its number.
+    # Of a viewport: what traces it, and what was drawn last as a texture, with its picture.
     _live: LiveView | None = None
-    _shown: tuple | None = None
     _texture: tuple | None = None
 
     def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
@@ -78,9 +76,8 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
                 self._keeper = self._read = None
 
     def view_update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
-        """The scene has changed: it is read anew as it is drawn next."""
-        if depsgraph.id_type_updated("SCENE") or not only_cameras_changed(depsgraph):
-            self._read = None
+        if self._live:
+            self._live.scene_changed(depsgraph)
 
     def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         try:
@@ -91,20 +88,9 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
             self.update_stats("", f"Virtual Pinhole: {errors.bug(error)}")
 
     def _show_view(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
-        settings, space = depsgraph.scene_eval.virtual_pinhole_reference, context.space_data
-        camera = camera_of(context.region, context.region_data)
-        clip = space.clip_start, space.clip_end
-        lit = settings.level != "GEOMETRY"
-        if self._read is None or self._read[0] != lit:
-            self._read = lit, export.scene_through(depsgraph, camera, clip, Ledger(), lit)
-            self._shown = None
-        scene = self._read[1]
-        level = least_level(scene)[0] if settings.level == "AUTO" else settings.level.lower()
-        asked = camera, clip, level, settings.samples, settings.clay
+        space = context.space_data
         self._live = self._live or LiveView()
-        if asked != self._shown:
-            self._shown, scene = asked, replace(scene, camera=camera, clip=clip)
-            self._live.show(_of_clay(scene) if settings.clay else scene, level, settings.samples)
+        self._live.follow(depsgraph, context.region, context.region_data, (space.clip_start, space.clip_end))
         self._draw_picture(self._live, context, depsgraph.scene)
 
     def _draw_picture(self, live: LiveView, context: bpy.types.Context, scene: bpy.types.Scene) -> None:
@@ -113,8 +99,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         from gpu_extras.presets import draw_texture_2d
 
         live.drawn, picture = live.number, live.picture
-        words = f"{live.samples} samples" if live.samples else "Surfaces"
-        self.update_stats("", live.message or words)
+        self.update_stats("", live.words())
         if picture is None:
             return
         if self._texture is None or self._texture[0] is not picture:
@@ -158,13 +143,13 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
             raise InputError("stereoscopy is on, and each eye has another camera: turn it off among the output properties")
         settings, camera_object = depsgraph.scene_eval.virtual_pinhole_reference, self.camera_override.original
         scene = self._read_scene(depsgraph, camera_object, settings.level != "GEOMETRY")
-        scene = _of_clay(scene) if settings.clay else scene
+        scene = of_clay(scene) if settings.clay else scene
         frame = datablocks.frame_of(depsgraph.scene)
         if frame.border and not frame.crop:
             scene = replace(scene, camera=scene.camera.cropped(*replace(frame, crop=True).window))
         lacking = [(entry.object, entry.reason) for entry in scene.ledger if entry.status != "exported"]
         beyond = [(camera_object.name, sentence) for sentence in datablocks.beyond_pinhole(camera_object, depsgraph.scene)]
-        words = [f"Not modelled as it is: {name!r}, {reason}" for name, reason in (*beyond, *lacking)]
+        words = [f"Not modeled as it is: {name!r}, {reason}" for name, reason in (*beyond, *lacking)]
         if words:
             others = f" (and {len(words) - 1} more, which viewcam export lists)" if len(words) > 1 else ""
             self.report({"WARNING"}, plain(words[0] + others))
@@ -191,12 +176,12 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
 
         self._keeper = self._keeper or tracing.keeper()
         settings, threads = depsgraph.scene_eval.virtual_pinhole_reference, depsgraph.scene.render.threads
-        centres: Passes = {}
+        centers: Passes = {}
         if level != _GEOMETRY and set(GEOMETRY_PASSES) & set(_asked_for(depsgraph.scene_eval, depsgraph.view_layer)):
             for passes, _ in traced(_GEOMETRY):
-                centres = passes
+                centers = passes
         for passes, rows in traced(level, steps):
-            band = {name: values[rows.start : rows.stop] for name, values in (centres | passes).items()}
+            band = {name: values[rows.start : rows.stop] for name, values in (centers | passes).items()}
             if level == _GEOMETRY:
                 band["Combined"] = lit_from_the_eye(band)
             yield band, rows
@@ -210,10 +195,6 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
             if name in band:
                 there[versions.pass_name(name)].rect.foreach_set(band[name].ravel())
         self.end_result(result)
-
-
-def _of_clay(scene: Scene) -> Scene:
-    return replace(scene, objects=tuple(replace(placed, materials=()) for placed in scene.objects))
 
 
 def _asked_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Iterator[str]:

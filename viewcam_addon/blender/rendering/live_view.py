@@ -1,8 +1,9 @@
 """The picture of a viewport, traced in a thread: surfaces at once, then light that refines, anew for each scene and view.
 
-Blender asks an engine to draw whenever its viewport is drawn, and must not wait for it: `LiveView.show` only says what shall be
-seen, and `picture` is what has come of it by then. What is asked for last ends what is under way. Hierarchies are kept from one
-view to the next (tracer/render.py).
+Blender draws a viewport whenever it likes, and must not wait: `LiveView.follow` only says what shall be seen, and `picture` is
+what has come of it by then. What is asked for last ends what is under way. The scene is read as the viewport's graph has it,
+when Blender has told of a change of more than cameras; hierarchies are kept from one view to the next (tracer/render.py). The
+engine (engine.py) and the swipe over other engines (interface/swipe.py) each have one.
 
 The camera is that of the matrices with which Blender draws, so that outlines and handles lie on what is traced.
 
@@ -12,6 +13,7 @@ a whole one takes less than a twentieth of a second).
 
 import contextlib
 import threading
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 from weakref import WeakSet
 
@@ -25,7 +27,11 @@ from ...pinhole import Pinhole
 from ...rotation import float64
 from ...tracer.scene import Scene
 from ...tracer.scene.film import LEVELS, refinement
+from ...tracer.scene.levels import least_level
 from ...tracer.tiles import Passes, Stopped
+from ..scenes import export
+from ..scenes.depsgraph import only_cameras_changed
+from ..scenes.ledger import Ledger
 
 if TYPE_CHECKING:
     from ...tracer.render import Keeper
@@ -53,8 +59,44 @@ class LiveView:
         self._steps: list[int] = []  # samples of the pictures of light that are still to come
         self._rows = 0  # of the next one that are there
         self._is_at_work = self._is_closed = False
+        self._read: tuple[bool, Scene] | None = None  # whether with light, and the scene
+        self._followed: tuple | None = None  # view and settings
         self._all.add(self)
         threading.Thread(target=self._work, name="viewcam view", daemon=True).start()
+
+    def scene_changed(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Have the scene read anew, unless nothing but cameras has changed."""
+        if depsgraph.id_type_updated("SCENE") or not only_cameras_changed(depsgraph):
+            self._read = None
+
+    def follow(
+        self,
+        depsgraph: bpy.types.Depsgraph,
+        region: bpy.types.Region,
+        view: bpy.types.RegionView3D,
+        clip: tuple[float, float],
+    ) -> None:
+        """Show what a viewport shows, with the settings of the reference, unless that is on its way already.
+
+        Raises
+        ------
+        InputError
+            if the view is orthographic, or the scene can't be read.
+        """
+        settings, camera = depsgraph.scene_eval.virtual_pinhole_reference, camera_of(region, view)
+        lit = settings.level != "GEOMETRY"
+        if self._read is None or self._read[0] != lit:
+            self._read, self._followed = (lit, export.scene_through(depsgraph, camera, clip, Ledger(), lit)), None
+        scene = self._read[1]
+        level = least_level(scene)[0] if settings.level == "AUTO" else settings.level.lower()
+        followed = camera, clip, level, settings.samples, settings.clay
+        if followed != self._followed:
+            self._followed, scene = followed, replace(scene, camera=camera, clip=clip)
+            self.show(of_clay(scene) if settings.clay else scene, level, settings.samples)
+
+    def words(self) -> str:
+        """The subject of the picture, or why there is none."""
+        return self.message or (f"{self.samples} samples" if self.samples else "Surfaces")
 
     def show(self, scene: Scene, level: str, samples: int) -> None:
         """Begin with another picture. samples : of light, at most."""
@@ -122,6 +164,11 @@ class LiveView:
             self.picture = np.ascontiguousarray(picture, np.float32)
         self.samples, self.message = samples, message
         self.number += 1
+
+
+def of_clay(scene: Scene) -> Scene:
+    """The scene with one material on everything."""
+    return replace(scene, objects=tuple(replace(placed, materials=()) for placed in scene.objects))
 
 
 def lit_from_the_eye(passes: Passes) -> Picture:

@@ -73,22 +73,22 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colours: bool = False, at
 
 
 @contextlib.contextmanager
-def mesh_shown(shown: bpy.types.Object, split: bool = False) -> Iterator[bpy.types.Mesh]:
+def mesh_shown(evaluated: bpy.types.Object, split: bool = False) -> Iterator[bpy.types.Mesh]:
     """The mesh of an object or an instance in a depsgraph, as it is there, or a copy that lasts as long as the context.
 
     What is edited is no mesh before it is copied. split : copies one that Cycles splits, too, and splits the copy.
     """
-    mesh = shown.data
+    mesh = evaluated.data
     if not (mesh.is_editmode or (split and is_split(mesh))):
         yield mesh
         return
-    copy = shown.to_mesh()
+    copy = evaluated.to_mesh()
     try:
         if split and is_split(copy):
             copy.split_faces()
         yield copy
     finally:
-        shown.to_mesh_clear()
+        evaluated.to_mesh_clear()
 
 
 def spheres_of(points: bpy.types.PointCloud) -> Spheres:

@@ -219,7 +219,7 @@ class Tree:
         kind = _AS.get(source.node.type, source.node.type)
         found = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == kind), None)
         if found is None:
-            self._reason(source, "is not modelled")
+            self._reason(source, "is not modeled")
             name = next((name for name in ("Base Color", "Color") if name in source.node.inputs), None)
             return Node("diffuse", (("color", self._colour(source, name) if name else self.viewport),))
         ours, shader = found
@@ -267,18 +267,18 @@ class Tree:
             return Colour(_WHITE, vertex=True)
         if node.type == "VECT_MATH" and node.operation == "MULTIPLY":
             return self._product(source)
-        self._reason(source, "is not modelled")
+        self._reason(source, "is not modeled")
         return self.viewport
 
     def _product(self, output: Output) -> Colour:
         """The product that a Vector Math node makes of two colors."""
         first, second = self._colour(output, 0), self._colour(output, 1)
         if (first.image and second.image) or (first.vertex and second.vertex):
-            self._reason(output, "multiplies two colours that vary alike")
+            self._reason(output, "multiplies two colors that vary alike")
             return first
         rgb = possible(tuple(a * b for a, b in zip(first.rgb, second.rgb, strict=True)))
         if rgb is None:
-            self._reason(output, "multiplies colours beyond what light can have")
+            self._reason(output, "multiplies colors beyond what light can have")
             return self.viewport
         textured = first if first.image else second
         return Colour(rgb, textured.image, textured.closest, first.vertex or second.vertex)
@@ -296,7 +296,7 @@ class Tree:
             return self.viewport
         vector = nodes.source(output.input("Vector"))
         if isinstance(vector, Output) and not self._is_uv(vector):
-            self._reason(vector, "is not modelled")
+            self._reason(vector, "is not modeled")
         return Colour(_WHITE, node.image.original.name_full, node.interpolation == "Closest")
 
     def _shows(self, output: Output) -> bool:
@@ -457,7 +457,7 @@ class Tree:
             return self._along(output)
         found = value_nodes.value_of(output)
         if found is None:
-            self._reason(output, "is not modelled")
+            self._reason(output, "is not modeled")
             return None
         told = len(self.reading.reasons)
         ours, value = found

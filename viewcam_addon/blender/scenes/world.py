@@ -55,11 +55,11 @@ def world_of(
         if hasattr(owner, name):  # versions know fewer of them
             ledger.set_for_cycles(owner, name, value, stands_in=False)
     hidden_from = frozenset(ray for ray in _RAYS if not getattr(world.cycles_visibility, ray))
-    made = _rendered(scene, world, reasons, ledger, render) if reasons else None
-    if made:
+    rendered = _rendered(scene, world, reasons, ledger, render) if reasons else None
+    if rendered:
         if pictures is not None:
-            pictures |= made.pictures
-        return replace(made.world, hidden_from=hidden_from), made.suns
+            pictures |= rendered.pictures
+        return replace(rendered.world, hidden_from=hidden_from), rendered.suns
     # Of an image, even of one that is missing, Cycles samples light, which no constant world needs.
     is_constant = wrapped is None and (backdrop, wrapped_there) == (radiance, None)
     if reasons or (missing and is_constant):
@@ -73,7 +73,11 @@ def world_of(
 def _rendered(
     scene: bpy.types.Scene, world: bpy.types.World, reasons: list[str], ledger: Ledger, render: bool
 ) -> world_image.Rendered | None:
-    """The image that stands in for a world that is not modeled, or None where a constant one must."""
+    """The image of a world that is no node of ours, which Cycles renders and both sides show; None where a constant one must
+    stand in.
+
+    Only a sun is another thing then than in the world: its disc shines evenly.
+    """
     obstacle = world_image.obstacle(world)
     result = None
     if obstacle is None:
@@ -84,11 +88,11 @@ def _rendered(
             ledger.note(world.name, "approximated", f"the world {reason}, and a constant one stands in")
         return None
     width = world_image.width(world)
-    image = f"an image of {width} × {width // 2} that Cycles renders of it stands in"
+    image = f"both sides show an image of it, {width} × {width // 2} pixels, that Cycles renders"
     if result.suns:
-        image += ", with lamps that shine evenly for its suns"
+        image += ", and lamps that shine evenly for its suns"
     for reason in reasons:
-        ledger.note(world.name, "approximated", f"the world {reason}, and {image}")
+        ledger.note(world.name, "approximated" if result.suns else "exported", f"the world {reason}: {image}")
     if world_image.tells_rays_apart(world):
         ledger.note(
             world.name, "approximated", "the world tells kinds of rays apart, and all but the camera's see what diffuse ones do"
@@ -97,7 +101,8 @@ def _rendered(
     if scene.render.film_transparent:
         hidden |= {"camera"}
     result = replace(result, suns=tuple(replace(sun, hidden_from=sun.hidden_from | hidden) for sun in result.suns))
-    ledger.call_for_cycles(world.original, world_image.show, scene.original, result)
+    is_another = bool(result.suns) or world_image.tells_rays_apart(world)
+    ledger.call_for_cycles(world.original, world_image.show, scene.original, result, stands_in=is_another)
     return result
 
 
@@ -176,7 +181,7 @@ def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, l
     if not isinstance(surface, Output):
         return (0.0, 0.0, 0.0), None, reasons
     if surface.node.type not in ("BACKGROUND", "EMISSION"):
-        return tuple(world.color), None, [*reasons, f"has a node {surface.node.name!r} that is not modelled"]
+        return tuple(world.color), None, [*reasons, f"has a node {surface.node.name!r} that is not modeled"]
     color = _unmixed(surface.input("Color"), camera)
     rgb = shaders.constant_colour_of(color)
     strength = shaders.constant_number_of(_unmixed(surface.input("Strength"), camera))
@@ -191,7 +196,7 @@ def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, l
         reasons.append("has a strength that varies")
     radiance = shaders.possible(tuple(value * strength for value in rgb))
     if radiance is None:
-        return (0.0, 0.0, 0.0), None, [*reasons, f"has the colour {tuple(rgb)} and the strength {strength:g}"]
+        return (0.0, 0.0, 0.0), None, [*reasons, f"has the color {tuple(rgb)} and the strength {strength:g}"]
     if wrapped and reasons:  # a constant world stands in
         mean = images.mean(wrapped.image)
         return tuple(a * b for a, b in zip(radiance, mean, strict=True)), None, reasons
@@ -233,14 +238,14 @@ def _rotation(vector: Output | Input) -> tuple[float, float, float] | None:
         return (0.0, 0.0, 0.0) if is_direction else None
     if vector.node.type != "MAPPING" or vector.node.vector_type not in ("POINT", "VECTOR"):
         return None
-    given = [
+    turns = [
         shaders.constant_colour(vector, name)
         for name in ("Location", "Rotation", "Scale")[vector.node.vector_type == "VECTOR" :]
     ]
     inner = _rotation(nodes.source(vector.input("Vector")))
-    if None in given or inner is None or any(inner) or given[-1] != (1.0, 1.0, 1.0) or (len(given) == 3 and any(given[0])):
+    if None in turns or inner is None or any(inner) or turns[-1] != (1.0, 1.0, 1.0) or (len(turns) == 3 and any(turns[0])):
         return None
-    return given[-2]
+    return turns[-2]
 
 
 def _mean(source: Output, world: bpy.types.World) -> tuple[RGB, str]:

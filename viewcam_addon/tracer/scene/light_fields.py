@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import shown
+from ...checks import quoted
 from ...errors import InputError
 from . import Scene, lamps, placing, value_nodes
 from .colours import RGBE, TEXELS
@@ -69,7 +69,7 @@ def light(fields: dict[str, Field], arrays: Arrays) -> dict[str, Any]:
 
 def _version(field: Field) -> tuple[int, int]:
     if not re.fullmatch(r"[0-9]{1,2}\.[0-9]{1,2}", field.text()):
-        field.fail(f'is {shown(field.value)}: give a version of Blender, as "5.2"')
+        field.fail(f'is {quoted(field.value)}: give a version of Blender, as "5.2"')
     first, second = map(int, field.value.split("."))
     return first, second
 
@@ -143,14 +143,14 @@ def _material(field: Field) -> Material:
     others = ("ior", "surface", "transparent_shadow", "displacement")
     components = [each.name for each in dataclasses.fields(Material) if each.name not in others]
     keys = field.fields((), (*components, *others))
-    given: dict[str, Any] = {name: _colour(keys[name]) for name in components if name in keys}
+    stated: dict[str, Any] = {name: _colour(keys[name]) for name in components if name in keys}
     if "ior" in keys:
-        given["ior"] = keys["ior"].number()
-    given |= {name: _node(keys[name]) for name in ("surface", "displacement") if name in keys}
+        stated["ior"] = keys["ior"].number()
+    stated |= {name: _node(keys[name]) for name in ("surface", "displacement") if name in keys}
     if "transparent_shadow" in keys:
-        given["transparent_shadow"] = keys["transparent_shadow"].truth()
+        stated["transparent_shadow"] = keys["transparent_shadow"].truth()
     try:
-        return Material(**given)
+        return Material(**stated)
     except InputError as error:
         field.hand_on(error)
 
@@ -160,16 +160,16 @@ def _node(field: Field, deep: int = 1) -> Node:
         raise InputError(f"{field.file}: more than {MOST_DEEP} nodes feed one another in a row: give fewer")
     kind = field.fields(("type",), others=True)["type"]
     if kind.text() not in KINDS:
-        kind.fail(f"is {shown(kind.value)}: give one of {', '.join(KINDS)}")
+        kind.fail(f"is {quoted(kind.value)}: give one of {', '.join(KINDS)}")
     known = KINDS[kind.value]
     keys = field.fields(("type",), tuple(known.inputs))
     try:
-        given = (
+        stated = (
             (name, _node_input(keys[name], default, known.is_value, deep))
             for name, default in known.inputs.items()
             if name in keys
         )
-        return Node(kind.value, tuple(given))
+        return Node(kind.value, tuple(stated))
     except InputError as error:
         field.hand_on(error)
 
@@ -207,7 +207,7 @@ def _colour(field: Field) -> Colour:
 def _lamp(field: Field) -> Lamp:
     kind = field.fields(("type", "name"), others=True)["type"]
     if kind.text() not in lamps.KINDS:
-        kind.fail(f"is {shown(kind.value)}: give one of {', '.join(lamps.KINDS)}")
+        kind.fail(f"is {quoted(kind.value)}: give one of {', '.join(lamps.KINDS)}")
     lamp = lamps.KINDS[kind.value]
     declared = [each.name for each in dataclasses.fields(lamp) if each.name not in ("name", "matrix")]
     is_placed = len(declared) + 1 < len(dataclasses.fields(lamp))

@@ -55,22 +55,22 @@ class Material:
     @property
     def colours(self) -> dict[str, Colour]:
         """Component → its color, without those that are None or black."""
-        found = {field.name: getattr(self, field.name) for field in fields(self) if field.type in (Colour, Colour | None)}
-        return {name: colour for name, colour in found.items() if colour is not None and not colour.is_black}
+        values = {field.name: getattr(self, field.name) for field in fields(self) if field.type in (Colour, Colour | None)}
+        return {name: colour for name, colour in values.items() if colour is not None and not colour.is_black}
 
     @property
     def closures(self) -> tuple[Closure, ...]:
         """The closures that the core adds up, of either form of a material."""
         if self.surface is not None:
             return tuple(closures(self.surface))
-        made = {
+        makers = {
             "emission": lambda colour: node("emission", color=colour),
             "diffuse": lambda colour: node("diffuse", color=colour),
             "mirror": lambda colour: node("glossy", color=colour, roughness=0.0, distribution="ggx"),
             "glass": lambda colour: node("glass", color=colour, ior=self.ior, distribution="ggx"),
             "refraction": lambda colour: node("refraction", color=colour, ior=self.ior, distribution="ggx"),
         }
-        return tuple(Closure(make(self.colours[name])) for name, make in made.items() if name in self.colours)
+        return tuple(Closure(make(self.colours[name])) for name, make in makers.items() if name in self.colours)
 
     @property
     def shines(self) -> bool:
@@ -80,15 +80,15 @@ class Material:
     @property
     def inputs(self) -> tuple[tuple[str, Colour], ...]:
         """The inputs of all colors and numbers, each with its name in sentences."""
-        found = [("displacement", colour) for colour in self.displacement.colours] if self.displacement else []
+        result = [("displacement", colour) for colour in self.displacement.colours] if self.displacement else []
         if self.surface is None:
-            return (*self.colours.items(), *found)
+            return (*self.colours.items(), *result)
         for closure in self.closures:
             kind = closure.node.type
             for name, value in (*closure.node.inputs, *(("a factor", factor) for factor, _ in closure.factors)):
                 colours = value.colours if isinstance(value, Node) else [value] if isinstance(value, Colour) else []
-                found += [(f"{name} of {kind}", colour) for colour in colours]
-        return tuple(found)
+                result += [(f"{name} of {kind}", colour) for colour in colours]
+        return tuple(result)
 
     @property
     def nodes(self) -> Iterator[Node]:
@@ -116,8 +116,8 @@ def components(shader: Node | None) -> dict[str, Any] | None:
         return None
     total: dict[str, Any] | None = {}
     for name, weight in (("first", 1.0 if factor is None else 1.0 - factor), ("second", 1.0 if factor is None else factor)):
-        some = components(shader[name]) if weight else {}
-        total = None if total is None or some is None else _sum(total, some, weight)
+        part = components(shader[name]) if weight else {}
+        total = None if total is None or part is None else _sum(total, part, weight)
     return total
 
 
@@ -126,20 +126,20 @@ _LAYERS = ("metallic", "diffuse_roughness", "transmission_weight", "coat_weight"
 
 
 def _component(shader: Node) -> dict[str, Any] | None:
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     if shader.type == "emission":
-        found = {"emission": _scaled(shader["color"], _constant(shader["strength"]))}
+        result = {"emission": _scaled(shader["color"], _constant(shader["strength"]))}
     elif shader.type in _SMOOTH and _constant(shader["roughness"]) == 0.0:
-        found = {_SMOOTH[shader.type]: _scaled(shader["color"], 1.0)}
+        result = {_SMOOTH[shader.type]: _scaled(shader["color"], 1.0)}
         if shader.type in ("glass", "refraction"):
             ior = _constant(shader["ior"])
-            found["ior"] = ior if ior is not None and LEAST_IOR <= ior <= MOST_IOR else None
+            result["ior"] = ior if ior is not None and LEAST_IOR <= ior <= MOST_IOR else None
     elif shader.type == "principled" and _is_diffuse(shader):
-        found = {"diffuse": _scaled(shader["base_color"], 1.0)}
+        result = {"diffuse": _scaled(shader["base_color"], 1.0)}
         if not shader["emission_strength"].is_black:
-            found["emission"] = _scaled(shader["emission_color"], _constant(shader["emission_strength"]))
+            result["emission"] = _scaled(shader["emission_color"], _constant(shader["emission_strength"]))
     is_bent = any(name in ("normal", "coat_normal") for name, _ in shader.inputs)
-    return None if is_bent or not found or None in found.values() else found
+    return None if is_bent or not result or None in result.values() else result
 
 
 def _is_diffuse(principled: Node) -> bool:
@@ -147,9 +147,9 @@ def _is_diffuse(principled: Node) -> bool:
     return not has_gloss and _constant(principled["alpha"]) == 1.0 and all(principled[name].is_black for name in _LAYERS)
 
 
-def _sum(total: dict[str, Any], some: dict[str, Any], weight: float) -> dict[str, Any] | None:
+def _sum(total: dict[str, Any], added: dict[str, Any], weight: float) -> dict[str, Any] | None:
     result = dict(total)
-    for name, value in some.items():
+    for name, value in added.items():
         before = result.get(name)
         scaled = value if name == "ior" else _scaled(value, weight)
         if name == "ior" or before is None or before.is_black:

@@ -130,13 +130,13 @@ class Node:
     def __post_init__(self) -> None:
         what = "node" if self.is_value else "shader"
         if self.type not in KINDS:
-            raise InputError(f"a {what} is of the type {checks.shown(self.type)}: give one of {', '.join(KINDS)}")
+            raise InputError(f"a {what} is of the type {checks.quoted(self.type)}: give one of {', '.join(KINDS)}")
         known = KINDS[self.type].inputs
         values = {}
         for name, value in dict(self.inputs).items():
             if name not in known:
                 raise InputError(
-                    f"a {what} {self.type!r} has no input {checks.shown(name)}: give one of {', '.join(known) or 'none'}"
+                    f"a {what} {self.type!r} has no input {checks.quoted(name)}: give one of {', '.join(known) or 'none'}"
                 )
             values[name] = _checked(f"{name} of a {what} {self.type!r}", value, known[name], self.is_value)
         for name, wanted in _NEEDED.items():
@@ -275,7 +275,7 @@ def _number_or_colour(value: Any, may_be_negative: bool) -> Any:
         return Colour(three)
     three = checks.vector("a value", three, 3)
     if any(abs(number) > LARGEST_RADIANCE for number in three):
-        raise InputError(f"a value is {checks.shown(three)}: give numbers up to {LARGEST_RADIANCE:g}")
+        raise InputError(f"a value is {checks.quoted(three)}: give numbers up to {LARGEST_RADIANCE:g}")
     return three
 
 
@@ -288,15 +288,15 @@ def _checked(name: str, value: Any, known: Any, of_value: bool) -> Any:
         return value
     if isinstance(known, tuple) and isinstance(known[0], str):
         if value not in known:
-            raise InputError(f"{name} is {checks.shown(value)}: give one of {', '.join(known)}")
+            raise InputError(f"{name} is {checks.quoted(value)}: give one of {', '.join(known)}")
         return value
     if isinstance(known, bool):
         if not isinstance(value, bool):
-            raise InputError(f"{name} is {checks.shown(value)}: give true or false")
+            raise InputError(f"{name} is {checks.quoted(value)}: give true or false")
         return value
     if known is value_nodes.NAME:
         if not isinstance(value, str):
-            raise InputError(f"{name} is {checks.shown(value)}: give a name")
+            raise InputError(f"{name} is {checks.quoted(value)}: give a name")
         return value
     if known is value_nodes.IES:
         ies.read(name, value)

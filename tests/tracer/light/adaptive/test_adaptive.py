@@ -76,8 +76,8 @@ def test_the_error_that_is_wanted_is_met_in_the_mean(soft, error):
     passes = render(scene, "direct", 1024, 1, error=error)
     off = np.sqrt(((passes["Combined"][..., :3] - truth) ** 2).mean())
     assert off <= error, f"{off:.4f}"
-    told = np.sqrt(passes["Variance"].astype(float).mean())
-    assert off / 3 <= told <= 3 * off, f"{told:.4f} told, {off:.4f} true"
+    stated = np.sqrt(passes["Variance"].astype(float).mean())
+    assert off / 3 <= stated <= 3 * off, f"{stated:.4f} told, {off:.4f} true"
 
 
 def test_samples_go_where_noise_is_and_are_no_more_than_allowed(soft):

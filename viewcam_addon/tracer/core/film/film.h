@@ -51,24 +51,10 @@ class Pixel {
 
     uint32_t count() const { return count_; }
 
-    // Adds a sample. batch_size: a power of two.
-    void add(const PathLight& light, const FilmSettings& film, uint32_t batch_size) {
-        double4 shown{};
-        for (unsigned brought = light.brought; brought;) {
-            int category = take_bit(brought);
-            totals_[category] += light.of[category];
-            if (category != COLOR && !(film.transparent && category == ENVIRONMENT)) shown += light.of[category];
-        }
-        if (count_ == 0) first_ = shown;
-        double4 difference = shown - first_;
-        differences_ += difference;
-        spread_ += difference * difference;
-        covered_ += light.covered;
-        if ((++count_ & (batch_size - 1)) == 0) {
-            double4 batch = differences_ - before_;
-            squares_ += batch * batch;
-            before_ = differences_;
-        }
+    // Adds samples, one after the other; a few at a time, so that sums stay in registers. batch_size: a power of two.
+    void add(const PathLight* samples, uint32_t count, const FilmSettings& film, uint32_t batch_size) {
+        for (; count >= FEW; samples += FEW, count -= FEW) add_few(samples, FEW, film, batch_size);
+        if (count > 0) add_few(samples, count, film, batch_size);
     }
 
     // The sum of all samples' differences from the first one, and the variance of one sample; without exposure.
@@ -106,7 +92,39 @@ class Pixel {
     }
 
    private:
-    static constexpr uint32_t BATCHES = 16;
+    static constexpr uint32_t BATCHES = 16, FEW = 4;
+
+    [[gnu::always_inline]] void add_few(const PathLight* samples, uint32_t count, const FilmSettings& film, uint32_t batch_size) {
+        double4 shown[FEW] = {};
+        unsigned brought = 0;
+        for (uint32_t i = 0; i < count; i++) brought |= samples[i].brought;
+        while (brought) {
+            int category = take_bit(brought);
+            bool is_shown = category != COLOR && !(film.transparent && category == ENVIRONMENT);
+            double4 total = totals_[category];
+            for (uint32_t i = 0; i < count; i++) {
+                if (!(samples[i].brought >> category & 1)) continue;
+                total += samples[i].of[category];
+                if (is_shown) shown[i] += samples[i].of[category];
+            }
+            totals_[category] = total;
+        }
+        if (count_ == 0) first_ = shown[0];
+        double4 first = first_, differences = differences_, spread = spread_;
+        double covered = covered_;
+        for (uint32_t i = 0; i < count; i++) {
+            double4 difference = shown[i] - first;
+            differences += difference;
+            spread += difference * difference;
+            covered += samples[i].covered;
+            if ((++count_ & (batch_size - 1)) == 0) {
+                double4 batch = differences - before_;
+                squares_ += batch * batch;
+                before_ = differences;
+            }
+        }
+        differences_ = differences, spread_ = spread, covered_ = covered;
+    }
 
     static Vec3 rgb(double4 channels) { return {channels[0], channels[1], channels[2]}; }
     // No pixel is infinite: float32's largest number is the most.

@@ -102,10 +102,13 @@ class TileSampler {
         return places;
     }
 
-    // Takes samples begin … end of some pixels, in groups that fill a block with a few samples of each.
+    // Takes samples begin … end of some pixels, in groups that fill a block with some samples of each: the closer together the rays of a
+    // block lie, the fewer boxes and triangles it meets. With up to 16 of a pixel, and not 4, 378,000 triangles under a sun take 0.9 of the time.
     void sample(Tile& tile, const std::vector<uint16_t>& places, uint32_t begin, uint32_t end, uint32_t batch,
                 const volatile int* stop) const {
-        size_t size = PathIntegrator::MOST / std::min(end - begin, 4u);
+        constexpr uint32_t MOST_AT_A_TIME = 16;
+        uint32_t rounds = (end - begin + MOST_AT_A_TIME - 1) / MOST_AT_A_TIME, at_a_time = (end - begin + rounds - 1) / rounds;
+        size_t size = PathIntegrator::MOST / at_a_time;
         for (size_t i = 0; i < places.size(); i += size)
             sample_group(tile, &places[i], uint32_t(std::min(size, places.size() - i)), begin, end, batch, stop);
     }
@@ -132,7 +135,7 @@ class TileSampler {
             }
             camera_.rays(columns, rows, count, samples.rays);
             integrator_.trace(samples, count, light);
-            for (int i = 0; i < count; i++) tile.pixels[group[uint32_t(i) / (last - first)]].add(light[i], film_, batch);
+            for (uint32_t k = 0; k < size; k++) tile.pixels[group[k]].add(light + k * (last - first), last - first, film_, batch);
         }
     }
 

@@ -193,6 +193,10 @@ class PathIntegrator {
         Shadowed shadowed[LightSampler::ASKED][MOST];  // by the light that was asked
         Rays shadow_rays[LightSampler::ASKED];
         Hits hits;
+        // What the rays of some paths meet.
+        Ray met_rays[MOST];
+        Hit met[MOST];
+        const Ray* met_by[MOST];
     };
 
     static int row(RayKind kind) { return kind == DIFFUSE ? 0 : kind == GLOSSY ? 1 : 2; }
@@ -429,7 +433,8 @@ class PathIntegrator {
         PathLight& light = lights_.has_sky() ? light_of(path, INFINITE, 1, nullptr, depth, block) : light_of(path, block);
         if (path.kind == CAMERA) {
             const auto& backdrop = scene_.illumination.backdrop;
-            light.add(ENVIRONMENT, path.weight * (backdrop ? *backdrop : lights_.environment()).le(normalize(ray.direction), CAMERA));
+            const Environment& behind = backdrop ? *backdrop : lights_.environment();
+            light.add(ENVIRONMENT, path.weight * behind.le(behind.has_image() ? normalize(ray.direction) : ray.direction, CAMERA));
             light.covered = 1 - mean(path.weight);
         } else {
             light.add(path.category, path.weight * lights_.environment_le(ray.direction, path.kind, block.points[path.from], path.pdf, depth == 1, path.through));
@@ -460,14 +465,15 @@ class PathIntegrator {
 
     // What the eye's rays come to, and the light that is of this alone.
     void start(int count, Block& block) const {
-        Ray rays[MOST];
-        Hit hits[MOST];
-        const Ray* met_by[MOST];
         int met = 0;
         scene_.closest(block.samples->rays, count, CAMERA, block.hits);
         for (int i = 0; i < count; i++) {
-            Ray& ray = rays[met] = block.samples->rays.ray(i);
-            Hit& hit = hits[met] = block.hits.hit(i);
+            Hit& hit = block.met[met] = block.hits.hit(i);
+            block.light[i].covered = 1;
+            bool is_matte = hit && meets_matte(hit, block.matte_points[i]);
+            if (is_matte) add_matte(i, block);
+            if (is_matte && !lights_.meets_lamps(CAMERA)) continue;
+            Ray& ray = block.met_rays[met] = block.samples->rays.ray(i);
             Path& path = block.paths[met];  // the rest is known when it is scattered
             path.sample = i, path.from = met;
             path.category = COLOR, path.kind = CAMERA, path.last = path.diffuse = false, path.pdf = INFINITE, path.passed = 0;
@@ -478,19 +484,14 @@ class PathIntegrator {
                 leave(path, ray, 0, block);
                 continue;
             }
-            block.light[i].covered = 1;
-            if (meets_matte(hit, block.matte_points[i])) {
-                add_matte(i, block);
-                continue;
-            }
-            met_by[met++] = &ray;
+            if (!is_matte) block.met_by[met++] = &ray;
         }
-        scene_.interactions(met_by, hits, met, block.points);
+        scene_.interactions(block.met_by, block.met, met, block.points);
         for (int k = 0; k < met; k++) {
             Path& path = block.paths[block.live];
             if (block.live < k) path = block.paths[k];
-            path.ray.direction = normalize(met_by[k]->direction);
-            if (follow(path, *met_by[k], hits[k], block.points[k], 0, block)) block.live++;
+            path.ray.direction = normalize(block.met_by[k]->direction);
+            if (follow(path, *block.met_by[k], block.met[k], block.points[k], 0, block)) block.live++;
         }
     }
 
@@ -829,8 +830,6 @@ class PathIntegrator {
 
     // Where rays come to; adds what shines there.
     void arrive(int depth, Block& block) const {
-        const Ray* met_by[MOST];
-        Hit hits[MOST];
         int arrived[MOST], met = 0;
         for (int i = 0; i < block.live; i++) {
             Path& path = block.onwards[i];
@@ -849,16 +848,16 @@ class PathIntegrator {
                 block.matte_paths[block.matte] = path;
                 add_matte(block.matte, block);
             } else if (hit)
-                arrived[met] = i, met_by[met] = &path.ray, hits[met++] = hit;
+                arrived[met] = i, block.met_by[met] = &path.ray, block.met[met++] = hit;
             else
                 leave(path, path.ray, depth, block);
         }
-        scene_.interactions(met_by, hits, met, block.next_points);
+        scene_.interactions(block.met_by, block.met, met, block.next_points);
         int live = 0;
         for (int k = 0; k < met; k++) {
             Path& path = block.onwards[arrived[k]];
-            if (path.inside != NONE && path.inside != hits[k].object) let_out_first(path, hits[k], block.next_points[k]);
-            if (!follow(path, path.ray, hits[k], block.next_points[k], depth, block)) continue;
+            if (path.inside != NONE && path.inside != block.met[k].object) let_out_first(path, block.met[k], block.next_points[k]);
+            if (!follow(path, path.ray, block.met[k], block.next_points[k], depth, block)) continue;
             block.paths[live] = path;
             block.paths[live].from = k;
             live++;
