@@ -100,7 +100,7 @@ def outside(request, folder):
         if not hasattr(os, "mkfifo"):
             pytest.skip("there are no pipes in folders here")
         os.mkfifo(folder / "pipe.usda")
-    return OUTSIDE[request.param].format(folder=folder)
+    return OUTSIDE[request.param].format(folder=folder.as_posix())
 
 
 OUTSIDE = {
