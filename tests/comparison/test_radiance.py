@@ -230,4 +230,4 @@ def test_samples_that_the_file_tells_wrongly_can_be_given():
 
 def test_the_references_variance_is_told_from_as_many_batches_as_it_is_judged_by():
     header = Path(__file__).parents[2] / "viewcam_addon" / "tracer" / "core" / "film" / "film.h"
-    assert re.findall(r"BATCHES = (\d+);", header.read_text(encoding="utf-8")) == [str(radiance.VARIANCE_BATCHES)]
+    assert re.findall(r"BATCHES = (\d+)\b", header.read_text(encoding="utf-8")) == [str(radiance.VARIANCE_BATCHES)]

@@ -154,7 +154,7 @@ def batch(blocks, tmp_path_factory):
     folder = tmp_path_factory.mktemp("batch")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        program, _ = blocks["python"]  # the other one is Blender's
+        (program,) = blocks["python"]
         exec(compile(program, str(PAGE), "exec"), {})
     return folder
 
