@@ -52,8 +52,9 @@ test: lint
 test-fresh:
 	.ci/fresh-machine "make demo" "make test"
 
+# What is slow and needs Blender, the oldest and the newest run: test-matrix and test-blender.
 test-exhaustive: .venv/test
-	$(call PARALLEL,.venv) --numprocesses=3 --dist=worksteal -m "slow or exhaustive"
+	$(call PARALLEL,.venv) --numprocesses=3 --dist=worksteal -m "exhaustive or (slow and not blender)"
 
 # GCC's sanitizers, which come with it: preloaded, since Python itself is compiled without them.
 sanitizers-address = address,undefined

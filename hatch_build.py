@@ -183,8 +183,8 @@ class CoreBuildHook(BuildHookInterface):
 
 def sanitized(sanitizers: str, folder: Path) -> None:
     """The package compiled for this machine with sanitizers, as compilers name them, in a folder for PYTHONPATH."""
-    told = f"-fsanitize={sanitizers}", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-g1"
-    library = build_core(this_platform(), (*told, "-O1", ONE_INSTANCE))
+    flags = f"-fsanitize={sanitizers}", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-g1"
+    library = build_core(this_platform(), (*flags, "-O1", ONE_INSTANCE))
     (folder / PACKAGE).mkdir(parents=True, exist_ok=True)
     (folder / PACKAGE / "__init__.py").touch()
     shutil.copy(library, folder / PACKAGE)

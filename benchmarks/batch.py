@@ -75,9 +75,9 @@ class Blender:
         """The seconds that the command took; SystemExit if it failed."""
         started, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
         process = self.start(*arguments)
-        said, _ = process.communicate()
+        output, _ = process.communicate()
         if process.returncode:
-            sys.exit(said)
+            sys.exit(output)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         return np.array([time.perf_counter() - started, cpu])
@@ -114,8 +114,8 @@ def same_pixels(shots: list[Job], loop: Path, batch: Path) -> int:
         return {name: channel.pixels for part in parts for name, channel in part.channels.items()}
 
     def is_same(name: str) -> bool:
-        one, other = channels(loop / f"{name}_0001.exr"), channels(batch / f"{name}.exr")
-        return one.keys() == other.keys() and all(np.array_equal(one[key], other[key]) for key in one)
+        first, other = channels(loop / f"{name}_0001.exr"), channels(batch / f"{name}.exr")
+        return first.keys() == other.keys() and all(np.array_equal(first[key], other[key]) for key in first)
 
     return sum(is_same(shot.name) for shot in shots)
 
@@ -168,8 +168,8 @@ def _resident(process: int) -> int:
         except OSError:  # it has ended
             continue
         is_ours = _descends(int(status.parent.name), process)
-        if is_ours and (found := re.search(r"^VmRSS:\s*(\d+) kB$", text, re.MULTILINE)):
-            largest = max(largest, 1024 * int(found[1]))
+        if is_ours and (match := re.search(r"^VmRSS:\s*(\d+) kB$", text, re.MULTILINE)):
+            largest = max(largest, 1024 * int(match[1]))
     return largest
 
 

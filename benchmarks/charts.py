@@ -276,8 +276,8 @@ def _draw_rows(chart: Chart, axes: Axes) -> None:
         answer = f"{curve.y[0]:.2g}" if math.isfinite(curve.y[0]) else "no answer"
         axes.annotate(answer, (1.02, place), xycoords=("axes fraction", "data"), va="center")
     axes.annotate(textwrap.fill(chart.y_label, 23), (1.02, 1.01), xycoords="axes fraction", va="bottom", color=_FAINT)
-    told = "   ".join(f"{mark} {what}" for mark, what in zip("●○", chart.rows, strict=False))
-    axes.annotate(told, (0, 1.02), xycoords="axes fraction", va="bottom", color=_FAINT)
+    text = "   ".join(f"{mark} {what}" for mark, what in zip("●○", chart.rows, strict=False))
+    axes.annotate(text, (0, 1.02), xycoords="axes fraction", va="bottom", color=_FAINT)
 
 
 def _make_x_logarithmic(axes: Axes) -> None:
@@ -321,13 +321,13 @@ def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str, line: str) -
     x, y = np.asarray(curve.x, float), np.asarray(curve.y, float)
     low, high = axes.get_ylim()
     answered = np.isfinite(y)
-    shown = np.where(answered, np.clip(y, low, high) if axes.get_yscale() == "log" else y, np.nan)
+    clipped = np.where(answered, np.clip(y, low, high) if axes.get_yscale() == "log" else y, np.nan)
     style = {"linewidth": 2.8, "markersize": 5} if curve.ours else {"linewidth": 1.6, "markersize": 4}
     if curve.minor:
         style = {"linewidth": 1.0, "markersize": 3, "alpha": 0.45}
-    axes.plot(x, shown, color=colour, marker=marker, linestyle=line, label=_label(curve), clip_on=False, **style)
+    axes.plot(x, clipped, color=colour, marker=marker, linestyle=line, label=_label(curve), clip_on=False, **style)
     if curve.spread and not curve.minor:
-        axes.hlines(shown, *np.transpose(curve.spread), color=colour, linewidth=1.2, alpha=0.6)
+        axes.hlines(clipped, *np.transpose(curve.spread), color=colour, linewidth=1.2, alpha=0.6)
     if not answered.all():
         axes.plot(x[~answered], np.full((~answered).sum(), high), "x", color=colour, markersize=6, clip_on=False)
 
@@ -394,10 +394,10 @@ def read(figures: Path) -> dict[str, Any]:
         if the file can't be read or has no figures of charts.
     """
     try:
-        told = json.loads(figures.read_text(encoding="utf-8"))
-        for each in told["charts"].values():
+        record = json.loads(figures.read_text(encoding="utf-8"))
+        for each in record["charts"].values():
             Chart.of_figures(each), each["command"], each["machine"]
-        return {"behind": [*told["behind"]], "charts": told["charts"]}
+        return {"behind": [*record["behind"]], "charts": record["charts"]}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(
             f"{figures} has no figures of charts: give what `python -m benchmarks SUBJECT --json` wrote"

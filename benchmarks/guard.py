@@ -1,4 +1,4 @@
-"""Whether the tracer has become slower: its speed as a share of bare Embree's on the same rays, in one run, on any machine.
+"""The guard of speed: the tracer's as a share of bare Embree's on the same rays, in one run, on any machine.
 
     python -m benchmarks.guard            # exit status 1 if a ratio has fallen by a third
     python -m benchmarks.guard --record   # write what is measured into guard.json, after a change that is meant
@@ -164,9 +164,9 @@ class Yardstick:
 
     def points(self, directions: Rays) -> Rays:
         """Points where rays from the eye meet the mesh, a little before it; those that meet nothing are left out."""
-        found = self._embree.run(self.eyes(directions), directions, output=True)
-        met = found["geomID"] >= 0
-        return directions[met] * (found["tfar"][met, None] * np.float32(1 - 1e-4))
+        actual = self._embree.run(self.eyes(directions), directions, output=True)
+        met = actual["geomID"] >= 0
+        return directions[met] * (actual["tfar"][met, None] * np.float32(1 - 1e-4))
 
     def towards(self, sun: Sun, count: int) -> Rays:
         """Directions into the disc of a sun."""
@@ -191,8 +191,8 @@ class Yardstick:
         """All rays, in tiles over all cores."""
 
         def tile(first: int) -> None:
-            some = slice(first, first + _TILE)
-            self._embree.run(origins[some], directions[some], query=query)
+            batch = slice(first, first + _TILE)
+            self._embree.run(origins[batch], directions[batch], query=query)
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(tile, range(0, len(origins), _TILE)))

@@ -99,8 +99,8 @@ def main() -> int:
 
 def judged(seconds: Mapping[str, Spent], differing: Mapping[str, float]) -> bool:
     """True if the labels are the same, and ours are not the slower."""
-    theirs = seconds["passes"].wall + seconds["made of them"].wall
-    return seconds["ours"].wall <= theirs and max(differing.values()) <= ON_EDGES
+    expected = seconds["passes"].wall + seconds["made of them"].wall
+    return seconds["ours"].wall <= expected and max(differing.values()) <= ON_EDGES
 
 
 def measured(shots: Sequence[Job], folder: Path) -> dict[str, Spent]:
@@ -109,11 +109,11 @@ def measured(shots: Sequence[Job], folder: Path) -> dict[str, Spent]:
     with race.Contestant(prepare_passes, blend, list(shots), folder / "passes") as blender:
         passes = blender.runners()["passes"]
         ours = [labelled(blend, shots[:middle], folder / "ours")]
-        theirs = [passes(1, middle), passes(middle + 1, len(shots))]
+        expected = [passes(1, middle), passes(middle + 1, len(shots))]
         ours += [labelled(blend, shots[middle:], folder / "ours")]
     pictures = sorted((folder / "passes").iterdir())
-    made = spent(lambda: [of_passes(path, folder / "theirs") for path in pictures])
-    return {"ours": Spent(*np.sum(ours, axis=0)), "passes": Spent(*np.sum(theirs, axis=0)), "made of them": made}
+    masks_spent = spent(lambda: [of_passes(path, folder / "theirs") for path in pictures])
+    return {"ours": Spent(*np.sum(ours, axis=0)), "passes": Spent(*np.sum(expected, axis=0)), "made of them": masks_spent}
 
 
 def labelled(blend: Path, shots: Sequence[Job], folder: Path) -> Spent:
@@ -181,20 +181,20 @@ def of_passes(path: Path, folder: Path) -> None:
     passes = image.read(path, ("Depth", "Object Index")).passes
     index = passes["Object Index"][..., 0].astype(np.int64)
     levels = files.depth_levels(passes["Depth"][::-1, :, 0], DEPTH_STEPS)
-    found = masks.of_picture(np.where(index > 0, index, -1), int(index.max()) + 1)
-    told = [{"object_index": number, "visible": each} for number, each in enumerate(found) if each]
+    values = masks.of_picture(np.where(index > 0, index, -1), int(index.max()) + 1)
+    entries = [{"object_index": number, "visible": each} for number, each in enumerate(values) if each]
     for ending, content in (
         ("depth.png", encoded(levels)),
         ("instances.png", encoded(files.id_colours(index[::-1]))),
-        ("json", json.dumps(told).encode()),
+        ("json", json.dumps(entries).encode()),
     ):
         with written_whole(folder / f"{path.stem}.{ending}") as temporary:
             temporary.write_bytes(content)
 
 
 def table(seconds: Mapping[str, Spent], count: int) -> Iterator[str]:
-    ours, passes, made = (seconds[name] for name in ("ours", "passes", "made of them"))
-    both = Spent(*np.add(passes, made))
+    ours, passes, masks_seconds = (seconds[name] for name in ("ours", "passes", "made of them"))
+    both = Spent(*np.add(passes, masks_seconds))
     yield f"| {count} shots | seconds | CPU seconds | shots a second | of our throughput |"
     yield "|---|---|---|---|---|"
     for name, each in (("viewcam batch --labels", ours), ("Cycles' passes", passes), ("… and labels made of them", both)):
@@ -220,12 +220,12 @@ def _ours(folder: Path, shot: Job) -> dict[str, NDArray]:
     return {**passes, "Object Index": of_ids[places].reshape(passes["Instance"].shape)}
 
 
-def differences(ours: Mapping[str, NDArray], theirs: Mapping[str, NDArray]) -> dict[str, float]:
+def differences(ours: Mapping[str, NDArray], from_passes: Mapping[str, NDArray]) -> dict[str, float]:
     """The share of one picture's pixels that differ, for each pass. What is no number differs."""
     depth, result = ours["Depth"].astype(float), {}
     for name, tolerance in TOLERANCES.items():
         allowed = tolerance * depth if name in ("Depth", "Position") else tolerance
-        result[name] = float((~(np.abs(ours[name].astype(float) - theirs[name]) <= allowed)).any(axis=-1).mean())
+        result[name] = float((~(np.abs(ours[name].astype(float) - from_passes[name]) <= allowed)).any(axis=-1).mean())
     return result
 
 

@@ -98,8 +98,8 @@ def _serve(asked: Connection, prepare: Callable[..., Mapping[str, Runner]], argu
             runners = prepare(*arguments)
             asked.send(list(runners))
             while (request := asked.recv()) is not None:
-                name, given = request
-                asked.send(runners[name](*given))
+                name, parameters = request
+                asked.send(runners[name](*parameters))
         except Exception as error:
             asked.send(error if isinstance(error, InputError) else InputError(f"a contestant failed: {bug(error)}"))
         asked.close()

@@ -23,15 +23,15 @@ def main() -> None:
     options.add_argument("names", metavar="NAME", nargs="*", help=f"which of {', '.join(SCENES)}; all if none is named")
     options.add_argument("--folder", type=Path, default=Path(__file__).parent, help="where the files go; here by default")
     options.add_argument("--pictures", metavar="SAMPLES", type=int, help="also render each scene to a PNG")
-    given = options.parse_args()
+    arguments = options.parse_args()
     known = (*SCENES, *materials.BUILDERS)
-    unknown = set(given.names) - set(known)
+    unknown = set(arguments.names) - set(known)
     if unknown:
         options.error(f"there is no scene {', '.join(sorted(unknown))}; the scenes are {', '.join(known)}")
     viewcam_addon.register()
     try:
-        for name in given.names or SCENES:
-            make(name, given.folder.resolve(), given.pictures)
+        for name in arguments.names or SCENES:
+            make(name, arguments.folder.resolve(), arguments.pictures)
     finally:
         viewcam_addon.unregister()  # bpy 4.2 crashes at exit where an update callback is still registered
 

@@ -45,8 +45,10 @@ def _map_flat(mesh) -> None:
 
 def _globe(name: str, radius: float, material, location, rotation=(0, 0, 0)):
     """A smooth sphere with a UV map."""
-    made = b.primitive(name, bmesh.ops.create_uvsphere, smooth=True, u_segments=48, v_segments=24, radius=radius, calc_uvs=True)
-    return b.place(name, made, material, location, rotation)
+    globe = b.primitive(
+        name, bmesh.ops.create_uvsphere, smooth=True, u_segments=48, v_segments=24, radius=radius, calc_uvs=True
+    )
+    return b.place(name, globe, material, location, rotation)
 
 
 # Materials that several scenes have.

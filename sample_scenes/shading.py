@@ -78,21 +78,21 @@ def _socket(sockets, name):
 
 def material(name: str, build):
     """A material whose surface is what build(Shading) returns."""
-    made = bpy.data.materials.new(name)
-    shading, output = _shading(made, "ShaderNodeOutputMaterial")
+    new_material = bpy.data.materials.new(name)
+    shading, output = _shading(new_material, "ShaderNodeOutputMaterial")
     shading.tree.links.new(build(shading), output.inputs["Surface"])
-    return made
+    return new_material
 
 
 def world(build):
     """The scene's world, whose surface is what build(Shading) returns."""
-    made = bpy.data.worlds.new("World")
-    shading, output = _shading(made, "ShaderNodeOutputWorld")
+    new_world = bpy.data.worlds.new("World")
+    shading, output = _shading(new_world, "ShaderNodeOutputWorld")
     shading.tree.links.new(build(shading), output.inputs["Surface"])
     # Cycles makes its map anew for each picture, by its own choice one of megapixels.
-    made.cycles.sampling_method, made.cycles.sample_map_resolution = "MANUAL", 512
-    bpy.context.scene.world = made
-    return made
+    new_world.cycles.sampling_method, new_world.cycles.sample_map_resolution = "MANUAL", 512
+    bpy.context.scene.world = new_world
+    return new_world
 
 
 def environment(image, turn: float = 0.0, strength: float = 1.0):

@@ -6,17 +6,17 @@ from pathlib import Path
 
 def contents(folder: Path) -> dict[str, object]:
     """Name → what each file holds, documents without their timings."""
-    found = {}
+    result = {}
     for file in sorted(Path(folder).iterdir()):
         data = file.read_bytes()
-        found[file.name] = _without_timings(json.loads(data)) if file.suffix == ".json" else data
-    return found
+        result[file.name] = _without_timings(json.loads(data)) if file.suffix == ".json" else data
+    return result
 
 
 def assert_same(folder: Path, undisturbed: Path) -> None:
-    found, wanted = contents(folder), contents(undisturbed)
-    assert sorted(found) == sorted(wanted), f"{sorted(found)} in place of {sorted(wanted)}"
-    unlike = [name for name in wanted if found[name] != wanted[name]]
+    actual, wanted = contents(folder), contents(undisturbed)
+    assert sorted(actual) == sorted(wanted), f"{sorted(actual)} in place of {sorted(wanted)}"
+    unlike = [name for name in wanted if actual[name] != wanted[name]]
     assert not unlike, f"not as an undisturbed run leaves them: {unlike}"
 
 

@@ -34,6 +34,8 @@ _LONG = 4 * 3600  # seconds
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
     for item in items:
+        if "bpy" in vars(item.module) or "fresh_blender" in item.fixturenames:
+            item.add_marker(pytest.mark.blender)
         if "benchmarks" in item.path.parts and not item.get_closest_marker("speed"):
             item.add_marker(pytest.mark.exhaustive)  # what measures is not what is shipped
         if "real_blender" in item.path.parts or any(map(item.get_closest_marker, ("exhaustive", "light", "speed"))):
@@ -120,12 +122,12 @@ def on_a_terminal():
         termios.tcsetwinsize(its, (24, 80))
         child = subprocess.Popen([*map(str, words)], stderr=its, stdout=subprocess.DEVNULL, env=environment)
         os.close(its)
-        shown = b""
+        output = b""
         with contextlib.suppress(OSError):  # Linux's way to say that the other side has gone
             while part := os.read(ours, 4096):
-                shown += part
+                output += part
         os.close(ours)
-        return child.wait(), shown.decode()
+        return child.wait(), output.decode()
 
     return run
 

@@ -79,12 +79,12 @@ class Batch:
 
     def until(self, event: str) -> dict | None:
         """Read its events up to the next of this name; None if it ends without."""
-        return next((told for told in map(_event, self.process.stdout) if told.get("event") == event), None)
+        return next((output for output in map(_event, self.process.stdout) if output.get("event") == event), None)
 
     def end(self) -> tuple[int, list[dict]]:
         """Wait for its end: exit status, and the events that were not read."""
         lines = self.process.communicate()[0].splitlines()
-        return self.process.returncode, [told for told in map(_event, lines) if told]
+        return self.process.returncode, [event for event in map(_event, lines) if event]
 
     def signal_all(self, number: int) -> None:
         """Send a signal to it and to its children, as Ctrl-C in a terminal does."""
@@ -153,8 +153,8 @@ class Disturbances:
 
     @pytest.mark.exhaustive
     def test_two_batches_at_once_share_the_work_and_leave_what_one_leaves(self, command, undisturbed, tmp_path):
-        with command.start(tmp_path, "--resume") as one, command.start(tmp_path, "--resume") as other:
-            ends = [one.end(), other.end()]
+        with command.start(tmp_path, "--resume") as first, command.start(tmp_path, "--resume") as other:
+            ends = [first.end(), other.end()]
         assert [status for status, _ in ends] == [0, 0], ends
         done = [sum(event["event"] == "shot_done" for event in events) for _, events in ends]
         assert sum(done) == 6, f"shots were rendered {sum(done)} times: {done[0]} by one, {done[1]} by the other"
@@ -162,10 +162,10 @@ class Disturbances:
 
     @pytest.mark.exhaustive
     def test_of_two_batches_the_one_that_is_not_killed_does_all(self, command, undisturbed, tmp_path):
-        with command.start(tmp_path, "--resume") as other, command.start(tmp_path, "--resume") as one:
+        with command.start(tmp_path, "--resume") as other, command.start(tmp_path, "--resume") as first:
             other.until("shot_started")
             other.process.kill()
-            status, events = one.end()
+            status, events = first.end()
         assert status == 0, events
         assert_same(tmp_path, undisturbed)
 
@@ -191,8 +191,8 @@ class Disturbances:
             batch.signal_all(signal.SIGINT)
             status, events = batch.end()
         assert status == 130, (status, events)
-        told = [event["event"] for event in events]
-        assert told[told.index("stopping") :].count("shot_done") <= 1, told
+        entries = [event["event"] for event in events]
+        assert entries[entries.index("stopping") :].count("shot_done") <= 1, entries
 
     @pytest.mark.exhaustive
     def test_a_second_signal_ends_it_at_once(self, blender, tmp_path):
@@ -228,8 +228,8 @@ class Disturbances:
             cp -a {disk} {tmp_path}/end
         """)
         assert outcome.stdout.split() == ["4", "0"], outcome
-        told = [_event(line) for line in first.read_text(encoding="utf-8").splitlines()]
-        failed = [event["error"] for event in told if event.get("event") == "shot_failed"]
+        entries = [_event(line) for line in first.read_text(encoding="utf-8").splitlines()]
+        failed = [event["error"] for event in entries if event.get("event") == "shot_failed"]
         assert len(failed) == 1 and "No space left on device" in failed[0] and "free some space" in failed[0], failed
         assert_same(tmp_path / "end", undisturbed)
 

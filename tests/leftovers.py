@@ -36,46 +36,46 @@ _PLAIN = str | int | float | list | set | dict | tuple | frozenset
 
 def snapshot():
     """Name of a place → what is there, as a set of texts."""
-    found = {}
+    result = {}
     for name in dir(bpy.types):
         each = getattr(bpy.types, name)
         if hasattr(each, "bl_rna"):
-            found[f"properties of {name}"] = set(each.bl_rna.properties.keys())
-            found[f"functions of {name}"] = set(each.bl_rna.functions.keys())
+            result[f"properties of {name}"] = set(each.bl_rna.properties.keys())
+            result[f"functions of {name}"] = set(each.bl_rna.functions.keys())
         draw = getattr(each, "draw", None)
-        found[f"entries of {name}"] = {_named(function) for function in getattr(draw, "_draw_funcs", [draw])}
+        result[f"entries of {name}"] = {_named(function) for function in getattr(draw, "_draw_funcs", [draw])}
         for key, value in getattr(each, "__dict__", {}).items():
             if isinstance(value, list | set | dict) and not key.startswith("__"):
-                found[f"{name}.{key}"] = _items(value)
-    found["types"] = set(dir(bpy.types))
-    found["classes"] = {_named(each) for each in _subclasses(bpy.types.bpy_struct) if _is_registered(each)}
-    found["operators"] = {f"{module}.{name}" for module in dir(bpy.ops) for name in dir(getattr(bpy.ops, module))}
+                result[f"{name}.{key}"] = _items(value)
+    result["types"] = set(dir(bpy.types))
+    result["classes"] = {_named(each) for each in _subclasses(bpy.types.bpy_struct) if _is_registered(each)}
+    result["operators"] = {f"{module}.{name}" for module in dir(bpy.ops) for name in dir(getattr(bpy.ops, module))}
     for name in dir(bpy.app.handlers):
         value = getattr(bpy.app.handlers, name)
         if isinstance(value, list):
-            found[f"handlers {name}"] = {_named(function) for function in value}
+            result[f"handlers {name}"] = {_named(function) for function in value}
     for configuration in bpy.context.window_manager.keyconfigs:
         for keymap in configuration.keymaps:
             where = f"{configuration.name}: {keymap.name}"
-            found[where] = {f"{item.idname} {item.to_string()} {i}" for i, item in enumerate(keymap.keymap_items)}
+            result[where] = {f"{item.idname} {item.to_string()} {i}" for i, item in enumerate(keymap.keymap_items)}
     for prop in bpy.data.bl_rna.properties:
         if prop.type == "COLLECTION":
-            found[f"bpy.data.{prop.identifier}"] = {block.name_full for block in getattr(bpy.data, prop.identifier)}
-    found["add-ons"] = set(bpy.context.preferences.addons.keys())
-    found["driver names"] = set(bpy.app.driver_namespace)
+            result[f"bpy.data.{prop.identifier}"] = {block.name_full for block in getattr(bpy.data, prop.identifier)}
+    result["add-ons"] = set(bpy.context.preferences.addons.keys())
+    result["driver names"] = set(bpy.app.driver_namespace)
     for module_name, module in list(sys.modules.items()):
         if _is_blenders(module_name, module):
             for key, value in getattr(module, "__dict__", {}).items():
                 if isinstance(value, list | set | dict) and key not in ("__builtins__", "__annotations__"):
-                    found[f"{module_name}.{key}"] = _items(value)
-    found["threads"] = {thread.name for thread in threading.enumerate()}
-    found["signals"] = {f"{number} {signal.getsignal(number)}" for number in signal.valid_signals()}
-    found["sys.path"] = set(sys.path)
-    found["import hooks"] = {_named(hook) for hook in (*sys.meta_path, *sys.path_hooks)}
+                    result[f"{module_name}.{key}"] = _items(value)
+    result["threads"] = {thread.name for thread in threading.enumerate()}
+    result["signals"] = {f"{number} {signal.getsignal(number)}" for number in signal.valid_signals()}
+    result["sys.path"] = set(sys.path)
+    result["import hooks"] = {_named(hook) for hook in (*sys.meta_path, *sys.path_hooks)}
     folder = Path(bpy.utils.resource_path("USER"))
-    found["files"] = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
-    found["environment"] = {f"{key}={value}" for key, value in os.environ.items()}
-    return found
+    result["files"] = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    result["environment"] = {f"{key}={value}" for key, value in os.environ.items()}
+    return result
 
 
 def _is_blenders(name, module):
@@ -201,8 +201,8 @@ def differences(before, after):
     return [
         f"{sign} {each} in {place}"
         for place in sorted(before.keys() | after.keys())
-        for sign, one, other in (("more:", after, before), ("less:", before, after))
-        for each in sorted(one.get(place, set()) - other.get(place, set()))
+        for sign, first, other in (("more:", after, before), ("less:", before, after))
+        for each in sorted(first.get(place, set()) - other.get(place, set()))
     ]
 
 

@@ -35,8 +35,8 @@ class TestWheel(disturbed.Disturbances):
             (blender,) = Path(f"/proc/{batch.process.pid}/task/{batch.process.pid}/children").read_text().split()
             os.kill(int(blender), signal.SIGSEGV)
             status, events = batch.end()
-        told = [event["text"] for event in events if event["event"] == "error"]
-        assert status == 2 and len(told) == 1 and "Blender has ended with SIGSEGV at " in told[0], (status, events)
+        entries = [event["text"] for event in events if event["event"] == "error"]
+        assert status == 2 and len(entries) == 1 and "Blender has ended with SIGSEGV at " in entries[0], (status, events)
         assert 1 <= len(list(tmp_path.glob("shot_*.json"))) < 6
         assert command.run(tmp_path, "--resume")[0] == 0
         assert_same(tmp_path, undisturbed)

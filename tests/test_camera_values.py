@@ -24,11 +24,11 @@ keeps = st.sampled_from(["PIXELS", FIELD_OF_VIEW])
 @given(distances, zooms, keeps, frames, frames, fits)
 def test_what_is_stated_is_asked_for_whatever_zoom_and_resolution(distance, zoom, keeps, earlier, frame, fit):
     values = replace(VALUES, zoom=zoom, keeps=keeps, counted_in=without_border(earlier))
-    said = values.stating((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), distance, frame, fit)
-    assert (said.zoom, said.enabled, said.held_roll) == (zoom, True, 0.0)
+    message = values.stating((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), distance, frame, fit)
+    assert (message.zoom, message.enabled, message.held_roll) == (zoom, True, 0.0)
     # Two quotients and two products, each rounded once.
-    assert abs(said.distance_at_full_size(frame, fit) - distance) <= 4.5 * ROUNDING * distance
-    assert said.view_when_set == ((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    assert abs(message.distance_at_full_size(frame, fit) - distance) <= 4.5 * ROUNDING * distance
+    assert message.view_when_set == ((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
 @given(distances, keeps, frames, frames, fits)

@@ -26,16 +26,16 @@ def is_there(process):
 
 def wait_until(is_so, seconds=20):
     ends = time.monotonic() + seconds
-    while not (found := is_so()) and time.monotonic() < ends:
+    while not (outcome := is_so()) and time.monotonic() < ends:
         time.sleep(0.02)
-    return found
+    return outcome
 
 
 def test_grandchildren_end_with_the_child(tmp_path):
-    said = tmp_path / "said.txt"
-    group = child_process.ProcessGroup([sys.executable, "-c", PARENT + "time.sleep(60)"], said, os.environ)
-    assert wait_until(lambda: said.read_text().endswith("\n")), "the group has not started"
-    members = [int(word) for word in said.read_text().split()]
+    log = tmp_path / "said.txt"
+    group = child_process.ProcessGroup([sys.executable, "-c", PARENT + "time.sleep(60)"], log, os.environ)
+    assert wait_until(lambda: log.read_text().endswith("\n")), "the group has not started"
+    members = [int(word) for word in log.read_text().split()]
     assert all(map(is_there, members)) and group.status() is None
     group.end()
     assert wait_until(lambda: not any(map(is_there, members))), "a member runs on"

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewcam_addon import api, cameras, image
+from viewcam_addon import api, cameras, commands, image
 from viewcam_addon.cli import main
 from viewcam_addon.commands.demo import SCENE as DEMO_SCENE
 from viewcam_addon.errors import InputError
@@ -78,8 +78,8 @@ def test_what_differs_is_drawn_where_it_is_wanted(tmp_path):
     result = tmp_path / "compare.json"
     assert main(["compare", str(picture), str(picture), "--difference", str(drawn), "--json", str(result)]) == 0
     assert drawn.read_bytes().startswith(b"\x89PNG")
-    told = json.loads(result.read_text())["difference"]
-    assert told["image"] == str(drawn) and "px off" in told["colours"]
+    record = json.loads(result.read_text())["difference"]
+    assert record["image"] == str(drawn) and "px off" in record["colours"]
 
 
 def test_two_cameras_a_pixel_apart_are_not_the_same_picture(tmp_path, capfd):
@@ -106,10 +106,10 @@ def test_what_is_not_modelled_is_named_with_its_share_and_fails_under_strict(tmp
     words += ["--junit", str(tmp_path / "a.xml"), "--report", str(tmp_path / "report")]
     for strict, status in (([], 0), (["--strict"], 3)):
         assert main(words + strict) == status
-        told = json.loads((tmp_path / "a.json").read_text())
-        assert (told["exit_status"], told["answer"], told["passed"]) == (status, "same_but", True)
+        record = json.loads((tmp_path / "a.json").read_text())
+        assert (record["exit_status"], record["answer"], record["passed"]) == (status, "same_but", True)
         seen = (image.read(picture)["Object Index"] == 3).mean()
-        assert told["not_modelled"] == {
+        assert record["not_modelled"] == {
             "count": 1,
             "names": ["Ball"],
             "in_one_place": [],
@@ -117,9 +117,9 @@ def test_what_is_not_modelled_is_named_with_its_share_and_fails_under_strict(tmp
             "share": seen,
             "shown": seen,
         }
-        assert f"but for 1 object that is not modelled (Ball; {100 * seen:.2g} % of the picture)" in capfd.readouterr().out
+        assert f"but for 1 object that is not modeled (Ball; {100 * seen:.2g} % of the picture)" in capfd.readouterr().out
         page = (tmp_path / "report" / "index.html").read_text(encoding="utf-8")
-        assert 'class="same_but"' in page and "but for 1 object that is not modelled" in page
+        assert 'class="same_but"' in page and "but for 1 object that is not modeled" in page
         assert ("<failure" in (tmp_path / "a.xml").read_text()) == bool(strict)
 
 
@@ -186,7 +186,7 @@ def test_the_size_and_the_stated_camera_can_be_chosen(tmp_path, capfd):
     assert "stated_camera" in fails(capfd, "render", write_scene(tmp_path), tmp_path / "c.exr", "--stated")
 
 
-def test_the_origin_of_a_recentred_scene_is_told(tmp_path, capfd):
+def test_the_origin_of_a_recentered_scene_is_told(tmp_path, capfd):
     scene, picture = write_scene(tmp_path, origin=[4200952.125, 0, -2]), tmp_path / "out.exr"
     assert main(["render", str(scene), str(picture)]) == 0
     report, result = tmp_path / "report", tmp_path / "result.json"
@@ -398,8 +398,8 @@ def test_what_can_not_be_written_is_said_before_anything_is_traced_or_rendered(t
     monkeypatch.setattr(command, "run", lambda options: begun.append(options) or (0, {}))
     (tmp_path / "file").write_text("no folder")
     bad = str(tmp_path / "file" / "out.png")
-    said = fails(capfd, *(word.replace("OUT.png", bad).replace("OUT", bad) for word in words))
-    assert not begun and "can't be written" in said and "out.png" in said
+    message = fails(capfd, *(word.replace("OUT.png", bad).replace("OUT", bad) for word in words))
+    assert not begun and "can't be written" in message and "out.png" in message
     good = str(tmp_path / "new" / "out.png")
     assert main([word.replace("OUT.png", good).replace("OUT", good) for word in words]) == 0
     assert len(begun) == 1 and getattr(begun[0], output) == Path(good)
@@ -430,9 +430,9 @@ def test_the_result_goes_to_standard_output_by_its_name_and_devices_stay(tmp_pat
     """As root, --json /dev/null once left a file in its place."""
     scene = write_scene(tmp_path)
     command = [sys.executable, "-m", "viewcam_addon", "render", scene, tmp_path / "out.exr", "--json"]
-    told = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=True).stdout
-    said, _, result = told.partition("\n")
-    assert "traced 64 × 48" in said and json.loads(result)["exit_status"] == 0
+    output = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=True).stdout
+    message, _, result = output.partition("\n")
+    assert "traced 64 × 48" in message and json.loads(result)["exit_status"] == 0
     subprocess.run([*command, "/dev/null"], capture_output=True, check=True)
     assert Path("/dev/null").is_char_device()
     mixed = subprocess.run([*command, "/dev/stdout", "--log-json"], capture_output=True, text=True, check=False)
@@ -490,7 +490,7 @@ def test_a_picture_made_elsewhere_is_judged_by_the_channels_that_are_named(tmp_p
 
     from viewcam_addon import image
 
-    scene, traced, made = tmp_path / "scene.json", tmp_path / "traced.exr", tmp_path / "made.exr"
+    scene, traced, rendered = tmp_path / "scene.json", tmp_path / "traced.exr", tmp_path / "made.exr"
     scene.write_text(json.dumps(SCENE))
     assert main(["render", str(scene), str(traced)]) == 0
     passes = image.read(traced).passes
@@ -498,14 +498,14 @@ def test_a_picture_made_elsewhere_is_judged_by_the_channels_that_are_named(tmp_p
     hit = passes["Depth"][..., 0] < image.BACKGROUND_DEPTH
     pixels = {f"P.{letter}": passes["Position"][::-1, :, i] for i, letter in enumerate("XYZ")}
     pixels |= {"far": np.where(hit, away, np.inf)[::-1], "id": passes["Object Index"][::-1, :, 0]}
-    OpenEXR.File({}, {name: np.ascontiguousarray(values, np.float32) for name, values in pixels.items()}).write(str(made))
-    compare = ["compare", str(traced), str(made), "--scene", str(scene), "--channels"]
+    OpenEXR.File({}, {name: np.ascontiguousarray(values, np.float32) for name, values in pixels.items()}).write(str(rendered))
+    compare = ["compare", str(traced), str(rendered), "--scene", str(scene), "--channels"]
     result = tmp_path / "result.json"
     stated = ["position=P.X,P.Y,P.Z", "distance=far", "object-index=id"]
     assert main([*compare, *stated, "--json", str(result), "--report", str(tmp_path / "report")]) == 0
-    found = json.loads(result.read_text())
-    assert [row["name"] for row in found["passes"]] == ["Position", "Position depth", "Depth"]
-    assert "Normal" in found["not_compared"] and (tmp_path / "report" / "index.html").is_file()
+    record = json.loads(result.read_text())
+    assert [row["name"] for row in record["passes"]] == ["Position", "Position depth", "Depth"]
+    assert "Normal" in record["not_compared"] and (tmp_path / "report" / "index.html").is_file()
     assert main([*compare, "distance=far", "--report", str(tmp_path / "depth")]) == 0
     assert main([*compare, "position=P.Y,P.X,P.Z"]) == 1
     assert "no channel 'W': name some of P.X" in fails(capfd, *compare[:-1], "--channels", "depth=W")
@@ -519,23 +519,23 @@ def test_a_picture_by_mitsuba_of_the_same_scene_is_the_same_and_one_of_a_moved_b
 
     mitsuba = pytest.importorskip("mitsuba")
     mitsuba.set_variant("scalar_rgb")
-    scene, traced, made, camera = (tmp_path / name for name in ("scene.json", "traced.exr", "made.exr", "camera.xml"))
+    scene, traced, rendered, camera = (tmp_path / name for name in ("scene.json", "traced.exr", "made.exr", "camera.xml"))
     scene.write_text(json.dumps(SCENE))
     assert main(["render", str(scene), str(traced)]) == 0
     cameras.save([cameras.Camera("camera", Pinhole(**CAMERA))], camera, "mitsuba")
     # One sample, through each pixel's center.
     number, flag = "<integer name='sample_count' value='1'/>", "<boolean name='jitter' value='false'/>"
-    one = f"<rfilter type='box'/></film><sampler type='stratified'>{number}{flag}</sampler>"
-    text = camera.read_text().replace("</film>", one)
+    body = f"<rfilter type='box'/></film><sampler type='stratified'>{number}{flag}</sampler>"
+    text = camera.read_text().replace("</film>", body)
     (sensor,) = mitsuba.load_string(text).sensors()
     for x, status in ((0, 0), (0.002, 1)):
         ball = {"type": "sphere", "center": [x, 0, 0]}
         document = {"type": "scene", "integrator": {"type": "aov", "aovs": "P:position"}, "ball": ball}
         pixels = np.array(mitsuba.render(mitsuba.load_dict(document), sensor=sensor))
         channels = {f"P.{letter}": np.ascontiguousarray(pixels[..., i], np.float32) for i, letter in enumerate("XYZ")}
-        OpenEXR.File({}, channels).write(str(made))
+        OpenEXR.File({}, channels).write(str(rendered))
         stated = ["--scene", str(scene), "--channels", "position=P.X,P.Y,P.Z"]
-        assert main(["compare", str(traced), str(made), *stated]) == status
+        assert main(["compare", str(traced), str(rendered), *stated]) == status
 
 
 def test_another_engine_is_checked_by_its_geometry_alone(capfd):
@@ -543,3 +543,31 @@ def test_another_engine_is_checked_by_its_geometry_alone(capfd):
     assert "--engine EEVEE is checked at level geometry" in fails(
         capfd, "check", "any.blend", "--engine", "EEVEE", "--level", "path"
     )
+
+
+LISTING = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import viewcam_addon
+from viewcam_addon import cli, commands
+assert viewcam_addon.__file__.startswith(sys.argv[1]), viewcam_addon.__file__
+assert cli.main(["--help"]) == 0
+named = [name for name in sys.modules if name.startswith("viewcam_addon.commands.")]
+assert not named, f"--help imports {named}"
+"""
+
+
+@pytest.mark.parametrize("form", ["folder", "zip"])
+def test_help_tells_the_first_line_of_each_module_of_a_command_and_imports_none(tmp_path, form):
+    package = Path(commands.__file__).parent.parent
+    path = package.parent
+    if form == "zip":
+        path = Path(shutil.make_archive(str(tmp_path / "viewcam"), "zip", package.parent, package.name))
+    done = subprocess.run([sys.executable, "-P", "-c", LISTING, path], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    listed = " ".join(done.stdout.split())
+    assert {"check", "batch", "demo"} <= set(commands.names())
+    for name in commands.names():
+        summary = importlib.import_module(f"viewcam_addon.commands.{name}").__doc__.splitlines()[0]
+        assert summary.endswith(".") and f"{name} {summary}" in listed, name
+    assert "serve" not in listed.partition("positional")[2], "a command for our own processes is listed"

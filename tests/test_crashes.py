@@ -112,8 +112,8 @@ def test_a_signal_to_a_batch_counts_once_whether_one_process_has_it_or_both(run,
     while not (tmp_path / "waiting").exists():
         time.sleep(0.02)
     send(child.pid, number)
-    told = (json.loads(line) for line in child.stdout)
-    assert next(event for event in told if event["event"] == "stopping")["signal"] == number.name
+    output = (json.loads(line) for line in child.stdout)
+    assert next(event for event in output if event["event"] == "stopping")["signal"] == number.name
     time.sleep(0.5)  # in which a second one would have ended it
     assert child.poll() is None
     send(child.pid, number)

@@ -136,8 +136,8 @@ def test_standard_output_by_its_name_is_written_to_behind_what_is_printed_alread
             child = subprocess.run(
                 [sys.executable, "-c", program], stdout=subprocess.PIPE if way == "pipe" else out, check=True
             )
-        said = child.stdout.decode() if way == "pipe" else (tmp_path / "out.txt").read_text()
-        assert said == "printed\nwhole\nmore\n", way
+        output = child.stdout.decode() if way == "pipe" else (tmp_path / "out.txt").read_text()
+        assert output == "printed\nwhole\nmore\n", way
 
 
 @posix

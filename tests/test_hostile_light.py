@@ -126,9 +126,9 @@ def test_a_lamp_of_any_power_lights_in_proportion(tmp_path, power):
 def test_five_thousand_lamps_light_as_one_that_has_their_power(tmp_path):
     """All in one place: the choice among them makes no noise, so that one sample a pixel is exact."""
     lamps = [{"type": "point", "name": f"Lamp {i}", "position": [0, 0, 3], "power": [1, 1, 1]} for i in range(5000)]
-    one = render(tmp_path, "direct", lamps=[lamps[0] | {"power": [5000] * 3}], samples=1)
+    bright = render(tmp_path, "direct", lamps=[lamps[0] | {"power": [5000] * 3}], samples=1)
     many = render(tmp_path, "direct", lamps=lamps, samples=1)
-    np.testing.assert_allclose(many, one, rtol=1e-5)
+    np.testing.assert_allclose(many, bright, rtol=1e-5)
 
 
 def test_five_thousand_lamps_all_over_the_place_light_what_their_sum_does(tmp_path):

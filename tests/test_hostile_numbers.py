@@ -202,9 +202,9 @@ def many_poses(source):
     plane, draw = some_camera(source).plane, source.choice((source.number, source.finite))
     numbers = [float(x) if isinstance(x, bool | np.bool_) else x for x in (draw() for _ in range(18))]
     poses = [[numbers[i : i + 3] for i in (j, j + 3, j + 6)] for j in (0, 9)]
-    made = answer(Pinhole.of_poses, *zip(*poses, strict=True), [plane, plane])
+    pinholes = answer(Pinhole.of_poses, *zip(*poses, strict=True), [plane, plane])
     alone = [answer(Pinhole, *pose, plane.distance, plane.width, plane.height, plane.principal_point) for pose in poses]
-    assert (made is REFUSED) if REFUSED in alone else (made == alone), (made, alone)
+    assert (pinholes is REFUSED) if REFUSED in alone else (pinholes == alone), (pinholes, alone)
     if all(isinstance(x, float) for x in numbers):
         valid = pinhole.make_views(*np.array(poses).swapaxes(0, 1))
         assert valid.tolist() == [camera is not REFUSED for camera in alone], poses
@@ -317,8 +317,10 @@ def a_lens_in_any_unit(source):
     back = answer(intrinsics.distance_by_lens, unit, lens, frame, sensor, fit)
     amplified = 1.0 if is_length else lens / max(math.sin(lens), 1e-300)
     assert back is REFUSED or abs(back / distance - 1) <= (8 + 4 * amplified) * 2.0**-53, (unit, distance, lens, back)
-    found = answer(intrinsics.distance_by_lens, unit, source.choice((source.finite(), math.nan, math.inf)), frame, sensor, fit)
-    assert found is REFUSED or 0 < found < math.inf, (unit, found)
+    answered = answer(
+        intrinsics.distance_by_lens, unit, source.choice((source.finite(), math.nan, math.inf)), frame, sensor, fit
+    )
+    assert answered is REFUSED or 0 < answered < math.inf, (unit, answered)
 
 
 @attacks("intrinsics.own_sensor", "intrinsics.lens_and_sensor", "intrinsics.check_storable")
@@ -334,8 +336,8 @@ def a_sensor_that_grew(source):
     stored = intrinsics.lens_and_sensor(data, own)
     assert stored["virtual_pinhole_sensor"] in (own, (0.0, 0.0)) and stored["sensor_width"] == data.sensor_width
     values = (source.choice((source.finite(), math.inf, math.nan)),)
-    found = answer(lambda: intrinsics.check_storable("Camera", eye=values))
-    assert (found is REFUSED) == (not abs(values[0]) <= np.finfo(np.float32).max)
+    answered = answer(lambda: intrinsics.check_storable("Camera", eye=values))
+    assert (answered is REFUSED) == (not abs(values[0]) <= np.finfo(np.float32).max)
 
 
 def public_functions():
@@ -370,7 +372,7 @@ def test_some_hundred_random_attacks(attack):
 
 def test_what_is_no_number_is_shown_in_one_short_line():
     for value in NO_NUMBERS:
-        text = checks.shown(value)
+        text = checks.quoted(value)
         assert "\n" not in text and len(text) < 70, text
     with pytest.raises(InputError, match=r"eye is array\(\[\[1., 2., 3.\]\]\): give 3 numbers"):
         Pinhole(np.array([[1.0, 2.0, 3.0]]), (0, 0, 0), (0, 0, 1), 500, 64, 48)

@@ -83,8 +83,10 @@ def test_the_verdict_is_the_message_and_counted_once(tmp_path, status, result, k
     assert {name: int(suite.get(name)) for name in counts} == counts
     (case,) = suite
     assert (case.get("name"), case.get("time")) == ("check a.blend", "1.250")
-    found = [child for child in case if child.tag != "properties"]
-    assert [(child.tag, child.get("message"), child.text) for child in found] == ([(kind, message, message)] if kind else [])
+    collected = [child for child in case if child.tag != "properties"]
+    assert [(child.tag, child.get("message"), child.text) for child in collected] == (
+        [(kind, message, message)] if kind else []
+    )
 
 
 @given(st.text(st.characters(), max_size=40))
@@ -107,8 +109,8 @@ def test_a_comparison_writes_it_whole_and_what_can_not_be_written_is_one_sentenc
     assert main(["render", str(tmp_path / "scene.json"), picture]) == 0
     assert main(["compare", picture, picture, "--junit", str(tmp_path / "a.xml"), "--json", str(tmp_path / "a.json")]) == 0
     (case,) = ElementTree.parse(tmp_path / "a.xml").getroot().iter("testcase")
-    told = {each.get("name"): each.get("value") for each in case.iter("property")}
-    assert told == dict(junit.properties(json.loads((tmp_path / "a.json").read_text())))
+    properties = {each.get("name"): each.get("value") for each in case.iter("property")}
+    assert properties == dict(junit.properties(json.loads((tmp_path / "a.json").read_text())))
     assert main(["compare", picture, str(tmp_path / "none.exr"), "--junit", str(tmp_path / "b.xml")]) == 2
     (case,) = ElementTree.parse(tmp_path / "b.xml").getroot().iter("testcase")
     assert "none.exr" in case.find("error").get("message")

@@ -57,8 +57,8 @@ def test_the_first_row_of_a_file_is_the_top_of_the_picture(tmp_path):
 
 def test_names_of_blender_4_and_parts_of_blender_5_mean_the_same_passes(tmp_path):
     index, depth = np.full((2, 3), 7, dtype=np.float32), np.full((2, 3), 9, dtype=np.float32)
-    one = {"View Layer.001.IndexOB.X": index, "View Layer.001.IndexMA.X": index, "View Layer.001.Depth.Z": depth}
-    OpenEXR.File({}, one).write(str(tmp_path / "4.exr"))
+    view_layer = {"View Layer.001.IndexOB.X": index, "View Layer.001.IndexMA.X": index, "View Layer.001.Depth.Z": depth}
+    OpenEXR.File({}, view_layer).write(str(tmp_path / "4.exr"))
     parts = [
         OpenEXR.Part({}, {f"ViewLayer.{name}": pixels}, name)
         for name, pixels in (("Object Index.X", index), ("Depth.Z", depth))

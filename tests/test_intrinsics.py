@@ -178,20 +178,20 @@ def test_euler_angles_are_right_in_gimbal_lock_and_next_to_it(order, from_lock, 
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_euler_applies_the_axes_in_blenders_order(order):
-    one, two, three = (
+    first, two, three = (
         rotation_about(angle, np.eye(3)["XYZ".index(axis)]) for axis, angle in zip(order, (0.3, 0.5, 0.7), strict=True)
     )
     given_angles = [0.0] * 3
     for axis, angle in zip(order, (0.3, 0.5, 0.7), strict=True):
         given_angles["XYZ".index(axis)] = angle
-    np.testing.assert_allclose(rotation.from_euler(given_angles, order), three @ two @ one, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(rotation.from_euler(given_angles, order), three @ two @ first, rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("order", ORDERS)
 @given(given_angles=angles)
 def test_euler_chooses_the_smaller_of_the_two_triples(order, given_angles):
-    found = rotation.euler(rotation.from_euler(given_angles, order), order)
-    assert sum(map(abs, found)) <= sum(map(abs, given_angles)) + 1e-6  # 1e-6: in gimbal lock one angle is free
+    angles = rotation.euler(rotation.from_euler(given_angles, order), order)
+    assert sum(map(abs, angles)) <= sum(map(abs, given_angles)) + 1e-6  # 1e-6: in gimbal lock one angle is free
 
 
 @given(angle=st.floats(0, math.pi), direction=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda a: math.hypot(*a) > 1e-3))
@@ -202,8 +202,8 @@ def test_quaternion_and_axis_angle_are_those_of_the_rotation(angle, direction):
     assert quaternion[0] >= 0
     assert abs(math.hypot(*quaternion) - 1) <= ROUNDING
     np.testing.assert_allclose(rotation.from_quaternion(quaternion), matrix, rtol=0, atol=ROUNDING)
-    found, *found_axis = rotation.axis_angle(matrix)
-    np.testing.assert_allclose(rotation_about(found, found_axis), matrix, rtol=0, atol=ROUNDING)
+    angles, *found_axis = rotation.axis_angle(matrix)
+    np.testing.assert_allclose(rotation_about(angles, found_axis), matrix, rtol=0, atol=ROUNDING)
 
 
 def test_no_rotation_turns_by_nothing_about_blenders_default_axis():
@@ -234,10 +234,10 @@ def rotation_of(numbers, mode):
 def test_numbers_near_others_give_the_same_rotation(mode, given_angles, angle, axis):
     matrix = rotation.from_euler(given_angles, "XYZ")
     before = (0.5, 0.5, -0.5, 0.5) if mode == "QUATERNION" else (angle, *axis) if mode == "AXIS_ANGLE" else (angle, 1, -9)
-    found = rotation.numbers(matrix, mode, before)
+    angles = rotation.numbers(matrix, mode, before)
     # A turn of 2⁻²⁶ about another axis, and an angle that begins elsewhere that close to gimbal lock: twice that, at most π.
-    error = np.abs(rotation_of(found, mode) - matrix).max()
-    assert error <= math.pi * 2.0**-26 + ROUNDING * 8, f"{mode} {found}: off by {error:.1e}"
+    error = np.abs(rotation_of(angles, mode) - matrix).max()
+    assert error <= math.pi * 2.0**-26 + ROUNDING * 8, f"{mode} {angles}: off by {error:.1e}"
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -257,8 +257,8 @@ def test_numbers_that_continue_others_never_jump(mode, axis):
 def test_in_gimbal_lock_the_free_angle_stays_as_it_was(order):
     given_angles = [0.3, 0.3, 2.2]
     given_angles["XYZ".index(order[1])] = math.pi / 2
-    found = rotation.numbers(rotation.from_euler(given_angles, order), order, given_angles)
-    np.testing.assert_allclose(found, given_angles, atol=1e-7)
+    angles = rotation.numbers(rotation.from_euler(given_angles, order), order, given_angles)
+    np.testing.assert_allclose(angles, given_angles, atol=1e-7)
 
 
 def test_without_numbers_before_a_rotation_is_the_plainest():

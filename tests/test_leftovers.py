@@ -129,18 +129,18 @@ def test_camera_is_where_its_four_values_say(name, opened):
     assert_same_camera(cameras.read(camera, scene), cameras.stated(camera, scene))
 
 
-def assert_same_camera(found, stated):
+def assert_same_camera(pinhole, stated):
     """Equal but for float32 storage: the eye, an orientation of float32 Euler angles, a lens over a sensor, a shift."""
-    offset = np.abs(np.subtract(found.eye, stated.eye))
+    offset = np.abs(np.subtract(pinhole.eye, stated.eye))
     assert np.all(offset <= FLOAT32 * np.abs(stated.eye)), f"the eye is {offset} off"
     # A matrix entry is within 2.7e-7 with the worst of rotation modes.
-    turn = np.abs(np.subtract(found.basis(), stated.basis())).max()
+    turn = np.abs(np.subtract(pinhole.basis(), stated.basis())).max()
     assert turn <= 2.7e-7, f"an axis is {turn:.1e} off"
     # Lens, sensor and their quotient: three roundings.
-    zoom = np.abs(np.divide(found.distance, stated.distance) - 1).max()
+    zoom = np.abs(np.divide(pinhole.distance, stated.distance) - 1).max()
     assert zoom <= 3 * FLOAT32, f"the distance is {zoom:.1e} of itself off"
-    assert (found.width, found.height, found.mirrored) == (stated.width, stated.height, stated.mirrored)
-    shift = np.abs(np.subtract(found.principal_point, stated.principal_point)).max()
+    assert (pinhole.width, pinhole.height, pinhole.mirrored) == (stated.width, stated.height, stated.mirrored)
+    shift = np.abs(np.subtract(pinhole.principal_point, stated.principal_point)).max()
     assert shift <= FLOAT32 * max(stated.width, stated.height), f"the principal point is {shift:.1e} pixels off"
 
 
@@ -176,9 +176,9 @@ def test_flight_moves_eye_and_look_at_and_the_camera_follows(opened):
     eyes = []
     for frame in range(scene.frame_start, scene.frame_end + 1):
         scene.frame_set(frame)
-        found = cameras.read(camera, scene)
-        assert_same_camera(found, cameras.stated(camera, scene))
-        eyes.append(found.eye)
+        pinhole = cameras.read(camera, scene)
+        assert_same_camera(pinhole, cameras.stated(camera, scene))
+        eyes.append(pinhole.eye)
     steps = np.linalg.norm(np.diff(eyes, axis=0), axis=1)
     assert len(eyes) == 48
     assert steps.min() > 0.1, f"between two frames the eye moves by only {steps.min():.3f} m"

@@ -57,8 +57,8 @@ def test_scene_of_artists_materials_is_exported_whole_and_the_same_within_noise(
     materials.BUILDERS[name]()
     blend = tmp_path / f"{name}.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
-    found = check(blend, tmp_path, "--level", "path", "--size", "48x27")
-    assert not [entry for entry in found["ledger"] if entry["status"] != "exported"], found["ledger"]
+    result = check(blend, tmp_path, "--level", "path", "--size", "48x27")
+    assert not [entry for entry in result["ledger"] if entry["status"] != "exported"], result["ledger"]
 
 
 @pytest.mark.parametrize("name", ["spot", "teapot", "stanford-bunny"])
@@ -102,15 +102,15 @@ def stage(model, scene):
 
 def material(name, shader, colour):
     """A material of one shader, perfectly smooth if it can be."""
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
-    nodes, links = made.node_tree.nodes, made.node_tree.links
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     node, output = nodes.new(shader), nodes.new("ShaderNodeOutputMaterial")
     node.inputs["Color"].default_value = (*colour, 1)
     node.inputs["Roughness"].default_value = 0
     links.new(node.outputs[0], output.inputs["Surface"])
-    return made
+    return material
 
 
 def lamp(kind, energy, location=(0, 0, 0), rotation=(0, 0, 0)):

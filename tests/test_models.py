@@ -39,6 +39,6 @@ def test_an_imported_model_is_the_same_picture(models_folder, fresh_blender, tmp
     blend, result = tmp_path / f"{name}.blend", tmp_path / "result.json"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     status = main(["check", str(blend), "--json", str(result)])
-    told = json.loads(result.read_text())
-    assert status == 0, told["sentence"]
-    assert told["hits"]["reference"] > 30_000, "the model must fill a good part of the picture"
+    record = json.loads(result.read_text())
+    assert status == 0, record["sentence"]
+    assert record["hits"]["reference"] > 30_000, "the model must fill a good part of the picture"

@@ -323,9 +323,9 @@ def test_what_cannot_be_framed_is_said(frame, points, changes, message):
 
 
 @pytest.mark.parametrize("frame", [moves.framed_by_eye, moves.framed_by_distance])
-@pytest.mark.parametrize("centre", [640, 700])
-def test_a_principal_point_at_the_margin_or_outside_frames_what_lies_on_its_other_side(frame, centre):
-    pinhole = looking_along_y(principal_point=(centre, 240))
+@pytest.mark.parametrize("center", [640, 700])
+def test_a_principal_point_at_the_margin_or_outside_frames_what_lies_on_its_other_side(frame, center):
+    pinhole = looking_along_y(principal_point=(center, 240))
     points = np.array([[-4.0, 0, 0], [-7, 0, 1]])
     check_framed(frame(pinhole, points), points, 0.0)
 

@@ -63,10 +63,10 @@ class Views:
         """(n, p) the truth less the solution: the turn, log d, and the eye where it is asked."""
         turn = self.rotation @ np.swapaxes(solution.rotation, -1, -2)
         about = [turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]]
-        found = [np.stack(about, axis=-1) / 2, np.log(self.distance / solution.distance)[:, None]]
+        values = [np.stack(about, axis=-1) / 2, np.log(self.distance / solution.distance)[:, None]]
         if solution.covariance.shape[-1] == 7:
-            found.append(self.eye - solution.eye)
-        return np.concatenate(found, axis=-1)
+            values.append(self.eye - solution.eye)
+        return np.concatenate(values, axis=-1)
 
 
 @pytest.mark.parametrize("count", [200, MANY])
@@ -144,19 +144,19 @@ def seen(points):
 
 def edges(axes="XXYY"):
     """Edges of the camera's picture, two of a box along each of the axes."""
-    found = []
+    result = []
     for number, axis in enumerate(axes):
         start = np.roll([-1.0, 1.0, float(number % 2)], "XYZ".index(axis))
         end = start + 2 * np.eye(3)["XYZ".index(axis)]
-        found.append((axis, *seen([start, end])))
-    return found
+        result.append((axis, *seen([start, end])))
+    return result
 
 
 def is_camera(match, eye=True):
-    found = match.pinhole
-    assert np.allclose(found.basis(), CAMERA.basis(), atol=1e-9)
-    assert found.distance == pytest.approx(CAMERA.distance, rel=1e-9)
-    assert not eye or np.allclose(found.eye, CAMERA.eye, atol=1e-8)
+    actual = match.pinhole
+    assert np.allclose(actual.basis(), CAMERA.basis(), atol=1e-9)
+    assert actual.distance == pytest.approx(CAMERA.distance, rel=1e-9)
+    assert not eye or np.allclose(actual.eye, CAMERA.eye, atol=1e-8)
 
 
 def test_a_rectangle_of_known_sides_gives_the_four_values_and_how_certain_they_are():
@@ -206,9 +206,9 @@ def edges_of(camera, axes="XYZ"):
 @pytest.mark.parametrize("distance", [None, 1700.0])
 def test_one_known_length_gives_the_place_as_well(distance):
     known = photo_match.KnownEdge(0, 4.0, (-2, -2, -1))
-    found = photo_match.from_edges(edges_of(CAMERA), LIKE, distance=distance, known=known).pinhole
-    np.testing.assert_allclose(found.eye, CAMERA.eye, atol=1e-8)
-    np.testing.assert_allclose(found.basis(), CAMERA.basis(), atol=1e-9)
+    pinhole = photo_match.from_edges(edges_of(CAMERA), LIKE, distance=distance, known=known).pinhole
+    np.testing.assert_allclose(pinhole.eye, CAMERA.eye, atol=1e-8)
+    np.testing.assert_allclose(pinhole.basis(), CAMERA.basis(), atol=1e-9)
     twice = photo_match.KnownEdge(0, 8.0, (-2, -2, -1))
     far = photo_match.from_edges(edges_of(CAMERA), LIKE, distance=distance, known=twice).pinhole
     np.testing.assert_allclose(np.subtract(far.eye, (-2, -2, -1)), 2 * np.subtract(CAMERA.eye, (-2, -2, -1)), atol=1e-8)
@@ -225,8 +225,8 @@ def test_a_known_lens_is_kept_and_makes_the_turn_more_certain():
 
 def test_a_known_lens_is_kept_by_points_and_rectangles():
     pixels = np.column_stack(CAMERA.project(RECTANGLE)[:2])
-    found = photo_match.from_rectangle(pixels, (3, 2), LIKE, distance=1700.0).pinhole
-    np.testing.assert_allclose(found.eye, CAMERA.eye, atol=1e-6)
+    pinhole = photo_match.from_rectangle(pixels, (3, 2), LIKE, distance=1700.0).pinhole
+    np.testing.assert_allclose(pinhole.eye, CAMERA.eye, atol=1e-6)
     wrong = photo_match.from_rectangle(pixels, (3, 2), LIKE, distance=2000.0)
     assert wrong.pinhole.distance == (2000.0, 2000.0) and wrong.error > 1, "another lens does not fit"
 
@@ -250,10 +250,10 @@ def test_opencv_sees_the_points_where_the_match_does():
     rotation = flip @ np.array(match.basis())
     d = match.distance[0]
     matrix = np.array([[d, 0, WIDTH / 2], [0, d, HEIGHT / 2], [0, 0, 1.0]])
-    theirs = np.stack([noisy[:, 0], HEIGHT - noisy[:, 1]], axis=-1)
+    expected = np.stack([noisy[:, 0], HEIGHT - noisy[:, 1]], axis=-1)
     # Its own refinement of the pose, with the lens that was found, moves nothing.
     turn, shift = cv2.Rodrigues(rotation)[0], -rotation @ np.array(match.eye)[:, None]
-    turn, shift = cv2.solvePnPRefineLM(points, theirs, matrix, None, turn, shift)
+    turn, shift = cv2.solvePnPRefineLM(points, expected, matrix, None, turn, shift)
     eye = -cv2.Rodrigues(turn)[0].T @ shift[:, 0]
     assert np.allclose(eye, match.eye, atol=1e-5)
 

@@ -107,9 +107,9 @@ def test_basis_neither_over_nor_underflows_at_any_scale(eye, look_at, up):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         camera = Pinhole(eye, look_at, up, 500, 64, 48)
-        one = np.array(camera.axes())
+        axes = np.array(camera.axes())
         many = np.array(basis(np.array([eye]), np.array([look_at]), np.array([up])))[:, 0]
-    assert np.array_equal(one, many)
+    assert np.array_equal(axes, many)
     if not camera.is_singular:
         error = basis_error(camera.axes(), (eye, look_at, up))
         assert error <= BASIS_TOLERANCE, f"error {error:.3g}"
@@ -221,7 +221,7 @@ def test_projecting_a_point_of_a_ray_gives_back_its_pixel(eye, look_at, up, d_x,
     assert depth > 0
 
 
-def test_the_centre_ray_runs_along_the_view_and_columns_and_rows_run_right_and_up():
+def test_the_center_ray_runs_along_the_view_and_columns_and_rows_run_right_and_up():
     camera = Pinhole((3, 0, 0), (0, 0, 0), (0, 0, 1), 100, 4, 2)
     u, v, w = camera.basis()
     assert np.array_equal(camera.ray_directions(2, 1, 0, 0), -w)

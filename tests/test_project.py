@@ -124,22 +124,22 @@ BUILD_FILES = {"__init__.py", "pyproject.toml", "Makefile", "LICENSE", "CONTRIBU
 
 def imported_modules(source: str, package: tuple[str, ...]) -> set[str]:
     """The modules that `source` imports anywhere, dotted and absolute; `package` is where its relative imports start."""
-    found = set()
+    result = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
-            found |= {name.name for name in node.names}
+            result |= {name.name for name in node.names}
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
-            found.add(node.module)
+            result.add(node.module)
         elif isinstance(node, ast.ImportFrom):
             start = [*package[: len(package) - node.level + 1], *(node.module.split(".") if node.module else [])]
-            found |= {".".join([*start, name.name]) for name in node.names}
-    return found
+            result |= {".".join([*start, name.name]) for name in node.names}
+    return result
 
 
 def arrows(source: str, path: Path) -> set[tuple[str, str, str]]:
     """(house, room, room it imports from) of `source`, as the file `path` relative to the package."""
     imports = imported_modules(source, ("viewcam_addon", *path.parent.parts))
-    found = set()
+    result = set()
     for house, rooms in HOUSES.items():
         inside = Path(house) if house else Path()
         if inside != Path() and inside not in path.parents:
@@ -147,8 +147,8 @@ def arrows(source: str, path: Path) -> set[tuple[str, str, str]]:
         room = path.relative_to(inside).parts[0].removesuffix(".py")
         package = ".".join(("viewcam_addon", *inside.parts))
         others = {other for other in rooms if any(f"{name}.".startswith(f"{package}.{other}.") for name in imports)}
-        found |= {(house, room, other) for other in others if room not in ROOF and other != room}
-    return found
+        result |= {(house, room, other) for other in others if room not in ROOF and other != room}
+    return result
 
 
 def undeclared(source: str, path: Path) -> list[str]:
@@ -181,8 +181,8 @@ def tracked_files() -> list[str]:
 
 
 def test_each_room_imports_only_from_those_that_its_line_in_the_table_names():
-    found = {path: undeclared(path.read_text(encoding="utf-8"), path.relative_to(PACKAGE)) for path in sources()}
-    guilty = {str(path.relative_to(PACKAGE)): names for path, names in found.items() if names}
+    result = {path: undeclared(path.read_text(encoding="utf-8"), path.relative_to(PACKAGE)) for path in sources()}
+    guilty = {str(path.relative_to(PACKAGE)): names for path, names in result.items() if names}
     assert not guilty, f"not in the table of tests/test_project.py: {guilty}"
 
 
@@ -216,9 +216,9 @@ def test_an_import_that_is_not_in_the_table_is_seen(source, path):
 def test_every_room_has_its_line_in_the_table():
     for house, rooms in HOUSES.items():
         inside = PACKAGE / house
-        found = {path.relative_to(inside).parts[0].removesuffix(".py") for path in inside.rglob("*.py")} - ROOF
-        assert found == set(rooms), (
-            f"say in the table of {house or 'the package'} what these import: {sorted(found ^ set(rooms))}"
+        result = {path.relative_to(inside).parts[0].removesuffix(".py") for path in inside.rglob("*.py")} - ROOF
+        assert result == set(rooms), (
+            f"say in the table of {house or 'the package'} what these import: {sorted(result ^ set(rooms))}"
         )
 
 
@@ -247,7 +247,7 @@ def test_no_modules_import_one_another_in_a_circle():
     openers = {PACKAGE / "__init__.py", NEEDS_BLENDER / "__init__.py"}  # what Blender is to hear of is imported as it registers
     files = [path for path in sources() if path not in openers]
     modules = {".".join(path.relative_to(ROOT).with_suffix("").parts): path.read_text(encoding="utf-8") for path in files}
-    assert len(modules) > 100 and not (found := circle(modules)), " → ".join(found)
+    assert len(modules) > 100 and not (actual := circle(modules)), " → ".join(actual)
 
 
 def test_a_circle_is_seen():
@@ -270,18 +270,18 @@ def test_imports_inside_the_package_are_relative():
 
 def names_of(tree: ast.Module) -> set[str]:
     """The names that a module defines or imports at its top level, in `if` and `try` as well."""
-    found, waiting = set(), list(tree.body)
+    result, waiting = set(), list(tree.body)
     for node in waiting:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            found.add(node.name)
+            result.add(node.name)
         elif isinstance(node, ast.Import | ast.ImportFrom):
-            found |= {(each.asname or each.name).split(".")[0] for each in node.names}
+            result |= {(each.asname or each.name).split(".")[0] for each in node.names}
         elif isinstance(node, ast.Assign | ast.AnnAssign):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            found |= {each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)}
+            result |= {each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)}
         else:
             waiting += [each for each in ast.iter_child_nodes(node) if isinstance(each, ast.stmt)]
-    return found
+    return result
 
 
 def missing_names(trees: dict[Path, ast.Module]) -> list[str]:
@@ -315,6 +315,25 @@ def test_an_import_of_what_is_not_there_is_seen():
     assert missing_names(trees) == []
     trees[Path("a/d.py")] = ast.parse("def late():\n    from .b import gone")
     assert missing_names(trees) == ["a/d.py: gone from a/b"]
+
+
+def vague_beginnings(tree: ast.Module) -> list[str]:
+    """The docstrings that begin with a word after which their subject is still unknown."""
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    texts = [ast.get_docstring(node) or "" for node in ast.walk(tree) if isinstance(node, documented)]
+    vague = re.compile(r"(How|Of|That of|The same|Those|What|When|Where|Whether|Which|Who)\b")
+    return [text.splitlines()[0] for text in texts if vague.match(text)]
+
+
+def test_docstrings_begin_with_what_a_thing_is_or_does():
+    vague = {path.relative_to(ROOT): vague_beginnings(parsed(path)) for path in sources()}
+    assert not (vague := {path: texts for path, texts in vague.items() if texts}), vague
+
+
+def test_a_docstring_that_begins_without_its_subject_is_seen():
+    assert vague_beginnings(ast.parse('def a():\n    """Of a picture."""\n\ndef b():\n    """The area of a picture."""')) == [
+        "Of a picture."
+    ]
 
 
 def test_only_blender_knows_blender():
@@ -364,11 +383,11 @@ METHODS = {"numbers", "precision"}
 
 def uses_of_the_property_group(source: str) -> list[str]:
     """The lines where `source` reads `….virtual_pinhole`, or takes or gives a PropertyGroup."""
-    found = []
+    result = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Attribute) and node.attr in ("virtual_pinhole", "PropertyGroup"):
-            found.append(f"{node.lineno}: {ast.unparse(node)}")
-    return found
+            result.append(f"{node.lineno}: {ast.unparse(node)}")
+    return result
 
 
 def test_below_the_interface_nothing_takes_the_property_group():
@@ -377,7 +396,7 @@ def test_below_the_interface_nothing_takes_the_property_group():
     uses = {path.name: uses_of_the_property_group(path.read_text(encoding="utf-8")) for path in camera_side}
     for name in ("render_settings.py", "own_picture.py"):  # a property group of their own
         assert len(uses.pop(name)) == 1
-    guilty = {name: found for name, found in uses.items() if found}
+    guilty = {name: result for name, result in uses.items() if result}
     assert len(uses) > 8 and not guilty, f"these reach up into the property group: {guilty}"
     for name in ("storage.py", "targets.py"):
         calls = {
@@ -399,8 +418,8 @@ def test_the_version_stands_in_one_place():
     manifest = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     assert "version" not in project["project"] and project["project"]["dynamic"] == ["version"]
-    found = [match["version"] for match in re.finditer(project["tool"]["hatch"]["version"]["pattern"], manifest)]
-    assert found == [tomllib.loads(manifest)["version"]]
+    result = [match["version"] for match in re.finditer(project["tool"]["hatch"]["version"]["pattern"], manifest)]
+    assert result == [tomllib.loads(manifest)["version"]]
 
 
 def test_the_manifest_asks_for_files_and_the_clipboard_and_no_more():
@@ -425,8 +444,8 @@ def test_what_the_readme_says_viewcam_does_it_does(capsys):
     promised = set(re.findall(r"(?m)(?:`|--command |^ *)viewcam ([a-z]+)", (ROOT / "README.md").read_text(encoding="utf-8")))
     assert {"check", "demo"} <= promised
     for name in sorted(promised):
-        status, said = cli.main([name, "--help"]), capsys.readouterr()
-        assert status == 0 and f"viewcam {name}" in said.out, said.err
+        status, output = cli.main([name, "--help"]), capsys.readouterr()
+        assert status == 0 and f"viewcam {name}" in output.out, output.err
 
 
 def paths_named_in(text: str) -> set[str]:
@@ -444,13 +463,13 @@ def test_every_path_that_a_document_names_exists():
 
 def test_every_module_that_a_comment_names_exists():
     """But for the tracer's and those of other programs, which cameras/ names as its sources."""
-    theirs = re.compile(r"(?<![\w/.*-])((?:[a-z_]+/)*[a-z_]+\.py)\b")
+    expected = re.compile(r"(?<![\w/.*-])((?:[a-z_]+/)*[a-z_]+\.py)\b")
     files = {f"/{path.relative_to(ROOT)}" for path in (*sources(), *(ROOT / "tests").rglob("*.py"))}
     missing = {}
     for path in sources():
         if path.relative_to(PACKAGE).parts[0] not in ("cameras", "tracer"):
-            found = set(theirs.findall(path.read_text(encoding="utf-8")))
-            if gone := {name for name in found if not any(file.endswith(f"/{name}") for file in files)}:
+            result = set(expected.findall(path.read_text(encoding="utf-8")))
+            if gone := {name for name in result if not any(file.endswith(f"/{name}") for file in files)}:
                 missing[str(path.relative_to(PACKAGE))] = gone
     assert not missing, missing
 
@@ -474,13 +493,13 @@ def races() -> dict[tuple[str, str, str], float]:
 def untrue_of_races(page: str) -> list[str]:
     """The cells of a page's table of races that say otherwise than measured: race, error, picture, wanted, job, wanted."""
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in page.splitlines() if line.count("|") == 7]
-    told = {
+    entries = {
         (race.replace(" ", "-"), error, figure): cell
         for race, error, picture, of_picture, job, of_job in rows[2:]
         for figure, cell in (("picture", (picture, of_picture)), ("job", (job, of_job)))
     }
-    untrue = [f"{key} is not told" for key in races() if key not in told]
-    for key, (cell, wanted) in told.items():
+    untrue = [f"{key} is not told" for key in races() if key not in entries]
+    for key, (cell, wanted) in entries.items():
         ratio = races().get(key)
         figure = "–" if ratio is None else f"{ratio:.3g}" if ratio >= float(wanted) else f"**{ratio:.3g}**"
         untrue += [] if cell == figure else [f"{key} is {figure}, not {cell}"]
@@ -502,15 +521,16 @@ def test_a_figure_that_was_not_measured_is_seen_in_the_table_of_races():
 
 def test_how_to_add_something_is_told_in_fewer_than_ten_lines():
     page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("## How to add")[2]
-    told = [each for each in page.split("\n\n") if each.strip().startswith("**")]
-    assert len(told) >= 7 and max(each.count("\n") + 1 for each in told) < 10
+    entries = [each for each in page.split("\n\n") if each.strip().startswith("**")]
+    assert len(entries) >= 7 and max(each.count("\n") + 1 for each in entries) < 10
     assert {"format", "lamp", "pass", "command", "tolerance", "version"} <= set(re.findall(r"[a-z]+", page))
-    touched = {each.split(".**")[0].strip("* "): len(paths_named_in(each)) for each in told}
+    touched = {each.split(".**")[0].strip("* "): len(paths_named_in(each)) for each in entries}
     most = {
         "A camera format": 2,
-        "A command": 2,
-        "A pass": 3,
-        "A pass of light": 3,
+        "A command": 1,
+        "A pass": 2,
+        "A pass of light": 2,
+        "A node that makes values": 2,
         "A material": 4,
         "A tolerance of geometry": 2,
         "A tolerance of light": 2,

@@ -59,12 +59,15 @@ def asked(monkeypatch):
 
 
 def test_a_failure_is_the_verdict_and_where_the_report_is_and_no_traceback(run, asked, pytester):
-    found = run("def test_it(viewcam_check): viewcam_check('blue.blend')", "--viewcam-report", "out")
-    found.assert_outcomes(failed=1)
-    told = found.stdout.str()
+    outcome = run("def test_it(viewcam_check): viewcam_check('blue.blend')", "--viewcam-report", "out")
+    outcome.assert_outcomes(failed=1)
+    output = outcome.stdout.str()
     report = pytester.path / "out" / "test_shots.py-test_it"
     assert (
-        VERDICT in told and f"report: {report / 'index.html'}" in told and "Traceback" not in told and "def test_it" not in told
+        VERDICT in output
+        and f"report: {report / 'index.html'}" in output
+        and "Traceback" not in output
+        and "def test_it" not in output
     )
     assert asked == [("check", [str(pytester.path / "blue.blend")], {"report": report})]
 
@@ -88,15 +91,15 @@ def test_options_are_those_of_the_command_and_marks_give_them_for_all(run, asked
 
 
 def test_tests_that_judge_pictures_can_be_left_out(run, asked):
-    found = run("def test_a(viewcam_check): viewcam_check('a.blend')\ndef test_b(): pass", "-m", "not viewcam")
-    found.assert_outcomes(passed=1, deselected=1)
+    outcome = run("def test_a(viewcam_check): viewcam_check('a.blend')\ndef test_b(): pass", "-m", "not viewcam")
+    outcome.assert_outcomes(passed=1, deselected=1)
     assert not asked
 
 
 def test_bad_input_is_its_sentence(run, asked):
-    found = run("def test_it(viewcam_check): viewcam_check('none.blend')")
-    found.assert_outcomes(failed=1)
-    assert "none.blend is not there: give another" in found.stdout.str() and "Traceback" not in found.stdout.str()
+    outcome = run("def test_it(viewcam_check): viewcam_check('none.blend')")
+    outcome.assert_outcomes(failed=1)
+    assert "none.blend is not there: give another" in outcome.stdout.str() and "Traceback" not in outcome.stdout.str()
 
 
 def test_figures_are_properties_of_the_test_in_the_form_that_junit_has(run, asked, pytester, tmp_path):
@@ -107,15 +110,17 @@ def test_figures_are_properties_of_the_test_in_the_form_that_junit_has(run, aske
     """
     run(text, "--junit-xml=a.xml").assert_outcomes(failed=1)
     root = ElementTree.parse(pytester.path / "a.xml").getroot()
-    told = {each.get("name"): each.get("value") for each in root.iter("property")}
+    properties = {each.get("name"): each.get("value") for each in root.iter("property")}
     assert (
-        told["viewcam.passed"] == "true" and told["viewcam-2.passed"] == "false" and told["viewcam-2.passes.Depth.max"] == "0.5"
+        properties["viewcam.passed"] == "true"
+        and properties["viewcam-2.passed"] == "false"
+        and properties["viewcam-2.passes.Depth.max"] == "0.5"
     )
     # What --junit writes has the same elements, and no attribute that pytest's has not.
     junit.write(tmp_path / "b.xml", "check", 1, {"sentence": VERDICT}, 1.0)
-    theirs = {each.tag: set(each.attrib) for each in root.iter()}
+    expected = {each.tag: set(each.attrib) for each in root.iter()}
     for each in ElementTree.parse(tmp_path / "b.xml").getroot().iter():
-        assert set(each.attrib) <= theirs[each.tag], each.tag
+        assert set(each.attrib) <= expected[each.tag], each.tag
     (failure,) = root.iter("failure")
     assert VERDICT in failure.get("message")
 
@@ -133,9 +138,9 @@ def test_pictures_are_judged_for_real(run, pytester):
         (pytester.path / f"{name}.json").write_text(json.dumps(scene | {"camera": camera | {"distance": distance}}))
         assert main(["render", str(pytester.path / f"{name}.json"), str(pytester.path / f"{name}.exr")]) == 0
     text = "def test_it(same_picture): assert same_picture('a.exr', 'a.exr').passed; same_picture('a.exr', 'b.exr')"
-    found = run(text, "--viewcam-report=out")
-    found.assert_outcomes(failed=1)
-    assert "Not the same picture: positions are" in found.stdout.str()
+    outcome = run(text, "--viewcam-report=out")
+    outcome.assert_outcomes(failed=1)
+    assert "Not the same picture: positions are" in outcome.stdout.str()
     assert (pytester.path / "out" / "test_shots.py-test_it-2" / "index.html").is_file()
 
 
@@ -159,20 +164,22 @@ def test_the_action_of_the_page_checks_every_file_and_fails_if_one_does(tmp_path
     assert action["runs"]["using"] == "composite" and set(action["inputs"]) == {"files", "options"}
     install, check, upload = action["runs"]["steps"]
     assert install["shell"] == check["shell"] == "bash" and upload["if"] == "always()"
-    said, stub = tmp_path / "said", tmp_path / "viewcam"
-    stub.write_text(f'#!/bin/sh\necho "$@" >> "{said}"\ncase $2 in *bad*) exit 1 ;; esac\n')
+    log, stub = tmp_path / "said", tmp_path / "viewcam"
+    stub.write_text(f'#!/bin/sh\necho "$@" >> "{log}"\ncase $2 in *bad*) exit 1 ;; esac\n')
     stub.chmod(0o755)
     assert set(check["env"].values()) == {"${{ inputs.files }}", "${{ inputs.options }}"}
     for files, status in (("a.blend bad.blend c.blend", 1), ("a.blend", 0)):
-        given = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}", "FILES": files, "OPTIONS": "--size 8x8"}
+        environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}", "FILES": files, "OPTIONS": "--size 8x8"}
         # GitHub runs bash with these words.
-        done = subprocess.run(["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", check["run"]], env=given, cwd=tmp_path)
+        done = subprocess.run(
+            ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", check["run"]], env=environment, cwd=tmp_path
+        )
         assert done.returncode == status
     to = "viewcam-report/{0}"
     expected = [
         f"check {n}.blend --size 8x8 --report {to.format(n)} --junit {to.format(n)}.xml" for n in ("a", "bad", "c", "a")
     ]
-    assert said.read_text().splitlines() == expected
+    assert log.read_text().splitlines() == expected
 
 
 # Three files of a user, a ball on a floor under a sun each, and what breaks them. Where the add-on is enabled the four values
@@ -233,8 +240,8 @@ def test_from_a_wheel_in_an_environment_of_its_own_three_broken_files_fail_with_
         command = [str(word) for word in (tmp_path / "fresh" / "bin" / "python", *words)]
         return subprocess.run(command, cwd=folder, env=clean, capture_output=True, text=True)
 
-    made = run("-c", MAKE)
-    assert made.returncode == 0, made.stderr
+    process = run("-c", MAKE)
+    assert process.returncode == 0, process.stderr
     for name in ("table", "lamp"):
         done = run("-m", "viewcam_addon", "export", f"{name}.blend", f"{name}.json", "--level", "direct")
         assert done.returncode == 0, done.stderr

@@ -60,11 +60,11 @@ def patterns_in(source):
 
 @cache
 def patterns():
-    found = {}
+    result = {}
     for path in sorted(ROOT.rglob("*.py")):
         for line, pattern, is_put in patterns_in(path.read_text("utf-8")):
-            found[f"{path.relative_to(ROOT)}:{line}"] = (pattern, is_put)
-    return found
+            result[f"{path.relative_to(ROOT)}:{line}"] = (pattern, is_put)
+    return result
 
 
 def nodes(parsed):
@@ -90,15 +90,15 @@ def test_all_expressions_are_read():
 
 def test_no_expression_has_possessive_quantifiers_or_atomic_groups():
     """CPython 3.11.0 to 3.11.4 match them wrongly where what repeats backtracks (its issue 106052)."""
-    found = {place: (pattern, refused_in(pattern)) for place, (pattern, _) in patterns().items() if refused_in(pattern)}
-    assert not found, "\n".join(f"{place}: {names} in {pattern!r}" for place, (pattern, names) in found.items())
+    result = {place: (pattern, refused_in(pattern)) for place, (pattern, _) in patterns().items() if refused_in(pattern)}
+    assert not result, "\n".join(f"{place}: {names} in {pattern!r}" for place, (pattern, names) in result.items())
 
 
 @pytest.mark.parametrize("pattern", [r"a++", r"(?:ab?c)*+d", r"x(?=[^y]?+)", r"(?>a)b", r"(a|(?:b{1,3}+))", r"(?<!a|(?>b))c"])
 def test_what_is_refused_is_found_wherever_it_stands(pattern):
     assert refused_in(pattern)
-    (found,) = patterns_in(f"import re\n_A = {pattern!r}\n_B = re.compile(rf'{{_A}}|b')")
-    assert refused_in(found[1])
+    (result,) = patterns_in(f"import re\n_A = {pattern!r}\n_B = re.compile(rf'{{_A}}|b')")
+    assert refused_in(result[1])
 
 
 # ---- time
@@ -116,8 +116,8 @@ def sample(parsed):
         if name == "LITERAL":
             result += chr(arguments)
         elif name in ("NOT_LITERAL", "ANY", "IN"):
-            one = alone(parsed, operator, arguments)
-            result += next(letter for letter in " a0.(," + "".join(map(chr, range(256))) if one.match(letter))
+            sampled = alone(parsed, operator, arguments)
+            result += next(letter for letter in " a0.(," + "".join(map(chr, range(256))) if sampled.match(letter))
         elif name == "BRANCH":
             result += sample(arguments[1][0])
         elif name == "SUBPATTERN":
@@ -161,8 +161,8 @@ def slowest(pattern, is_put):
 
 
 def test_no_expression_takes_time_by_the_square_of_a_text():
-    found = {place: slowest(pattern, is_put) for place, (pattern, is_put) in patterns().items()}
-    slow = {place: each for place, each in found.items() if each[0] > SECONDS}
+    result = {place: slowest(pattern, is_put) for place, (pattern, is_put) in patterns().items()}
+    slow = {place: each for place, each in result.items() if each[0] > SECONDS}
     assert not slow, "\n".join(f"{place}: {seconds:.2g} s of {text!r}…" for place, (seconds, text) in slow.items())
 
 

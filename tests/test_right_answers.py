@@ -68,8 +68,8 @@ def is_near(have, true, error):
 def test_rays_and_the_view_plane_are_right_for_every_distance_and_column(camera, column, row):
     with mpmath.workprec(300):
         x, y = (
-            (mpmath.mpf(place) - centre) / distance
-            for place, centre, distance in zip((column, row), camera.principal_point, camera.distance, strict=True)
+            (mpmath.mpf(place) - center) / distance
+            for place, center, distance in zip((column, row), camera.principal_point, camera.distance, strict=True)
         )
         assert is_near(camera.view_plane(column, row)[0], x, 2 * ROUNDING * abs(x))
         assert is_near(camera.view_plane([column], [row])[1][0], y, 2 * ROUNDING * abs(y))
@@ -103,10 +103,10 @@ def test_a_point_of_any_size_appears_where_exact_arithmetic_puts_it(camera, poin
         if not depth > 0 or z <= 4 * rounded or z < 2 * 5e-324:
             return  # too near the plane of the eye for figures
         x, y = dot(relative, u) * (-1 if camera.mirrored else 1), dot(relative, v)
-        for have, across, centre, distance in zip((column, row), (x, y), camera.principal_point, camera.distance, strict=True):
+        for have, across, center, distance in zip((column, row), (x, y), camera.principal_point, camera.distance, strict=True):
             moved = distance * across / z
-            error = distance * rounded / z * (1 + abs(across) / z) * 2 + 6 * ROUNDING * (abs(moved) + abs(centre))
-            assert is_near(have, centre + moved, error), f"{have} for {centre + moved}"
+            error = distance * rounded / z * (1 + abs(across) / z) * 2 + 6 * ROUNDING * (abs(moved) + abs(center))
+            assert is_near(have, center + moved, error), f"{have} for {center + moved}"
 
 
 @given(cameras)

@@ -120,10 +120,10 @@ def test_what_it_prints_stands_in_its_log(tmp_path):
 
 @pytest.mark.parametrize("answering", [0, 60])
 def test_a_process_ends_with_whoever_asked_even_in_the_midst_of_an_answer(tmp_path, answering):
-    said = tmp_path / "said.txt"
-    asker = child_process.ProcessGroup([sys.executable, "-c", ASKER, ECHO, str(answering)], said, child_process.environment())
-    assert _until(lambda: said.read_text().strip().isdecimal()), said.read_text()
-    process = psutil.Process(int(said.read_text()))
+    log = tmp_path / "said.txt"
+    asker = child_process.ProcessGroup([sys.executable, "-c", ASKER, ECHO, str(answering)], log, child_process.environment())
+    assert _until(lambda: log.read_text().strip().isdecimal()), log.read_text()
+    process = psutil.Process(int(log.read_text()))
     psutil.Process(asker._first.pid).kill()
     asker.wait()
     gone = _until(lambda: not process.is_running() or process.status() == psutil.STATUS_ZOMBIE)
@@ -144,6 +144,6 @@ def test_a_process_that_listens_is_there(echo):
 
 def _until(is_so):
     ends = time.monotonic() + ENDS_WITHIN
-    while not (found := is_so()) and time.monotonic() < ends:
+    while not (outcome := is_so()) and time.monotonic() < ends:
         time.sleep(0.02)
-    return found
+    return outcome

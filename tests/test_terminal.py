@@ -22,19 +22,19 @@ HOSTILE = f"Wall\n{FORGED}\r\x1b[2K\x1b[1A\x9b31m\u2028{FORGED}\u202eklaw\u2066\
 """A name that ends its line, clears it, goes up, turns red, and turns the direction of the text."""
 
 
-def assert_shows_itself(said):
+def assert_shows_itself(text):
     """Nothing but characters that show themselves, and no line that a name has written."""
-    for line in said.splitlines():
+    for line in text.splitlines():
         assert all(character.isprintable() for character in line), f"{line!r} does not show itself"
         assert not line.startswith(FORGED), f"a name has written the line {line!r}"
 
 
 @given(st.text() | st.text(st.characters(categories=["C", "Z"])))
 def test_what_is_plain_is_one_line_that_shows_itself_and_is_plain_already(text):
-    shown = plain(text)
-    assert len(shown.splitlines()) <= 1 and plain(shown) == shown
-    assert all(unicodedata.category(character)[0] != "C" for character in shown)
-    shown.encode("utf-8")  # a lone surrogate could not be printed
+    escaped = plain(text)
+    assert len(escaped.splitlines()) <= 1 and plain(escaped) == escaped
+    assert all(unicodedata.category(character)[0] != "C" for character in escaped)
+    escaped.encode("utf-8")  # a lone surrogate could not be printed
 
 
 @given(st.text(st.characters(categories=["L", "M", "N", "P", "S", "Zs"])))
@@ -43,7 +43,7 @@ def test_what_people_write_stays_as_it_is(text):
 
 
 @pytest.mark.parametrize(
-    ("text", "shown"),
+    ("text", "escaped"),
     [
         ("a\nb", r"a\nb"),
         ("\x1b[2K", r"\x1b[2K"),
@@ -54,8 +54,8 @@ def test_what_people_write_stays_as_it_is(text):
         ("left\N{NO-BREAK SPACE}eye: 64 × 48, 10⁻⁶, 左, é", "left\N{NO-BREAK SPACE}eye: 64 × 48, 10⁻⁶, 左, é"),
     ],
 )
-def test_an_escape_says_which_character_it_was(text, shown):
-    assert plain(text) == shown
+def test_an_escape_says_which_character_it_was(text, escaped):
+    assert plain(text) == escaped
 
 
 def test_everything_is_printed_by_the_one_that_makes_it_plain():
@@ -67,9 +67,9 @@ def test_everything_is_printed_by_the_one_that_makes_it_plain():
         "files.py": {"stdout", "stderr"},  # flushed
         "__main__.py": {"stdout", "stderr"},  # flushed
         "child_process.py": {"stdout", "stderr"},  # flushed; those of child processes
-        "commands/options.py": {"stdout"},  # flushed
+        "commands/_options.py": {"stdout"},  # flushed
     }
-    found = {}
+    result = {}
     for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             name = None
@@ -78,8 +78,8 @@ def test_everything_is_printed_by_the_one_that_makes_it_plain():
             elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "sys":
                 name = node.attr
             if name in ("print", "stdout", "stderr"):
-                found.setdefault(path.relative_to(PACKAGE).as_posix(), set()).add(name)
-    extra = {path: names - allowed.get(path, set()) for path, names in found.items()}
+                result.setdefault(path.relative_to(PACKAGE).as_posix(), set()).add(name)
+    extra = {path: names - allowed.get(path, set()) for path, names in result.items()}
     assert not {path: names for path, names in extra.items() if names}, "print with terminal.say"
 
 
@@ -105,9 +105,9 @@ def test_a_comparison_prints_the_names_of_a_scene_plain(scene, tmp_path, capfd):
     assert main(["render", str(scene), str(picture), "--level", "path", "--samples", "1"]) == 0
     assert main(["render", str(scene), str(picture)]) == 0
     assert main(["compare", str(picture), str(picture), "--scene", str(scene), "--report", str(tmp_path / "report")]) == 0
-    said = capfd.readouterr()
-    assert_shows_itself(said.out + said.err)
-    assert rf"skipped: Wall\n{FORGED}\r\x1b[2K" in said.out, "the test's name never reached the terminal"
+    output = capfd.readouterr()
+    assert_shows_itself(output.out + output.err)
+    assert rf"skipped: Wall\n{FORGED}\r\x1b[2K" in output.out, "the test's name never reached the terminal"
 
 
 @pytest.mark.parametrize("change", ["key", "name", "geometry", "path", "word", "suffix", "camera"])
@@ -130,9 +130,9 @@ def test_an_error_shows_what_it_names_plain(scene, tmp_path, capfd, change):
     scene.write_text(json.dumps(document))
     for more in ([], ["--log-json"]):
         assert main([*words, *more]) == 2
-        said = capfd.readouterr()
-        assert said.err and len(said.err.splitlines()) == 1
-        assert_shows_itself(said.out + said.err)
+        output = capfd.readouterr()
+        assert output.err and len(output.err.splitlines()) == 1
+        assert_shows_itself(output.out + output.err)
 
 
 def test_a_list_of_problems_is_as_many_lines_as_problems(tmp_path, capfd):
@@ -146,9 +146,9 @@ def test_a_list_of_problems_is_as_many_lines_as_problems(tmp_path, capfd):
     path.write_text(json.dumps(rows))
     blend = PACKAGE.parent / "sample_scenes" / "cornell.blend"
     assert main(["batch", str(blend), str(path), "--out", str(tmp_path / "out"), "--json", str(tmp_path / "out.json")]) == 2
-    said = capfd.readouterr().err
-    assert_shows_itself(said)
-    assert len(said.splitlines()) == 1 + len(json.loads((tmp_path / "out.json").read_text())["problems"])
+    output = capfd.readouterr().err
+    assert_shows_itself(output)
+    assert len(output.splitlines()) == 1 + len(json.loads((tmp_path / "out.json").read_text())["problems"])
 
 
 @pytest.mark.exhaustive
@@ -205,6 +205,6 @@ def test_what_a_camera_can_not_be_at_a_frame_is_printed_plain(fresh_blender, cap
     camera.virtual_pinhole.keyframe_insert("eye", frame=10)
     capfd.readouterr()
     bpy.context.scene.frame_set(10)
-    said = capfd.readouterr().err
-    assert "viewcam: frame 10" in said
-    assert_shows_itself(said)
+    output = capfd.readouterr().err
+    assert "viewcam: frame 10" in output
+    assert_shows_itself(output)

@@ -24,10 +24,11 @@ def main_and_exit() -> NoReturn:
     if answer is signal.default_int_handler:  # a shell lets those that it starts in the background ignore it
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     number = survived(sys.argv[1:])
-    from .cli import COMMANDS, main
+    from . import commands
+    from .cli import main
     from .terminal import open_streams, share_one_heap
 
-    if (command := next(iter(sys.argv[1:]), "")) in COMMANDS:
+    if (command := next(iter(sys.argv[1:]), "")) in commands.names():
         importlib.import_module(f".commands.{command}", __package__)
     signal.signal(signal.SIGINT, answer)
     open_streams()

@@ -160,13 +160,13 @@ def compare(
     if camera is None:
         raise InputError(f"{of.source} does not tell its camera: give its scene with --scene, or trace it with viewcam render")
     # The picture may be of another size than the scene says, or of the stated camera.
-    shown = scene and replace(scene, camera=camera)
+    framed = scene and replace(scene, camera=camera)
     stated = scene.stated_camera if scene and camera == scene.camera else None
     if radiance.carries_light(of):
         alarms = false_alarms or FALSE_ALARMS
-        if shown is None:
+        if framed is None:
             return radiance.compare(of, pictures, camera, test_samples, false_alarms=alarms)
-        makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(shown, threads))
+        makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(framed, threads))
         level, samples, seed = of.attributes.get("level", "path"), samples_of(of) or 0, seed_of(of)
 
         def coincident() -> CoincidentLight:
@@ -183,29 +183,29 @@ def compare(
         lit = radiance.compare(of, pictures, camera, test_samples, coincident, trace_anew, alarms)
         lit = replace(lit, stated=stated)
         _check_not_empty(lit, may_be_empty)
-        names = tuple(dict.fromkeys((*shown.not_modelled, *lit.taken_out.names)))
+        names = tuple(dict.fromkeys((*framed.not_modelled, *lit.taken_out.names)))
         if not names:
             return lit
-        surfaces = makes_tracer().pixels_of(shown.not_modelled)
+        surfaces = makes_tracer().pixels_of(framed.not_modelled)
         surfaces |= {name: surfaces.get(name, False) | lit.taken_out.pixels for name in lit.taken_out.names}
         parts = not_modelled(names, surfaces, of, pictures, whole, camera)
         one_place, otherwise = (
-            [name for name in some if name not in shown.not_modelled]
-            for some in (lit.taken_out.in_one_place, lit.taken_out.seen_otherwise)
+            [name for name in group if name not in framed.not_modelled]
+            for group in (lit.taken_out.in_one_place, lit.taken_out.seen_otherwise)
         )
         return replace(lit, not_modelled=parts.sorted_by(one_place, otherwise))
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
     by = renderer or renderers.CYCLES
-    if shown is None:
-        found = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
+    if framed is None:
+        comparison = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
     else:
-        tracer = (keeper or tracing.Keeper()).tracer(shown, threads)
-        found = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, shown.origin, by, partial)
-        names = shown.not_modelled
-        found = replace(found, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
-    _check_not_empty(found, may_be_empty)
-    return found
+        tracer = (keeper or tracing.Keeper()).tracer(framed, threads)
+        comparison = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, framed.origin, by, partial)
+        names = framed.not_modelled
+        comparison = replace(comparison, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
+    _check_not_empty(comparison, may_be_empty)
+    return comparison
 
 
 def _check_not_empty(comparison: "GeometryComparison | RadianceComparison", may_be_empty: bool) -> None:

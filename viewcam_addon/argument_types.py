@@ -75,11 +75,11 @@ def channels(text: str) -> tuple[str, list[str]]:
     if not stated or name.lower() not in _OF_GEOMETRY:
         known = ", ".join(_OF_GEOMETRY)
         raise argparse.ArgumentTypeError(f"{text!r} names no pass: write position=P.X,P.Y,P.Z, or one of {known}")
-    found, count = names(listed), _OF_GEOMETRY[name.lower()]
-    if len(found) != count:
+    chosen, count = names(listed), _OF_GEOMETRY[name.lower()]
+    if len(chosen) != count:
         has = "1 channel" if count == 1 else f"{count} channels"
-        raise argparse.ArgumentTypeError(f"{text!r} has {len(found)}: {name.lower()} has {has}, with commas between them")
-    return ("UV" if name.lower() == "uv" else name.replace("-", " ").title()), list(found)
+        raise argparse.ArgumentTypeError(f"{text!r} has {len(chosen)}: {name.lower()} has {has}, with commas between them")
+    return ("UV" if name.lower() == "uv" else name.replace("-", " ").title()), list(chosen)
 
 
 def png(text: str) -> Path:

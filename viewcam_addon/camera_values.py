@@ -81,8 +81,8 @@ class CameraValues:
             if the values make no camera: eye = look-at, up = 0, distance ≤ 0, zoom ≤ 0, a number that is not finite.
         """
         distance = self.distances(frame, sensor_fit)
-        size, centre = (plane.width, plane.height), plane.principal_point
-        return Pinhole(self.eye, self.look_at, self.up, distance, *size, centre, mirrored)
+        size, center = (plane.width, plane.height), plane.principal_point
+        return Pinhole(self.eye, self.look_at, self.up, distance, *size, center, mirrored)
 
     def distances(self, frame: Frame, sensor_fit: str) -> tuple[float, float]:
         """(d_x, d_y) in pixels of the picture of `frame`, its percentage included."""
@@ -125,8 +125,10 @@ class CameraValues:
         """
         distance /= self.growth(frame, sensor_fit)
         zoom = self.zoom if _can_divide(self.zoom, distance) else 1.0
-        said = replace(self, eye=eye, look_at=look_at, up=up, distance=distance / zoom, zoom=zoom, enabled=True, held_roll=0.0)
-        return said.as_set()
+        values = replace(
+            self, eye=eye, look_at=look_at, up=up, distance=distance / zoom, zoom=zoom, enabled=True, held_roll=0.0
+        )
+        return values.as_set()
 
     def as_set(self) -> "CameraValues":
         """The values from which the next edit sets out, once the camera is where they say."""
@@ -153,26 +155,26 @@ class CameraValues:
         return replace(self, up=rolls.rolled(rolls.turned(self.view(), held), up_axis, angle).up)
 
     def moved_to(
-        self, found: Pinhole, moved: Collection[str], bound: Collection[tuple[str, int]], up_axis: Triple, rounding: float
+        self, pinhole: Pinhole, moved: Collection[str], bound: Collection[tuple[str, int]], up_axis: Triple, rounding: float
     ) -> "CameraValues":
         """The view of a camera that was moved, with the look-at point as far away as it was.
 
-        found : the camera as it stands. moved : which of "eye" and "view" have changed by more than a rounding; what has not
+        pinhole : the camera as it stands. moved : which of "eye" and "view" have changed by more than a rounding; what has not
         keeps its digits. bound : (name, index) of the numbers that something else decides; they stay. up_axis : the up to
         choose where that of the values does not give the picture, up to `rounding`, but it does; else up becomes v.
         """
-        said = self.with_unbound(replace(self, eye=found.eye), bound) if "eye" in moved else self
+        values = self.with_unbound(replace(self, eye=pinhole.eye), bound) if "eye" in moved else self
         if "view" in moved:
-            _, v, w = found.basis()
-            look_at = said.eye - math.dist(self.eye, self.look_at) * w
+            _, v, w = pinhole.basis()
+            look_at = values.eye - math.dist(self.eye, self.look_at) * w
             up = self.up
             if self.pole != HOLD:
-                choices = (up for up in (self.up, up_axis) if np.abs(replace(found, up=up).basis()[1] - v).max() <= rounding)
+                choices = (up for up in (self.up, up_axis) if np.abs(replace(pinhole, up=up).basis()[1] - v).max() <= rounding)
                 up = next(choices, tuple(v.tolist()))
-            said = replace(said, look_at=tuple(look_at.tolist()), up=up)
-        elif said.eye != self.eye:
-            said = replace(said, look_at=tuple((self.look_at + np.subtract(said.eye, self.eye)).tolist()))
-        return self.with_unbound(said, bound)
+            values = replace(values, look_at=tuple(look_at.tolist()), up=up)
+        elif values.eye != self.eye:
+            values = replace(values, look_at=tuple((self.look_at + np.subtract(values.eye, self.eye)).tolist()))
+        return self.with_unbound(values, bound)
 
     def with_unbound(self, other: "CameraValues", bound: Collection[tuple[str, int]]) -> "CameraValues":
         """Other values, but their own numbers (name, index) that something else decides."""
@@ -180,11 +182,13 @@ class CameraValues:
             return other
         kept = {}
         for name in {name for name, _ in bound}:
-            mine, others = getattr(self, name), getattr(other, name)
-            if isinstance(mine, tuple):
-                kept[name] = tuple(a if (name, i) in bound else b for i, (a, b) in enumerate(zip(mine, others, strict=True)))
+            own_value, other_value = getattr(self, name), getattr(other, name)
+            if isinstance(own_value, tuple):
+                kept[name] = tuple(
+                    a if (name, i) in bound else b for i, (a, b) in enumerate(zip(own_value, other_value, strict=True))
+                )
             else:
-                kept[name] = mine
+                kept[name] = own_value
         return replace(other, **kept)
 
     def roll_from(self, up: Triple, held: float) -> float:

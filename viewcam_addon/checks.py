@@ -23,7 +23,7 @@ LARGEST_WHOLE = 2**31 - 1
 
 _WITHOUT_ORDER = (bytes, bytearray, memoryview, Set, Mapping)  # or whose items are no numbers of anybody's
 _MOST_DIGITS = 310  # more than the largest float64 has
-_SHOWN = 60  # characters of a refused value: a sentence is one line
+_LONGEST = 60  # characters of a refused value: a sentence is one line
 
 
 def number(name: str, value: object, least: float = -math.inf, most: float = math.inf) -> float:
@@ -31,11 +31,11 @@ def number(name: str, value: object, least: float = -math.inf, most: float = mat
     try:
         result = _real(value)
     except TypeError:
-        raise InputError(f"{name} is {shown(value)}: give a number") from None
+        raise InputError(f"{name} is {quoted(value)}: give a number") from None
     if not math.isfinite(result):
-        raise InputError(f"{name} is {shown(value)}: give a finite number")
+        raise InputError(f"{name} is {quoted(value)}: give a finite number")
     if not least <= result <= most:
-        raise InputError(f"{name} is {shown(value)}: give a number from {least:.6g} to {most:.6g}")
+        raise InputError(f"{name} is {quoted(value)}: give a number from {least:.6g} to {most:.6g}")
     return result
 
 
@@ -49,9 +49,9 @@ def vector(name: str, values: object, count: int) -> tuple[float, ...]:
     except TypeError:
         numbers = ()
     if len(numbers) != count:
-        raise InputError(f"{name} is {shown(values)}: give {count} numbers")
+        raise InputError(f"{name} is {quoted(values)}: give {count} numbers")
     if not all(map(math.isfinite, numbers)):
-        raise InputError(f"{name} is {shown(numbers)}: every number of it must be finite")
+        raise InputError(f"{name} is {quoted(numbers)}: every number of it must be finite")
     return numbers
 
 
@@ -62,7 +62,7 @@ def whole(name: str, value: object) -> int:
     except TypeError:
         result = 0
     if not 1 <= result <= LARGEST_WHOLE:
-        raise InputError(f"{name} is {shown(value)}: give a whole number from 1 to {LARGEST_WHOLE}")
+        raise InputError(f"{name} is {quoted(value)}: give a whole number from 1 to {LARGEST_WHOLE}")
     return result
 
 
@@ -86,7 +86,7 @@ def for_json(value: Any) -> Any:
 def truth(name: str, value: object) -> bool:
     """The value as a bool, which it must be."""
     if not isinstance(value, bool | np.bool_):
-        raise InputError(f"{name} is {shown(value)}: give True or False")
+        raise InputError(f"{name} is {quoted(value)}: give True or False")
     return bool(value)
 
 
@@ -106,7 +106,7 @@ def array(name: str, values: ArrayLike) -> NDArray[np.float64]:
         if values.dtype.kind not in "iuf":
             raise TypeError
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name} is {shown(values)}: give numbers, in lists of equal length") from None
+        raise InputError(f"{name} is {quoted(values)}: give numbers, in lists of equal length") from None
     with np.errstate(over="ignore"):  # of longer floats
         return np.asarray(values, dtype=np.float64)
 
@@ -129,13 +129,13 @@ def broadcast(**arrays: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
         raise InputError(f"the shapes do not fit together ({shapes}): give equal ones, or single numbers") from None
 
 
-def shown(value: object) -> str:
+def quoted(value: object) -> str:
     """The value in a sentence: one line, and not too long a one."""
     try:
         text = " ".join(repr(value).split())
     except ValueError:  # Python prints no int of more than 4300 digits
         return "a number of thousands of digits"
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
 
 
 def _real(value: object) -> float:

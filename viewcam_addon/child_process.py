@@ -84,8 +84,8 @@ def blender_scripts() -> str:
 
     Where bpy is loaded, here or in our parent, the path leads first to Blender's scripts, whose bpy is half of it.
     """
-    loaded, found = sys.modules.get("bpy"), importlib.util.find_spec("bpy")
-    place = Path(getattr(loaded, "__file__", None) or (found and found.origin) or "")
+    loaded, spec = sys.modules.get("bpy"), importlib.util.find_spec("bpy")
+    place = Path(getattr(loaded, "__file__", None) or (spec and spec.origin) or "")
     return str(place.parents[2]) if place.name == "__init__.py" else ""
 
 
@@ -197,14 +197,14 @@ class ServerProcess:
         events: Events | None = None,
     ) -> None:
         self._name, self._timeout, self._events = name, START_TIMEOUT, events
-        self._ours, theirs = connection.Pipe()
+        self._ours, child_end = connection.Pipe()
         try:
-            self._process = ProcessGroup([*command, str(theirs.fileno())], log, variables, theirs.fileno())
+            self._process = ProcessGroup([*command, str(child_end.fileno())], log, variables, child_end.fileno())
         except OSError as error:
             self._ours.close()
             raise InputError(f"{name} can't be started ({error.strerror or error}): check {command[0]}") from error
         finally:
-            theirs.close()
+            child_end.close()
 
     def is_there(self) -> bool:
         """True if the process still listens, as far as can be known without asking it."""

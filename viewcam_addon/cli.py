@@ -3,7 +3,7 @@
 Exit status: 0 all well; 1 the comparison failed; 2 bad input or usage, with one line on stderr; 3 something could not be
 modeled under --strict. No traceback reaches a user.
 
-Here are the names of the commands; their options, and what they do, are in commands/.
+The commands, their options, and what they do, are in commands/.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import argument_types as types
-from . import events
+from . import commands, events
 from .commands import Result
 from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False, en
             options.events.tell("started", command=options.command, words=options.words)
             status, result = _outcome(options)
         else:
-            status, result = _told(options, InputError.exit_status, _crash(options, ended_by))
+            status, result = _failure(options, InputError.exit_status, _crash(options, ended_by))
         seconds = round(time.monotonic() - started, 3)
         if result:
             status = _write_result(options, status, {"exit_status": status, **result}, seconds) or status
@@ -99,19 +99,7 @@ class _CommandParser(_OneLineParser):
         return self.parse_known_intermixed_args(*arguments)
 
 
-COMMANDS = {
-    "export": "Write the scene of a .blend as the tracer reads it.",
-    "render": "Trace a scene file into an EXR.",
-    "cycles": "Render a .blend with Cycles so that it can be compared, and give every setting back.",
-    "compare": "Compare EXRs of one camera against derived tolerances and noise.",
-    "check": "Export, trace, render with Cycles or another engine and compare, all in one go.",
-    "batch": "Render many shots of one file: opened once, each written whole, and continued after whatever ended it.",
-    "audit": "Tell what is wrong with a dataset's cameras, by its points or depth maps.",
-    "labels": "Make a dataset of the labels of a folder's pictures.",
-    "camera": "List the cameras of another program's file, or write them for a third one.",
-    "demo": "Check the studio still that comes with the project, and write the report.",
-}
-"""Each is a module of commands/, which is imported once its command is given."""
+_SERVE = "_serve"
 
 
 def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
@@ -121,17 +109,18 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     def add_words(name: str, added: argparse.ArgumentParser) -> None:
         command = importlib.import_module(f".commands.{name}", __package__)
         added.set_defaults(run=command.run, writes=())
-        if name in COMMANDS:
+        if name != _SERVE:
             added.add_argument("--threads", type=types.positive, metavar="N", help="threads to use (default: all)")
             added.add_argument("--json", metavar="FILE", type=types.path, help="write the result as JSON")
             events_too = "tell on standard output a JSON object for each event"
             added.add_argument("--log-json", action="store_true", help=events_too)
         command.add_options(added, blend_is_open)
 
-    for name, text in COMMANDS.items():
+    for name in commands.names():
+        text = commands.summary(name)
         subparsers.add_parser(name, help=text, description=text).add_words = functools.partial(add_words, name)
     # For our own processes: without a help, the list leaves it out.
-    subparsers.add_parser("serve").add_words = functools.partial(add_words, "serve")
+    subparsers.add_parser("serve").add_words = functools.partial(add_words, _SERVE)
     return parser
 
 
@@ -141,11 +130,11 @@ def _outcome(options: argparse.Namespace) -> Result:
         _check_outputs(options)
         return options.run(options)
     except InputError as error:
-        return _told(options, error.exit_status, str(error), getattr(error, "problems", ()))
+        return _failure(options, error.exit_status, str(error), getattr(error, "problems", ()))
     except KeyboardInterrupt:
         return 130, {"error": "interrupted"}
     except Exception as error:  # in one line, as every other error
-        return _told(options, 2, bug(error))
+        return _failure(options, 2, bug(error))
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
@@ -170,7 +159,7 @@ def _check_output(path: Path, is_text: bool) -> None:
         raise InputError(f"{path} is where viewcam prints: give the name of a file")
 
 
-def _told(options: argparse.Namespace, status: int, sentence: str, problems: Sequence[str] = ()) -> Result:
+def _failure(options: argparse.Namespace, status: int, sentence: str, problems: Sequence[str] = ()) -> Result:
     several = {"problems": list(problems)} if problems else {}
     options.events.tell("error", command=options.command, text=sentence, **several)
     return status, {"error": sentence, **several}
@@ -191,5 +180,5 @@ def _write_result(options: argparse.Namespace, status: int, result: dict[str, An
 
             junit.write(path, options.words, status, result, seconds)
     except InputError as error:
-        return _told(options, error.exit_status, str(error))[0]
+        return _failure(options, error.exit_status, str(error))[0]
     return 0

@@ -9,6 +9,8 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
+_MOST_NAMED = 3  # in a sentence
+
 
 class InputError(ValueError):
     """An error of input that can't be used. The message is one sentence: what is wrong (object, key, value), what to do."""
@@ -31,7 +33,13 @@ def listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def told(error: Exception) -> str:
+def several(names: Sequence[str]) -> str:
+    """Names in a sentence, not too long a one: a, b, c and 2 more."""
+    rest = len(names) - _MOST_NAMED
+    return ", ".join(names[:_MOST_NAMED]) + (f" and {rest:,} more" if rest > 0 else "")
+
+
+def message_of(error: Exception) -> str:
     """The message of any error for a user, in one sentence or, of a list of shots, in a list of them."""
     return str(error) if isinstance(error, InputError) else bug(error)
 

@@ -10,7 +10,7 @@ Every function takes floats or float64 arrays and runs the same formulas on both
 single pose costs no array at all.
 
 Sources: two_sum is Knuth's (TAOCP 2, 4.2.2), two_product Dekker's (Numer. Math. 18, 1971), the array sum is Kahan's
-distillation as analysed by Ogita, Rump and Oishi (SIAM J. Sci. Comput. 26, 2005). math.fma would replace Dekker's
+distillation as analyzed by Ogita, Rump and Oishi (SIAM J. Sci. Comput. 26, 2005). math.fma would replace Dekker's
 splitting, but Python has it from 3.13 only. Rejected: mpmath or Fraction for every pose (a hundred times slower; Python's
 whole numbers serve the rare inputs whose products would leave float64's range), and numpy.longdouble (64 bits of mantissa on
 some machines, 53 on others).

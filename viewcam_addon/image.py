@@ -51,7 +51,7 @@ class _Pass:
 
 # Two are the tracer's own, by which a tolerance can be derived: Magnitude, that float32's relative rounding applies to at a
 # hit, in world units (its largest coordinate, plus the distance times the slenderness of the triangle), and Facing, the cosine
-# between ray and true normal. The core (capi.h) numbers them in this order.
+# between ray and true normal. The core (integrators/geometry.h) numbers them in this order.
 _GEOMETRY = {
     "Depth": _Pass("Z", "use_pass_z"),
     "Position": _Pass("XYZ", "use_pass_position"),
@@ -63,7 +63,7 @@ _GEOMETRY = {
     "Facing": _Pass("X"),
 }
 # Variance is the tracer's own: the estimated variance of Combined's color, which is a mean of samples. Here, too, the order is
-# the core's (capi_light.h).
+# the core's (film/film.h).
 _LIGHT = {
     "Combined": _Pass("RGBA"),
     "Emission": _Pass("RGB", "use_pass_emit", "Emit"),
@@ -159,8 +159,8 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
         if there is no such file, if it is no EXR or a damaged one, if it holds no known pass, or, by its header, a part of a
         picture only, another size than its camera's, or more than there is memory for.
     """
-    found, camera, attributes = _pixels(Path(path))
-    passes = {name: _stacked(channels) for name, channels in _passes(found).items() if only is None or name in only}
+    pixels, camera, attributes = _pixels(Path(path))
+    passes = {name: _stacked(channels) for name, channels in _passes(pixels).items() if only is None or name in only}
     if not passes:
         wanted = ", ".join(only or CHANNELS)
         raise InputError(f"{path} holds none of the passes {wanted}: render a multilayer EXR with them")
@@ -177,15 +177,15 @@ def read_channels(path: str | os.PathLike[str], named: Mapping[str, Sequence[str
     InputError
         as `read` does, and if there is no such channel, or more than one.
     """
-    found, camera, attributes = _pixels(Path(path))
+    pixels, camera, attributes = _pixels(Path(path))
 
     def channel(wanted: str) -> NDArray[Any]:
-        names = [wanted] if wanted in found else [name for name in found if name.endswith(f".{wanted}")]
+        names = [wanted] if wanted in pixels else [name for name in pixels if name.endswith(f".{wanted}")]
         if len(names) == 1:
-            return found[names[0]]
+            return pixels[names[0]]
         if names:
             raise InputError(f"{path} has several channels {wanted!r}: name one of {', '.join(names)}")
-        raise InputError(f"{path} has no channel {wanted!r}: name some of {', '.join(found)}")
+        raise InputError(f"{path} has no channel {wanted!r}: name some of {', '.join(pixels)}")
 
     passes = {name: _stacked([channel(wanted) for wanted in channels]) for name, channels in named.items()}
     return Image(passes, camera, attributes, str(path))
@@ -255,13 +255,13 @@ def check_same_frames(paths: Sequence[str | os.PathLike[str]]) -> None:
     first, *others = (Path(path) for path in paths)
     expected = _frame(_headers(first), first)
     for path in others:
-        found = _frame(_headers(path), path)
+        frame = _frame(_headers(path), path)
         # Blender up to 4.2 writes 1 whatever its pixels are.
-        stated = 1 not in (found.aspect, expected.aspect)
-        if found.size != expected.size or (
-            stated and not math.isclose(found.aspect, expected.aspect, rel_tol=_ASPECT_ROUNDING)
+        stated = 1 not in (frame.aspect, expected.aspect)
+        if frame.size != expected.size or (
+            stated and not math.isclose(frame.aspect, expected.aspect, rel_tol=_ASPECT_ROUNDING)
         ):
-            raise InputError(f"{path} has {found} and {first} has {expected}: compare pictures of the same size")
+            raise InputError(f"{path} has {frame} and {first} has {expected}: compare pictures of the same size")
 
 
 def _headers(path: Path) -> list[dict[str, Any]]:
@@ -348,11 +348,11 @@ def _save(path: str | os.PathLike[str], attributes: Mapping[str, Any], channels:
 
 def _passes(channels: dict[str, NDArray[Any]]) -> dict[str, list[NDArray[Any]]]:
     """The known passes of the first view layer, each as its channels in order."""
-    found: dict[str, dict[str, dict[str, NDArray[Any]]]] = defaultdict(lambda: defaultdict(dict))
+    components: dict[str, dict[str, dict[str, NDArray[Any]]]] = defaultdict(lambda: defaultdict(dict))
     for full_name, pixels in channels.items():
         layer, _, rest = full_name.rpartition(".")[0].rpartition(".")
-        found[layer][OLDER_NAMES.get(rest, rest)][full_name.rpartition(".")[2]] = pixels
-    for passes in found.values():
+        components[layer][OLDER_NAMES.get(rest, rest)][full_name.rpartition(".")[2]] = pixels
+    for passes in components.values():
         complete = {
             name: [passes[name][letter] for letter in letters]
             for name, letters in CHANNELS.items()

@@ -54,7 +54,7 @@ class CameraData:
         for name in ("shift_x", "shift_y"):
             _set(self, name, checks.number(name, getattr(self, name), -_LARGEST, _LARGEST))
         if not isinstance(self.sensor_fit, str) or self.sensor_fit not in FITS:
-            raise InputError(f"sensor_fit is {checks.shown(self.sensor_fit)}: give one of {', '.join(FITS)}")
+            raise InputError(f"sensor_fit is {checks.quoted(self.sensor_fit)}: give one of {', '.join(FITS)}")
 
 
 @dataclass(frozen=True)
@@ -260,8 +260,8 @@ def lens_and_sensor(data: CameraData, own: tuple[float, float]) -> dict[str, flo
     """The values that Blender is to store, by its names: lens and sensor, and beside them the artist's own sensor if it had to
     grow."""
     before = own if data.sensor_width != own[0] else (0.0, 0.0)
-    found = {name: getattr(data, name) for name in ("lens", "sensor_width", "sensor_height")}
-    return found | {"virtual_pinhole_sensor": before}
+    values = {name: getattr(data, name) for name in ("lens", "sensor_width", "sensor_height")}
+    return values | {"virtual_pinhole_sensor": before}
 
 
 def check_storable(camera: str, **numbers: tuple[float, ...]) -> None:

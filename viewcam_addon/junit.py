@@ -100,4 +100,4 @@ def _outcome_of(shot: Mapping[str, Any], strict: bool) -> tuple[str | None, str]
 
 def _text(text: str) -> str:
     """With `#x1B` in place of each character that XML can't hold."""
-    return _NO_CHARACTERS.sub(lambda found: f"#x{ord(found[0]):02X}", text)
+    return _NO_CHARACTERS.sub(lambda match: f"#x{ord(match[0]):02X}", text)

@@ -103,12 +103,12 @@ def framed_by_eye(pinhole: Pinhole, points: ArrayLike, margin: float = 0.0) -> P
         if room > 0:
             nearest = np.maximum(nearest, distance * offset / room)
         elif (offset > 0).any() or (room < 0 and (offset >= 0).any()):
-            raise _off_centre()
+            raise _off_center()
         elif room < 0:
             farthest = np.minimum(farthest, distance * offset / room)
     back = (nearest - depth).max()
     if back > (farthest - depth).min():
-        raise _off_centre()
+        raise _off_center()
     depth = depth + back
     if depth.min() <= 0:
         raise InputError("the nearest of the points lies on the view axis, and no distance is the smallest: frame by d instead")
@@ -141,13 +141,13 @@ def framed_by_distance(pinhole: Pinhole, points: ArrayLike, margin: float = 0.0)
         if room > 0:
             largest = min(largest, room / slope.max())
         elif room == 0 or (slope >= 0).any():
-            raise _off_centre()
+            raise _off_center()
         else:
             least = max(least, room / slope.max())
     if largest == math.inf:
         raise InputError("all of the points lie on the view axis, and any d frames them: give a point beside it too")
     if least > largest:
-        raise _off_centre()
+        raise _off_center()
     return replace(pinhole, distance=tuple(largest * distance for distance in pinhole.distance))
 
 
@@ -169,12 +169,12 @@ def _sides(pinhole: Pinhole, margin: float, across: tuple[Array, Array]) -> list
     margin = checks.number("margin", margin, 0, _LARGEST_MARGIN)
     sides = []
     for axis, size in enumerate((pinhole.width, pinhole.height)):
-        centre, distance = pinhole.principal_point[axis], pinhole.distance[axis]
-        sides += [((1 - margin) * size - centre, distance, across[axis]), (centre - margin * size, distance, -across[axis])]
+        center, distance = pinhole.principal_point[axis], pinhole.distance[axis]
+        sides += [((1 - margin) * size - center, distance, across[axis]), (center - margin * size, distance, -across[axis])]
     return sides
 
 
-def _off_centre() -> InputError:
+def _off_center() -> InputError:
     return InputError("the view axis meets the picture outside the margins, and the points cannot be framed: take shift off")
 
 

@@ -221,13 +221,13 @@ def solve_edges(
     ends : (..., n, 2, 2): edge, end, pixels from the principal point. axes : (n,) which of the world's axes each runs along.
     half : of the picture's larger side, pixels. known_distance : d in pixels where the lens is known.
     """
-    found = np.unique(axes)
+    present = np.unique(axes)
     scaled = np.concatenate([ends / half, np.ones((*ends.shape[:-1], 1))], axis=-1)
     normals = np.cross(scaled[..., 0, :], scaled[..., 1, :])
     normals /= np.linalg.norm(normals[..., :2], axis=-1, keepdims=True)
-    vanishing = np.stack([np.linalg.svd(normals[..., axes == axis, :])[2][..., -1, :] for axis in found], axis=-2)
+    vanishing = np.stack([np.linalg.svd(normals[..., axes == axis, :])[2][..., -1, :] for axis in present], axis=-2)
     above = below = 0.0
-    for i, j in combinations(range(len(found)), 2):
+    for i, j in combinations(range(len(present)), 2):
         across = (vanishing[..., i, :2] * vanishing[..., j, :2]).sum(axis=-1)
         away = vanishing[..., i, 2] * vanishing[..., j, 2]
         above, below = above - across * away, below + away * away
@@ -239,12 +239,12 @@ def solve_edges(
     seen /= np.linalg.norm(seen, axis=-1, keepdims=True)
     # What moves along an axis moves in the picture by V − p W, where (V, W) is its vanishing point.
     along = scaled[..., 1, :2] - scaled[..., 0, :2]
-    for k, axis in enumerate(found):
+    for k, axis in enumerate(present):
         of = axes == axis
         towards = vanishing[..., k, None, :2] - scaled[..., of, 0, :2] * vanishing[..., k, None, 2:]
         seen[..., k, :] *= np.where((along[..., of, :] * towards).sum(axis=(-1, -2)) < 0.0, -1.0, 1.0)[..., None]
-    is_mirrored = np.linalg.det(seen) < 0.0 if len(found) == 3 else np.zeros(distance.shape, bool)
-    rotation = _nearest_rotation(np.einsum("...ki,kj->...ij", seen, np.eye(3)[found]))
+    is_mirrored = np.linalg.det(seen) < 0.0 if len(present) == 3 else np.zeros(distance.shape, bool)
+    rotation = _nearest_rotation(np.einsum("...ki,kj->...ij", seen, np.eye(3)[present]))
     directions = np.eye(3)[axes]
 
     def measured(rotation: Array, _eye: Array, distance: Array) -> tuple[Array, Array]:
@@ -260,14 +260,14 @@ def solve_points(points: Array, pixels: Array, half: float, is_flat: bool, known
 
     is_flat : whether the points lie in a plane, where four are enough. known_distance : see above.
     """
-    centre = points.mean(axis=-2, keepdims=True)
-    scale = np.sqrt(((points - centre) ** 2).sum(axis=-1).mean(axis=-1))[..., None, None]
-    local, scaled = (points - centre) / scale, pixels / half
+    center = points.mean(axis=-2, keepdims=True)
+    scale = np.sqrt(((points - center) ** 2).sum(axis=-1).mean(axis=-1))[..., None, None]
+    local, scaled = (points - center) / scale, pixels / half
     rotation, shift, distance = (_pose_of_a_plane if is_flat else _pose_in_space)(local, scaled)
     if known_distance is not None:  # and farther away by as much as the lens is longer
         shift[..., 2] *= known_distance / half / distance
         distance = np.full_like(distance, known_distance / half)
-    eye = centre[..., 0, :] - scale[..., 0] * np.einsum("...ij,...i->...j", rotation, shift)
+    eye = center[..., 0, :] - scale[..., 0] * np.einsum("...ij,...i->...j", rotation, shift)
 
     start = distance * half if known_distance is None else np.full_like(distance, known_distance)
 

@@ -74,8 +74,8 @@ class ViewPlane:
         pair = self.distance if np.iterable(self.distance) else (self.distance,) * 2
         checked["distance"] = checks.vector("distance", pair, 2)
         check_distance(min(checked["distance"]))
-        centre = (checked["width"] / 2, checked["height"] / 2)
-        point = centre if self.principal_point is None else self.principal_point
+        center = (checked["width"] / 2, checked["height"] / 2)
+        point = center if self.principal_point is None else self.principal_point
         checked["principal_point"] = checks.vector("principal_point", point, 2)
         for name, value in checked.items():
             object.__setattr__(self, name, value)
@@ -155,15 +155,15 @@ class Pinhole:
         InputError
             as the constructor does; it names the first such pose.
         """
-        given = {"eye": eye, "look_at": look_at, "up": up}
-        points = checks.broadcast(**{name: checks.array(name, values) for name, values in given.items()})
+        vectors = {"eye": eye, "look_at": look_at, "up": up}
+        points = checks.broadcast(**{name: checks.array(name, values) for name, values in vectors.items()})
         _check_poses(*points)
-        found = []
+        pinholes = []
         for *pose, plane in zip(*(map(tuple, each.tolist()) for each in points), planes, strict=True):
             pinhole = object.__new__(cls)
             pinhole._set(*pose, plane, False)
-            found.append(pinhole)
-        return found
+            pinholes.append(pinhole)
+        return pinholes
 
     @property
     def plane(self) -> ViewPlane:
@@ -249,8 +249,8 @@ class Pinhole:
         Returns (..., 3) float64 unit vectors, world space, to 1e-15 of the sample point that columns + px and rows + py round
         to.
         """
-        given = {"columns": columns, "rows": rows, "px": px, "py": py}
-        columns, rows, px, py = checks.broadcast(**{name: checks.array(name, values) for name, values in given.items()})
+        coordinates = {"columns": columns, "rows": rows, "px": px, "py": py}
+        columns, rows, px, py = checks.broadcast(**{name: checks.array(name, values) for name, values in coordinates.items()})
         with np.errstate(all="ignore"):
             x, y = self.view_plane(columns + px, rows + py)
             z = np.float64(1.0)
@@ -286,8 +286,8 @@ class Pinhole:
 
     def _towards(self, column: float | Array, row: float | Array) -> list[float | Array]:
         """(x, y, 1) of the ray through a place in the picture, scaled so that the largest is about 1."""
-        one = (0.0 * column + 1.0, 0)
-        return exact.of_one_scale(self._slope(0, column), self._slope(1, row), one)
+        ones = (0.0 * column + 1.0, 0)
+        return exact.of_one_scale(self._slope(0, column), self._slope(1, row), ones)
 
     def project(self, points: ArrayLike) -> tuple[Array, Array, Array]:
         """The pixels where points appear in the picture.
@@ -360,8 +360,8 @@ def basis(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike) -> tuple[Array, Arr
     InputError
         where eye = look_at, up = 0 or something is no finite number; it names the first such pose.
     """
-    given = {"eye": eye, "look_at": look_at, "up": up}
-    e, l, up = checks.broadcast(**{name: checks.array(name, values) for name, values in given.items()})
+    vectors = {"eye": eye, "look_at": look_at, "up": up}
+    e, l, up = checks.broadcast(**{name: checks.array(name, values) for name, values in vectors.items()})
     if e.shape[-1:] != (3,):
         raise InputError(f"eye, look_at and up have the shape {e.shape}: give three numbers for each")
     if e.ndim == 1:
@@ -372,9 +372,9 @@ def basis(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike) -> tuple[Array, Arr
     _check_poses(e, l, up)
     axes, safe = np.empty((3, *e.shape)), np.empty(len(e), bool)
     with np.errstate(all="ignore"):  # what leaves float64's range here is done again, one by one, below
-        for some in (slice(first, first + _AT_ONCE) for first in range(0, len(e), _AT_ONCE)):
-            poses = (tuple(vector[some].T.copy()) for vector in (e, l, up))
-            axes[:, some].swapaxes(1, 2)[:], safe[some] = _basis_of_many(*poses)
+        for batch in (slice(first, first + _AT_ONCE) for first in range(0, len(e), _AT_ONCE)):
+            poses = (tuple(vector[batch].T.copy()) for vector in (e, l, up))
+            axes[:, batch].swapaxes(1, 2)[:], safe[batch] = _basis_of_many(*poses)
     for i in np.flatnonzero(~safe):
         pose = [tuple(vector[i].tolist()) for vector in (e, l, up)]
         axes[:, i] = _axes_of_one(pose[2], *_view_of_one(*pose))

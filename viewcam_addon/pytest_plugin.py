@@ -78,13 +78,13 @@ class _Runner:
     def __init__(self, request: pytest.FixtureRequest) -> None:
         self._request, self._runs = request, 0
 
-    def __call__(self, command: str, paths: list[str | Path], given: dict[str, Option]) -> "Check":
+    def __call__(self, command: str, paths: list[str | Path], stated: dict[str, Option]) -> "Check":
         from .errors import InputError
         from .jobs import check as checks
 
         node, folder, self._runs = self._request.node, self._request.path.parent, self._runs + 1
         options = {name: value for mark in reversed(list(node.iter_markers("viewcam"))) for name, value in mark.kwargs.items()}
-        options = {name: value for name, value in (options | given).items() if value is not None and value is not False}
+        options = {name: value for name, value in (options | stated).items() if value is not None and value is not False}
         for name in _FILES:
             if isinstance(options.get(name), str | Path):
                 options[name] = folder / options[name]
@@ -114,7 +114,7 @@ class _Runner:
         from . import junit
 
         prefix = "viewcam" if self._runs == 1 else f"viewcam-{self._runs}"
-        found = junit.properties(check.figures)
+        properties = junit.properties(check.figures)
         if report:
-            found.append(("report", str(Path(str(report), "index.html"))))
-        self._request.node.user_properties += [(f"{prefix}.{name}", value) for name, value in found]
+            properties.append(("report", str(Path(str(report), "index.html"))))
+        self._request.node.user_properties += [(f"{prefix}.{name}", value) for name, value in properties]

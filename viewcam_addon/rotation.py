@@ -118,8 +118,8 @@ def numbers(rotation: Array, mode: str, before: Sequence[float] | None = None) -
         opposite axis, and whole turns more or less.
     """
     if mode == "QUATERNION":
-        found = quaternion(rotation)
-        return found if before is None or np.dot(found, before) >= 0 else tuple(-number for number in found)
+        quaternion_ = quaternion(rotation)
+        return quaternion_ if before is None or np.dot(quaternion_, before) >= 0 else tuple(-number for number in quaternion_)
     if mode == "AXIS_ANGLE":
         return axis_angle(rotation) if before is None else _continued_axis_angle(*axis_angle(rotation), before=before)
     if before is None:

@@ -101,7 +101,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any] | None:
             Sdf.Layer.CreateAnonymous(".usda").ImportFromString("#usda 1.0\n")  # what OpenUSD loads when it is first used
             return None
         _bound(request["seconds"], request["memory"])
-        return _said(request)
+        return _read(request)
     except InputError:
         raise
     except Exception as error:
@@ -123,7 +123,7 @@ def _bound(seconds: float, memory: int) -> None:
             resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + memory, resource.RLIM_INFINITY))
 
 
-def _said(request: dict[str, Any]) -> dict[str, Any]:
+def _read(request: dict[str, Any]) -> dict[str, Any]:
     from pxr import Sdf, Usd, UsdGeom
 
     layers = _Layers(Sdf)
@@ -250,13 +250,13 @@ def _samples(prim: Any, stage: Any, size: str, usd: Any, usd_geom: Any) -> list[
     result = []
     for moment in times[:_MOST_SAMPLES]:
         code = usd.TimeCode(moment) if is_moving or moment else usd.TimeCode.EarliestTime()
-        said = {name: _plain(getattr(camera, f"Get{name}Attr")().Get(code)) for name in _LENS}
-        said["matrix"] = [number for row in camera.ComputeLocalToWorldTransform(code) for number in row]
-        said["size"] = _plain(prim.GetAttribute(size).Get()) if prim.HasAttribute(size) else None
-        said |= {"time": moment if is_moving else None, "seconds": None}
+        sample = {name: _plain(getattr(camera, f"Get{name}Attr")().Get(code)) for name in _LENS}
+        sample["matrix"] = [number for row in camera.ComputeLocalToWorldTransform(code) for number in row]
+        sample["size"] = _plain(prim.GetAttribute(size).Get()) if prim.HasAttribute(size) else None
+        sample |= {"time": moment if is_moving else None, "seconds": None}
         if is_moving:
-            said["seconds"] = moment / (stage.GetTimeCodesPerSecond() or 24.0)
-        result.append(said)
+            sample["seconds"] = moment / (stage.GetTimeCodesPerSecond() or 24.0)
+        result.append(sample)
     return result
 
 

@@ -65,10 +65,10 @@ def drawn(blocks: Iterable[Judged]) -> tuple[Chart, ...]:
     """A chart for each family and one for all of them."""
     good, bad = zip(*blocks, strict=True)
     clean = _by_judge(itertools.chain(*good))
-    of_faults = (itertools.chain(*said) for said in zip(*filter(None, bad), strict=True))
-    found = dict(zip(FAULTS, map(_by_judge, of_faults), strict=True))
+    of_faults = (itertools.chain(*record) for record in zip(*filter(None, bad), strict=True))
+    actual = dict(zip(FAULTS, map(_by_judge, of_faults), strict=True))
     return tuple(
-        _chart(family, {fault: of for fault, of in found.items() if family in ("all", fault.family)}, clean)
+        _chart(family, {fault: of for fault, of in actual.items() if family in ("all", fault.family)}, clean)
         for family in (*FAMILIES, "all")
     )
 
@@ -83,24 +83,24 @@ def together(scores: np.ndarray, share: float = 0.01) -> float:
     return float(beside[is_high].mean() / (2 * (SIDE - 1)))
 
 
-def _by_judge(said: Iterable[Said]) -> dict[str, np.ndarray]:
-    said = list(said)
-    return {judge: np.array([each[judge] for each in said if judge in each]) for judge in said[0]}
+def _by_judge(judged: Iterable[Said]) -> dict[str, np.ndarray]:
+    judged = list(judged)
+    return {judge: np.array([each[judge] for each in judged if judge in each]) for judge in judged[0]}
 
 
-def _chart(family: str, found: dict[Fault, dict[str, np.ndarray]], clean: dict[str, np.ndarray]) -> Chart:
+def _chart(family: str, errors_by_fault: dict[Fault, dict[str, np.ndarray]], clean: dict[str, np.ndarray]) -> Chart:
     curves, at_own_threshold = [], []
-    for judge, said in clean.items():
-        of_faults = np.concatenate([each[judge] for each in found.values()])
+    for judge, record in clean.items():
+        of_faults = np.concatenate([each[judge] for each in errors_by_fault.values()])
         # So many good pictures are above the threshold, and no more.
-        alarms = [share for share in (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3) if share * len(said) >= 1]
-        limits = [np.sort(said)[::-1][int(share * len(said))] for share in alarms]
+        alarms = [share for share in (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3) if share * len(record) >= 1]
+        limits = [np.sort(record)[::-1][int(share * len(record))] for share in alarms]
         missed = [float(np.mean(of_faults <= limit)) for limit in limits]
         curves.append(Curve(judge, alarms, missed, ours=judge == rivals.OURS))
-        at_own_threshold.append(f"{judge} {np.mean(of_faults > 1):.1%} at {np.mean(said > 1):.2%}")
+        at_own_threshold.append(f"{judge} {np.mean(of_faults > 1):.1%} at {np.mean(record > 1):.2%}")
     share = together(clean[rivals.OURS])
     beside = f" Where a pair is in ours' highest hundredth, so are {share:.1%} of those that share a side."
-    trials, seen = ([len(of[judge]) for of in (*found.values(), clean)] for judge in (rivals.OURS, "FLIP"))
+    trials, seen = ([len(of[judge]) for of in (*errors_by_fault.values(), clean)] for judge in (rivals.OURS, "FLIP"))
     return Chart(
         family,
         {"all": "All faults", "camera": "The camera", "geometry": "What stands in the scene", "light": "Light"}.get(
@@ -109,8 +109,9 @@ def _chart(family: str, found: dict[Fault, dict[str, np.ndarray]], clean: dict[s
         "good pictures that are called bad",
         "faults that are missed",
         tuple(curves),
-        f"Read how much is missed at how few false alarms: {len(found)} faults × {trials[0]} seeds, {trials[-1]} pairs of good "
-        f"pictures; of these the others judged {seen[0]} and {seen[-1]}. Found by each at its own threshold, and false alarms: "
+        f"Read how much is missed at how few false alarms: {len(errors_by_fault)} faults × {trials[0]} seeds, "
+        f"{trials[-1]} pairs of good pictures; of these the others judged {seen[0]} and {seen[-1]}. "
+        f"Found by each at its own threshold, and false alarms: "
         f"{'; '.join(at_own_threshold)}.{beside if family == 'all' else ''}",
         tie=0.05,
         log_y=False,
@@ -145,14 +146,14 @@ class Block:
         self._lit = [self._light(0, bench.tracer, i) for i in range(SIDE)]
 
     def good(self) -> list[Said]:
-        said = []
+        result = []
         for i, j in itertools.product(range(SIDE), repeat=2):
             of_geometry = self._of_geometry(self._surfaces(self._bench.tracer, self._random(0, i, j)))
-            said.append(self._said(of_geometry, self._lit[i], j, by_all=i == j == 0))
-        return said
+            result.append(self._said(of_geometry, self._lit[i], j, by_all=i == j == 0))
+        return result
 
     def faulty(self, fault: Fault) -> list[Said]:
-        number, tracer, said = 1 + FAULTS.index(fault), self._bench.faulty[fault], []
+        number, tracer, judged = 1 + FAULTS.index(fault), self._bench.faulty[fault], []
         for i in range(SIDE):
             test = self._surfaces(tracer, self._random(number, i))
             if fault.of_picture:
@@ -161,26 +162,26 @@ class Block:
                 fault.of_picture(test, self._random(number, i))
             of_geometry = self._of_geometry(test)
             if of_geometry > 1 and i > 0:
-                said.append({rivals.OURS: of_geometry})
+                judged.append({rivals.OURS: of_geometry})
                 continue
             lit = self._light(number, tracer, i) if fault.of_scene else [dict(passes) for passes in self._lit[i]]
             if fault.of_picture:
                 for passes in lit:
                     passes.update(Combined=passes["Combined"].copy())
                     fault.of_picture(passes, self._random(number, i))  # the same place in all of them
-            said.append(self._said(of_geometry, lit, i, by_all=i == 0))
-        return said
+            judged.append(self._said(of_geometry, lit, i, by_all=i == 0))
+        return judged
 
     def _said(self, of_geometry: float, lit: list[Passes], j: int, by_all: bool) -> Said:
         reference = self._references[j]
         pictures = [rivals.without_the_tracers_own(Image(passes, attributes={"samples": str(_SAMPLES)})) for passes in lit]
-        said = {rivals.OURS: max(of_geometry, rivals.of_light(reference, pictures))}
+        values = {rivals.OURS: max(of_geometry, rivals.of_light(reference, pictures))}
         if not by_all:
-            return said
+            return values
         colours = np.mean([picture["Combined"][..., :3].astype(float) for picture in pictures], axis=0)
         expected, variance = reference["Combined"][..., :3].astype(float), reference["Variance"] * float(_REFERENCE_SAMPLES)
-        given = expected, colours, variance, _PICTURES * _SAMPLES
-        return said | {name: judge(*given) for name, judge in rivals.RIVALS.items()}
+        settings = expected, colours, variance, _PICTURES * _SAMPLES
+        return values | {name: judge(*settings) for name, judge in rivals.RIVALS.items()}
 
     def _of_geometry(self, test: Passes) -> float:
         image = rivals.without_the_tracers_own(Image(test))

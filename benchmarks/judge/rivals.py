@@ -30,11 +30,11 @@ OURS = "ours"
 
 def of_geometry(reference: Image, test: Image, surfaces_at: Callable) -> float:
     """Ours, of geometry: the largest share of what is allowed."""
-    found = geometry.compare(reference, test, reference.camera, surfaces_at)
-    shares = [share for row in found.rows for share in row.shares]
-    if found.systematic:
-        shares.append(found.systematic.mean / found.systematic.tolerance)
-    if not (found.mismatches_ok and shares):
+    comparison = geometry.compare(reference, test, reference.camera, surfaces_at)
+    shares = [share for row in comparison.rows for share in row.shares]
+    if comparison.systematic:
+        shares.append(comparison.systematic.mean / comparison.systematic.tolerance)
+    if not (comparison.mismatches_ok and shares):
         shares.append(np.inf)
     return max(shares)
 

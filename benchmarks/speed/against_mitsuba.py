@@ -56,9 +56,9 @@ def charts(quick: bool) -> tuple[Chart, ...]:
         sides[OURS] = start_contestant(processes, tracer.prepare, scene, still.level, threads)
         sides[OURS]["fresh"] = tracer.fresh(scene, still.level, threads)
         for variant in variants:
-            theirs = Path(folder) / variant
-            sides[variant] = start_contestant(processes, mitsuba3.prepare, scene, theirs, variant, threads)
-            sides[variant]["fresh"] = mitsuba3.fresh(theirs, variant, threads)
+            expected = Path(folder) / variant
+            sides[variant] = start_contestant(processes, mitsuba3.prepare, scene, expected, variant, threads)
+            sides[variant]["fresh"] = mitsuba3.fresh(expected, variant, threads)
         methods = tuple(method for method in METHODS if method.side in sides)
         reference = references.reference(still.name, scene, sides, still.samples)
         return figures.charts(still, figures.FRESH, sides, methods, reference, quick, path)

@@ -80,9 +80,9 @@ def _chart(
     tracks = {method: _with_half(method, points, reference) for method, points in tracks.items()}
     wanted = dict(zip(still.wanted, ratios, strict=True))
     times = standings.times(tracks, wanted, reference.error)
-    found = standings.standings(times, wanted)
-    told = [standing.told() for standing in found]
-    told += [f"to {error:g} nobody can tell" for error in wanted if error not in {standing.target for standing in found}]
+    ranked = standings.standings(times, wanted)
+    claims = [standing.summary() for standing in ranked]
+    claims += [f"to {error:g} nobody can tell" for error in wanted if error not in {standing.target for standing in ranked}]
     width, height = still.size
     rounds = max(len(point.seconds) for points in tracks.values() for point in points)
     return standings.Contested(
@@ -90,11 +90,12 @@ def _chart(
         f"{still.title}, {width} × {height}, {still.level}: the {figure.name}",
         f"seconds, {figure.seconds}: median, least and most of {rounds}",
         "RMS error of Combined",
-        standings.curves(tracks, reference.error, found),
-        f"Read how long each takes to an error: {'; '.join(told)}. {reference.told()}{' Quick: not judged.' if quick else ''}",
+        standings.curves(tracks, reference.error, ranked),
+        f"Read how long each takes to an error: {'; '.join(claims)}. {reference.summary()}"
+        + (" Quick: not judged." if quick else ""),
         tie=0.0,
         levels=tuple(wanted),
-        standings=found,
+        standings=ranked,
         times=times,
         measured={"methods": standings.measured(tracks), "reference": reference.figures()},
         judged=not quick,

@@ -42,7 +42,7 @@ class Claim:
     ratio: float
     wanted: float
 
-    def told(self) -> str:
+    def summary(self) -> str:
         return f"{self.sentence}: {self.ratio:.2f}, wanted {self.wanted:g}"
 
     def figures(self) -> dict[str, object]:
@@ -71,10 +71,10 @@ def charts(quick: bool) -> tuple[Chart]:
             f"seconds: median, least and most of {rounds}",
             "pixels, median distance of positions from pixel centres",
             tuple(curves),
-            f"Read {'; '.join(claim.told() for claim in claims)}.{' Quick: not judged.' if quick else ''}",
+            f"Read {'; '.join(claim.summary() for claim in claims)}.{' Quick: not judged.' if quick else ''}",
             tie=0.0,
             standings=tuple(claims),
-            measured={"methods": {figure.name: measured(found) for figure, found in tracks.items()}},
+            measured={"methods": {figure.name: measured(actual) for figure, actual in tracks.items()}},
             judged=not quick,
             rows=tuple(figure.name for figure in tracks),
         ),

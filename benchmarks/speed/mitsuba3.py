@@ -81,12 +81,12 @@ def fresh(folder: Path, variant: str, threads: int) -> race.Runner:
     """A runner from a fresh process to the EXR."""
 
     def runner(sampling: str, parameter: float, seed: int, path: Path) -> float:
-        theirs = path.with_name("mitsuba.exr")
-        arguments = [folder, variant, sampling, int(parameter), seed, threads, theirs]
+        expected = path.with_name("mitsuba.exr")
+        arguments = [folder, variant, sampling, int(parameter), seed, threads, expected]
         started = time.perf_counter()
         subprocess.run([sys.executable, JOB, *map(str, arguments)], check=True, stdout=subprocess.DEVNULL)
         seconds = time.perf_counter() - started
-        _as_combined(theirs, path)
+        _as_combined(expected, path)
         return seconds
 
     return runner
@@ -109,13 +109,14 @@ def write(scene: Scene, folder: Path) -> None:
     for number, placed in enumerate(scene.objects):
         geometry = scene.geometries[placed.geometry]
         material = scene.materials.get(placed.materials[0], PLAIN) if placed.materials else PLAIN
-        if not isinstance(geometry, Mesh) or set(material.colours) != {"diffuse"} or len(set(placed.materials)) > 1:
+        is_matte = [each.node.type for each in material.closures] == ["diffuse"]
+        if not isinstance(geometry, Mesh) or not is_matte or len(set(placed.materials)) > 1:
             raise InputError(f"object {placed.name!r} is more than one matte mesh: race Mitsuba on another scene")
         smooth = geometry.corner_normals is not None
         for place, matrix in enumerate(placed.matrices):
             file = folder / f"{number}.{place}.ply"
             _mesh(mitsuba, geometry, placed.name, matrix).write_ply(str(file))
-            document["objects"].append({"file": file.name, "smooth": smooth, "colour": material.diffuse.rgb})
+            document["objects"].append({"file": file.name, "smooth": smooth, "colour": material.surface["color"].rgb})
     for lamp in scene.lamps:
         if not isinstance(lamp, Sun) or lamp.angle:
             raise InputError(f"light {lamp.name!r} is no sun without size: race Mitsuba on another scene")
@@ -158,10 +159,10 @@ def _flat(values: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.ascontiguousarray(values, np.float32).reshape(-1)
 
 
-def _as_combined(theirs: Path, path: Path) -> None:
+def _as_combined(mitsuba_picture: Path, path: Path) -> None:
     """Mitsuba's R, G and B as our Combined."""
     import OpenEXR
 
-    channels = OpenEXR.File(str(theirs), separate_channels=True).channels()
+    channels = OpenEXR.File(str(mitsuba_picture), separate_channels=True).channels()
     rgb = np.dstack([channels[letter].pixels for letter in "RGB"])[::-1]
     image.write(path, image.Image({"Combined": np.dstack([rgb, np.ones_like(rgb[..., :1])])}))

@@ -52,7 +52,7 @@ class Reference:
         measured = rms(combined(path) - self.picture)
         return math.sqrt(max(measured * measured - self.error * self.error, 0.0))
 
-    def told(self) -> str:
+    def summary(self) -> str:
         sides = " and ".join(f"{half.side} with 2 × {half.samples:,} samples" for half in self.halves)
         return (
             f"The reference, {sides}, is itself off by {self.error:.2g}, which is taken off; the two differ by "
@@ -91,12 +91,12 @@ def reference(
 def combine(halves: Mapping[str, NDArray[np.float64]], samples: Mapping[str, int]) -> Reference:
     """halves : of each of two sides, (2, height, width, 3)."""
     noise = {side: rms(pair[0] - pair[1]) / math.sqrt(2) for side, pair in halves.items()}
-    (one, other), variances = halves.values(), [error * error / 2 for error in noise.values()]
+    (first, other), variances = halves.values(), [error * error / 2 for error in noise.values()]
     weight = variances[1] / sum(variances) if any(variances) else 0.5
     return Reference(
-        picture=weight * one.mean(axis=0) + (1 - weight) * other.mean(axis=0),
+        picture=weight * first.mean(axis=0) + (1 - weight) * other.mean(axis=0),
         error=math.hypot(weight * math.sqrt(variances[0]), (1 - weight) * math.sqrt(variances[1])),
-        differ=rms(one.mean(axis=0) - other.mean(axis=0)),
+        differ=rms(first.mean(axis=0) - other.mean(axis=0)),
         explained=math.sqrt(sum(variances)),
         halves=tuple(Half(side, samples[side], error) for side, error in noise.items()),
     )

@@ -21,7 +21,7 @@ class Reached:
     seconds: float
     beyond: bool
 
-    def told(self) -> str:
+    def summary(self) -> str:
         return f"{self.method.name} {self.seconds:.3g} s{' (its curve followed on)' if self.beyond else ''}"
 
     def figures(self) -> dict[str, object]:
@@ -41,9 +41,9 @@ class Standing:
     def ratio(self) -> float:
         return self.rival.seconds / self.ours.seconds
 
-    def told(self) -> str:
+    def summary(self) -> str:
         wanted = "" if self.wanted is None else f", wanted {self.wanted:g}"
-        return f"to {self.target:g} {self.ours.told()}, {self.rival.told()}: {self.ratio:.2f} times as fast{wanted}"
+        return f"to {self.target:g} {self.ours.summary()}, {self.rival.summary()}: {self.ratio:.2f} times as fast{wanted}"
 
     def figures(self) -> dict[str, object]:
         sides = {"ours": self.ours.figures(), "rival": self.rival.figures()}
@@ -54,7 +54,7 @@ class Standing:
 class Contested(Chart):
     """A chart of error against time, judged by its standings.
 
-    standings : each with ratio, wanted, told() and figures(). times : error → when each method reaches it. measured : all
+    standings : each with ratio, wanted, summary() and figures(). times : error → when each method reaches it. measured : all
     points, for JSON. judged : whether what is wanted and missed counts.
     """
 
@@ -65,7 +65,7 @@ class Contested(Chart):
 
     def behind(self) -> list[str]:
         missed = (standing for standing in self.standings if standing.wanted is not None and standing.ratio < standing.wanted)
-        return [f"{self.title}: {standing.told()}" for standing in missed if self.judged]
+        return [f"{self.title}: {standing.summary()}" for standing in missed if self.judged]
 
     def lines(self) -> list[str]:
         """A table of the times of all methods, the fastest first."""
@@ -73,7 +73,7 @@ class Contested(Chart):
         for target, all_reached in self.times.items():
             lines += [
                 f"  to {target:g}",
-                *(f"    {each.told()}" for each in sorted(all_reached, key=lambda each: each.seconds)),
+                *(f"    {each.summary()}" for each in sorted(all_reached, key=lambda each: each.seconds)),
             ]
         return lines
 
@@ -88,16 +88,16 @@ class Contested(Chart):
 
 
 def reached(method: Method, points: Sequence[Point], target: float) -> Reached | None:
-    """When the error falls to the target: between neighbors log error goes with log time. None where points don't tell.
+    """The time at which the error is the target: between neighbors log error goes with log time. None where points don't tell.
 
     Where the first point is good enough already, its time.
     """
     if points and points[0].error <= target:
         return Reached(method, points[0].time, False)
     known = [point for point in points if point.error > 0]
-    for one, other in itertools.pairwise(known):
+    for first, other in itertools.pairwise(known):
         if other.error <= target:
-            return Reached(method, _followed(one, other, target), False)
+            return Reached(method, _followed(first, other, target), False)
     if len(known) < 2 or target < known[-1].error / _FURTHEST:
         return None
     if known[-1].error * _STEEP > known[-2].error or known[-1].time <= known[-2].time:
@@ -105,10 +105,10 @@ def reached(method: Method, points: Sequence[Point], target: float) -> Reached |
     return Reached(method, _followed(*known[-2:], target), True)
 
 
-def _followed(one: Point, other: Point, target: float) -> float:
+def _followed(point: Point, next_point: Point, target: float) -> float:
     """The line through two points, in logarithms."""
-    share = math.log(target / one.error) / math.log(other.error / one.error)
-    return one.time * (other.time / one.time) ** share
+    share = math.log(target / point.error) / math.log(next_point.error / point.error)
+    return point.time * (next_point.time / point.time) ** share
 
 
 def times(tracks: Tracks, targets: Iterable[float], reference_error: float) -> dict[float, tuple[Reached, ...]]:
@@ -122,13 +122,13 @@ def times(tracks: Tracks, targets: Iterable[float], reference_error: float) -> d
 
 def standings(times: Mapping[float, tuple[Reached, ...]], wanted: Mapping[float, float | None]) -> tuple[Standing, ...]:
     """One for each error that both sides reach. wanted : error → times as fast."""
-    found = []
+    result = []
     for target, all_reached in times.items():
         ours = _best(each for each in all_reached if each.method.ours)
         rival = _best(each for each in all_reached if each.method.rival)
         if ours and rival:
-            found.append(Standing(target, ours, rival, wanted[target]))
-    return tuple(found)
+            result.append(Standing(target, ours, rival, wanted[target]))
+    return tuple(result)
 
 
 def _best(all_reached: Iterable[Reached]) -> Reached | None:
@@ -143,8 +143,8 @@ def with_point_by_line(points: Sequence[Point], samples: int, error: float) -> l
     """
     if len(points) < 2 or samples <= points[-1].parameter:
         return list(points)
-    one, other = points[-2:]
-    slope = (other.time - one.time) / (other.parameter - one.parameter)
+    first, other = points[-2:]
+    slope = (other.time - first.time) / (other.parameter - first.parameter)
     if slope <= 0:
         return list(points)
     return [*points, Point(samples, [other.time + slope * (samples - other.parameter)], [error])]
@@ -152,14 +152,14 @@ def with_point_by_line(points: Sequence[Point], samples: int, error: float) -> l
 
 def curves(tracks: Tracks, least: float, judged: Sequence[Standing] = ()) -> tuple[Curve, ...]:
     """least : points of smaller errors are left out. judged : who is the best of his side in none stays in the background."""
-    found, best = [], {side.method for standing in judged for side in (standing.ours, standing.rival)}
+    result, best = [], {side.method for standing in judged for side in (standing.ours, standing.rival)}
     for method, points in tracks.items():
-        shown = [point for point in points if point.error >= least]
-        spread = tuple((min(point.seconds), max(point.seconds)) for point in shown)
-        x, y = [point.time for point in shown], [point.error for point in shown]
+        visible_points = [point for point in points if point.error >= least]
+        spread = tuple((min(point.seconds), max(point.seconds)) for point in visible_points)
+        x, y = [point.time for point in visible_points], [point.error for point in visible_points]
         minor = bool(best) and method not in best
-        found.append(Curve(method.name, x, y, ours=method.ours, spread=spread, minor=minor))
-    return tuple(found)
+        result.append(Curve(method.name, x, y, ours=method.ours, spread=spread, minor=minor))
+    return tuple(result)
 
 
 def measured(tracks: Tracks) -> dict[str, object]:

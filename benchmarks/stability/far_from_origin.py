@@ -97,7 +97,7 @@ def _relative_to_the_eye(pinhole: Pinhole, matrix: Array, points: Array) -> Arra
     corners = points[:, None] + _SMALL * np.array([-u - v, 2 * u - v, 2 * v - u])
     uvs = np.tile(np.array([[0, 0], [1, 0], [0, 1]], np.float32), (len(points), 1, 1))
     places = _exactly(pinhole, matrix, points)
-    shown = []
+    result = []
     for triangle, uv, (column, row) in zip(corners, uvs, places.T, strict=True):
         mesh = Mesh(triangle, np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32), corner_uvs=uv[None])
         tracer = Tracer(Scene(pinhole, {"point": mesh}, (Object("point", "point", matrix),)), 1)
@@ -105,8 +105,8 @@ def _relative_to_the_eye(pinhole: Pinhole, matrix: Array, points: Array) -> Arra
         weights = [mpmath.mpf(1) - float(second) - float(third), mpmath.mpf(float(second)), mpmath.mpf(float(third))]
         with mpmath.workdps(60):
             seen = [mpmath.fdot(weights, [mpmath.mpf(float(x)) for x in triangle[:, axis]]) for axis in range(3)]
-            shown.append(_projected(pinhole, matrix, seen) if depth < image.BACKGROUND_DEPTH else (float("nan"),) * 2)
-    return 2 * places - np.array(shown).T
+            result.append(_projected(pinhole, matrix, seen) if depth < image.BACKGROUND_DEPTH else (float("nan"),) * 2)
+    return 2 * places - np.array(result).T
 
 
 def _in_world_space(kind: type) -> object:

@@ -36,7 +36,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
     poses = [_poses(distance, trials) for distance in distances]
 
     def curve(name: str, mode: str, setter: Setter, **more: object) -> Curve:
-        return Curve(name, distances, [_largest_error(scene, camera, mode, setter, some) for some in poses], **more)
+        return Curve(name, distances, [_largest_error(scene, camera, mode, setter, batch) for batch in poses], **more)
 
     curves = (
         curve("matrix_world =, XYZ", "XYZ", _matrix_world),
@@ -85,8 +85,8 @@ def _largest_error(scene: bpy.types.Scene, camera: bpy.types.Object, mode: str, 
         camera.rotation_mode = mode
         setter(scene, camera, pinhole)
         bpy.context.view_layer.update()
-        found = np.array(camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)[:3, :3]
-        worst = max(worst, float(np.abs(found - np.column_stack(pinhole.basis())).max()))
+        values = np.array(camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)[:3, :3]
+        worst = max(worst, float(np.abs(values - np.column_stack(pinhole.basis())).max()))
         camera.matrix_parent_inverse.identity()
         camera.matrix_basis.identity()
     return worst

@@ -86,10 +86,10 @@ def _poses(angles: Array, trials: int, up: Array | None) -> list[tuple[Array, Ar
 def _errors(method: Method, poses: list) -> list[float]:
     """The largest roll error at each angle; nan where the method has no answer for some pose."""
     with np.errstate(all="ignore"):
-        found = [method(e, l, up) for e, l, up, _ in poses]
+        result = [method(e, l, up) for e, l, up, _ in poses]
     return [
         max(_roll_error(u, *axes) for u, axes in zip(us, true, strict=True)) if np.isfinite(us).all() else np.nan
-        for us, (*_, true) in zip(found, poses, strict=True)
+        for us, (*_, true) in zip(result, poses, strict=True)
     ]
 
 
@@ -132,9 +132,9 @@ def _track_to(camera: bpy.types.Object) -> Callable[[Array, Array, Array], Array
         constraint = camera.constraints.new("TRACK_TO")
         constraint.target, constraint.track_axis, constraint.up_axis = target, "TRACK_NEGATIVE_Z", "UP_Y"
         camera.location, target.location = e, l
-        found = _evaluated_u(camera)
+        actual = _evaluated_u(camera)
         camera.constraints.remove(constraint)
-        return found
+        return actual
 
     return u
 

@@ -209,14 +209,14 @@ def _measured(
     shots: Callable[..., Shots], sweep: Array, rays: int, flattest: float = _FLATTEST
 ) -> tuple[tuple[Curve, ...], tuple[Curve, ...]]:
     """The curves of the depth's errors, of rays that meet the surface at this cosine or more, and of the wrong decisions."""
-    found: dict[str, list[tuple[float, float]]] = {}
+    result: dict[str, list[tuple[float, float]]] = {}
     for x in sweep:
         aimed = shots(x, rays, np.random.default_rng(3))
         truth, cosine = np.array(list(_true_depths(aimed))).T
         for name, depths in _found_depths(aimed):
-            found.setdefault(name, []).append(_errors(depths, truth, cosine >= flattest))
+            result.setdefault(name, []).append(_errors(depths, truth, cosine >= flattest))
     return tuple(
-        tuple(Curve(name, sweep, [errors[kind] for errors in values], name == "ours") for name, values in found.items())
+        tuple(Curve(name, sweep, [errors[kind] for errors in values], name == "ours") for name, values in result.items())
         for kind in range(2)
     )
 

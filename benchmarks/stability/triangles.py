@@ -130,8 +130,8 @@ def _hits_of_fans(size: float, fans: int, random: np.random.Generator) -> Iterat
         yield name, np.concatenate([group.first_hits(lambda *given, r=robust: _embree_depth(*given, r)) for group in groups])
     for name, packets in (("ours", True), ("ours, one by one", False)):
         counts = np.concatenate([group.first_hits(lambda *given, p=packets: _core_depth(*given, p)) for group in groups])
-        found = np.concatenate([np.isfinite(_core_depth(group.corners, group.x, group.y, packets)) for group in groups])
-        yield name, np.where(found, np.maximum(counts, 1), 0)
+        values = np.concatenate([np.isfinite(_core_depth(group.corners, group.x, group.y, packets)) for group in groups])
+        yield name, np.where(values, np.maximum(counts, 1), 0)
 
 
 class _Fans:
@@ -228,11 +228,11 @@ def _seen_on_the_ground(extents: Array, count: int) -> tuple[Curve, ...]:
     lost: dict[str, list[float]] = {}
     for extent in extents:
         random = np.random.default_rng(9)
-        found: dict[str, list[Array]] = {}
+        result: dict[str, list[Array]] = {}
         for _ in range(count):
             for name, triangle in _first_on_the_ground(extent, random):
-                found.setdefault(name, []).append(triangle)
-        for name, triangles in found.items():
+                result.setdefault(name, []).append(triangle)
+        for name, triangles in result.items():
             lost.setdefault(name, []).append(float(np.mean(np.stack(triangles) < _GROUND)))
     return tuple(Curve(name, extents, shares, name == "ours") for name, shares in lost.items())
 
@@ -347,9 +347,9 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _in_precision(test: Callable[..., Array], dtype: type) -> Callable[..., Array]:
-    def rounded(*given: Array) -> Array:
+    def rounded(*arrays: Array) -> Array:
         with np.errstate(all="ignore"):
-            return test(*(values.astype(dtype) for values in given)).astype(float)
+            return test(*(values.astype(dtype) for values in arrays)).astype(float)
 
     return rounded
 

@@ -69,8 +69,8 @@ def test_a_chart_is_drawn_with_its_caption_the_machine_and_the_command(tmp_path)
     charts.draw(chart_of(ours, other), tmp_path / "chart.svg", "python -m benchmarks something")
     text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
     assert ElementTree.fromstring(text).tag.endswith("svg")
-    for said in ("A title", "Read this.", "ours", "no answer", "python -m benchmarks something", f"numpy {np.__version__}"):
-        assert said in text, f"{said!r} is not in the chart"
+    for record in ("A title", "Read this.", "ours", "no answer", "python -m benchmarks something", f"numpy {np.__version__}"):
+        assert record in text, f"{record!r} is not in the chart"
 
 
 def test_the_same_measurement_draws_the_same_file(tmp_path):
@@ -102,9 +102,9 @@ EVERY_KIND = (
 
 @pytest.mark.parametrize("chart", EVERY_KIND)
 def test_a_chart_is_drawn_from_its_figures_as_it_was_drawn_when_it_was_measured(chart, tmp_path, capsys):
-    status, told = charts.run_all("subject", {"sweep": lambda quick: [chart]}, tmp_path)
-    (tmp_path / "figures.json").write_text(json.dumps({"exit_status": status, **told}, allow_nan=False), encoding="utf-8")
-    assert charts.redraw(charts.read(tmp_path / "figures.json"), tmp_path / "again") == (0, told)
+    status, sentence = charts.run_all("subject", {"sweep": lambda quick: [chart]}, tmp_path)
+    (tmp_path / "figures.json").write_text(json.dumps({"exit_status": status, **sentence}, allow_nan=False), encoding="utf-8")
+    assert charts.redraw(charts.read(tmp_path / "figures.json"), tmp_path / "again") == (0, sentence)
     assert (tmp_path / "again" / "subject-name.svg").read_bytes() == (tmp_path / "subject-name.svg").read_bytes()
 
 
@@ -172,8 +172,8 @@ def test_methods_of_a_point_or_two_stand_in_rows_the_best_on_top_with_their_erro
     chart = dataclasses.replace(chart_of(*methods), rows=("at once", "one by one"))
     charts.draw(chart, tmp_path / "chart.svg", "python -m benchmarks something")
     text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
-    for said in ("theirs", "ours", "1e-16", "2e-07", "no answer", "● at once", "○ one by one", "A title"):
-        assert said in text, f"{said!r} is not in the chart"
+    for record in ("theirs", "ours", "1e-16", "2e-07", "no answer", "● at once", "○ one by one", "A title"):
+        assert record in text, f"{record!r} is not in the chart"
     places = {name: float(re.search(rf'y="([-0-9.]+)"[^>]*>{name}<', text)[1]) for name in ("lost", "theirs", "ours")}
     assert places["ours"] < places["theirs"] < places["lost"]
 

@@ -14,8 +14,8 @@ def charts():
 
 
 def curve(chart, name) -> Curve:
-    (found,) = (curve for curve in chart.curves if curve.name == name)
-    return found
+    (actual,) = (curve for curve in chart.curves if curve.name == name)
+    return actual
 
 
 def slope_of(chart, name):

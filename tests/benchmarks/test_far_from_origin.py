@@ -19,11 +19,11 @@ def curves(chart):
     return {curve.name: np.array(curve.y) for curve in chart.curves}
 
 
-def test_the_tracer_and_recentred_cycles_are_as_exact_at_1e9_as_near_it(chart, curves):
+def test_the_tracer_and_recentered_cycles_are_as_exact_at_1e9_as_near_it(chart, curves):
     assert chart.behind() == []
     assert max(chart.curves[0].x) == 1e9
     assert curves["tracer: relative to the eye (ours)"].max() < far_from_origin.ARITHMETIC
-    assert curves["Cycles, recentred (ours)"].max() < far_from_origin.NEAR_ORIGIN
+    assert curves["Cycles, recentered (ours)"].max() < far_from_origin.NEAR_ORIGIN
 
 
 def test_world_coordinates_and_plain_cycles_fail_far_from_origin(curves):

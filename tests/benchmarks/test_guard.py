@@ -23,11 +23,11 @@ def test_a_ratio_may_fall_by_less_than_a_third():
 
 def test_what_is_slow_in_every_attempt_has_fallen_and_what_is_slow_in_two_has_not(monkeypatch):
     recorded, asked = {"geometry": 0.6, "direct": 1.0}, []
-    found = iter([{"geometry": 0.1, "direct": 0.9}, {"geometry": 0.2}, {"geometry": 0.5}])
+    actual = iter([{"geometry": 0.1, "direct": 0.9}, {"geometry": 0.2}, {"geometry": 0.5}])
 
     def measure(names):
         asked.append(names)
-        return next(found)
+        return next(actual)
 
     monkeypatch.setattr(guard, "measure", measure)
     assert guard.judged(recorded) == ({"geometry": 0.5, "direct": 0.9}, [])

@@ -28,20 +28,20 @@ def test_there_are_sixty_faults_of_four_families_each_with_a_name_of_its_own():
 @pytest.mark.exhaustive
 def test_good_pictures_pass_and_a_fault_of_each_family_is_found_in_each(block):
     good = block.good()
-    assert len(good) == detection.SIDE**2 and all(said["ours"] < 1 for said in good), good
-    assert len({said["ours"] for said in good}) == len(good), "no pair is another's"
+    assert len(good) == detection.SIDE**2 and all(record["ours"] < 1 for record in good), good
+    assert len({record["ours"] for record in good}) == len(good), "no pair is another's"
     for name in ("shifted by 0.01 px upwards", "the ball moved by 0.001", "the lamp 3.0% dimmer", "a firefly"):
         (fault,) = (fault for fault in faults.FAULTS if fault.name == name)
-        said = block.faulty(fault)
-        assert len(said) == detection.SIDE and all(each["ours"] > 1 for each in said), (name, said)
-        assert set(said[0]) == {"ours", "FLIP", "idiff", "SSIM", "z-test"}
+        record = block.faulty(fault)
+        assert len(record) == detection.SIDE and all(each["ours"] > 1 for each in record), (name, record)
+        assert set(record[0]) == {"ours", "FLIP", "idiff", "SSIM", "z-test"}
     assert block.good() == good, "a fault of the picture is put into a copy"
 
 
 def test_a_chart_counts_what_is_missed_at_how_few_false_alarms():
     clean = {"ours": np.arange(100.0) / 100, "SSIM": np.arange(10.0), "FLIP": np.zeros(10)}
-    found = {faults.FAULTS[0]: {"ours": np.array([2.0, 0.5]), "SSIM": np.array([8.5]), "FLIP": np.zeros(1)}}
-    chart = detection._chart("all", found, clean)
+    values = {faults.FAULTS[0]: {"ours": np.array([2.0, 0.5]), "SSIM": np.array([8.5]), "FLIP": np.zeros(1)}}
+    chart = detection._chart("all", values, clean)
     ours, ssim, _ = chart.curves
     assert list(ours.x) == [1e-2, 3e-2, 0.1, 0.3] and list(ours.y) == [0.5] * 4
     assert list(ssim.x) == [0.1, 0.3] and list(ssim.y) == [0.0, 0.0]

@@ -18,15 +18,15 @@ def passes(seed=0, height=30, width=40):
 
 
 def test_what_differs_by_less_than_the_tolerances_is_the_same_and_what_is_no_number_is_not():
-    ours, theirs = passes(), passes()
-    theirs["Depth"] = theirs["Depth"] * np.float32(1 + 5e-5)
-    assert labels.differences(ours, theirs) == dict.fromkeys(labels.TOLERANCES, 0.0)
+    ours, expected = passes(), passes()
+    expected["Depth"] = expected["Depth"] * np.float32(1 + 5e-5)
+    assert labels.differences(ours, expected) == dict.fromkeys(labels.TOLERANCES, 0.0)
     for name, share in {"Depth": 1e-3, "Position": 2e-3, "Normal": 0.02, "Object Index": 1, "Material Index": 1}.items():
         for wrong in (share * 9, np.nan):
-            theirs = passes()
-            theirs[name][3, 4, -1] += wrong
-            found = labels.differences(ours, theirs)
-            assert found.pop(name) == pytest.approx(1 / 1200) and not any(found.values())
+            expected = passes()
+            expected[name][3, 4, -1] += wrong
+            errors = labels.differences(ours, expected)
+            assert errors.pop(name) == pytest.approx(1 / 1200) and not any(errors.values())
 
 
 def test_the_slower_and_the_wrong_miss_what_is_wanted():
@@ -46,9 +46,9 @@ def test_both_ways_label_the_studio_alike_and_a_camera_that_is_off_is_told(tmp_p
     assert max(labels.compared(shots, tmp_path).values()) <= labels.ON_EDGES
     ours = labels._ours(tmp_path / "ours", shots[0])
     for number, shot in enumerate(shots, 1):
-        told = json.loads((tmp_path / "theirs" / f"{number:04d}.json").read_text())
+        record = json.loads((tmp_path / "theirs" / f"{number:04d}.json").read_text())
         index = labels._ours(tmp_path / "ours", shot)["Object Index"][::-1, :, 0]
-        for each in told:
+        for each in record:
             mask = masks.decoded(each["visible"]["segmentation"])
             assert (mask != (index == each["object_index"])).mean() <= labels.ON_EDGES
     shifted = {name: np.roll(values, 1, axis=1) for name, values in ours.items()}

@@ -27,14 +27,14 @@ def test_our_pictures_are_noisier_than_no_others(charts):
     """Beside Cycles': at most by the tenth that the two pictures' own chance is good for, over some hundred noisy pixels."""
     for chart in charts.values():
         errors = {curve.name: curve.y for curve in chart.curves}
-        assert all(ours <= 1.1 * theirs for ours, theirs in zip(errors["ours"], errors["Cycles"], strict=True)), errors
+        assert all(ours <= 1.1 * expected for ours, expected in zip(errors["ours"], errors["Cycles"], strict=True)), errors
 
 
 def test_the_noise_of_pictures_falls_as_that_of_integrals(charts):
-    found = {name: slopes(chart)["ours"] for name, chart in charts.items()}
-    assert found["edge"] <= -0.72, found  # −¾, measured in a picture in which two hundred pixels are noisy
-    assert found["shadow"] <= -0.6, found  # an edge in four dimensions
-    assert found["corner"] <= -0.5, found
+    result = {name: slopes(chart)["ours"] for name, chart in charts.items()}
+    assert result["edge"] <= -0.72, result  # −¾, measured in a picture in which two hundred pixels are noisy
+    assert result["shadow"] <= -0.6, result  # an edge in four dimensions
+    assert result["corner"] <= -0.5, result
 
 
 def test_random_numbers_in_the_same_integrator_are_noisier(charts):

@@ -21,9 +21,9 @@ def test_ours_is_the_best_or_tied_at_every_separation(chart):
 
 
 def test_ours_stays_within_its_bound_from_1e_300_to_1e300(chart):
-    found = errors(chart, "power of two, compensated (ours)")
-    assert min(found) == -300 and max(found) == 300
-    assert max(found.values()) <= separation.COMPUTED, found
+    differences = errors(chart, "power of two, compensated (ours)")
+    assert min(differences) == -300 and max(differences) == 300
+    assert max(differences.values()) <= separation.COMPUTED, differences
 
 
 @pytest.mark.parametrize(
@@ -35,6 +35,8 @@ def test_ours_stays_within_its_bound_from_1e_300_to_1e300(chart):
     ],
 )
 def test_the_simpler_formulas_lose_the_axes_on_both_sides(chart, name, lost_at, good_at):
-    found = errors(chart, name)
-    assert all(not found[exponent] < 0.1 for exponent in lost_at), f"the sweep does not reach the failure of {name}: {found}"
-    assert found[good_at] < 1e-5
+    differences = errors(chart, name)
+    assert all(not differences[exponent] < 0.1 for exponent in lost_at), (
+        f"the sweep does not reach the failure of {name}: {differences}"
+    )
+    assert differences[good_at] < 1e-5

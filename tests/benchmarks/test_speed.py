@@ -80,16 +80,16 @@ def test_the_parameters_near_a_target_are_those_on_both_sides_of_it():
 def test_between_points_of_a_power_law_the_time_is_that_of_the_law(exponent, seconds, share):
     points = power_law(seconds, exponent)
     target = points[0].error * (points[-1].error / points[0].error) ** share
-    found = reached(OURS, points, target)
-    assert not found.beyond
+    actual = reached(OURS, points, target)
+    assert not actual.beyond
     # t = s (target/0.1)^(1/exponent), in logarithms and back: some roundings of the exponent's inverse, at most 3.4.
-    assert found.seconds == pytest.approx(seconds * (target / 0.1) ** (1 / exponent), rel=1e-12)
+    assert actual.seconds == pytest.approx(seconds * (target / 0.1) ** (1 / exponent), rel=1e-12)
 
 
 def test_beyond_its_points_a_curve_is_followed_on_no_further_than_to_a_quarter_of_its_error_and_that_is_said():
     points = power_law(1.0, -0.5)
-    found = reached(OURS, points, points[-1].error / 2)
-    assert found.beyond and found.seconds == pytest.approx(256.0) and "followed on" in found.told()
+    actual = reached(OURS, points, points[-1].error / 2)
+    assert actual.beyond and actual.seconds == pytest.approx(256.0) and "followed on" in actual.summary()
     assert reached(OURS, points, points[-1].error / 5) is None
 
 
@@ -124,16 +124,16 @@ def test_nobody_is_ahead_where_the_reference_can_not_tell():
 def contested(wanted, judged=True):
     tracks = {OURS: power_law(0.1, -0.5), CYCLES: power_law(1.0, -0.5)}
     times = standings.times(tracks, [0.02], 0.0)
-    found = standings.standings(times, {0.02: wanted})
+    ranked = standings.standings(times, {0.02: wanted})
     curves = standings.curves(tracks, 0.0)
-    return Contested("name", "A title", "x", "y", curves, "Read this.", 0.0, standings=found, times=times, judged=judged)
+    return Contested("name", "A title", "x", "y", curves, "Read this.", 0.0, standings=ranked, times=times, judged=judged)
 
 
 def test_who_is_the_best_of_his_side_nowhere_stays_in_the_background():
     slow = dataclasses.replace(CYCLES, name="Cycles, slowly")
     tracks = {OURS: power_law(0.1, -0.5), CYCLES: power_law(1.0, -0.5), slow: power_law(10.0, -0.5)}
-    found = standings.standings(standings.times(tracks, [0.02], 0.0), {0.02: None})
-    assert {curve.name: curve.minor for curve in standings.curves(tracks, 0.0, found)} == {
+    ranked = standings.standings(standings.times(tracks, [0.02], 0.0), {0.02: None})
+    assert {curve.name: curve.minor for curve in standings.curves(tracks, 0.0, ranked)} == {
         "ours": False,
         "Cycles": False,
         "Cycles, slowly": True,
@@ -176,29 +176,29 @@ def test_the_error_of_a_reference_is_what_its_halves_tell_of_it():
     rng = np.random.default_rng(1)
     true = rng.random((100, 100, 3))
     halves = {"one": noisy(rng, true, 0.02, 0.02), "other": noisy(rng, true, 0.01, 0.01)}
-    found = references.combine(halves, {"one": 5, "other": 7})
-    assert found.error == pytest.approx(references.rms(found.picture - true), rel=0.03)
-    assert found.error < 0.01 / math.sqrt(2)
-    assert found.differ == pytest.approx(found.explained, rel=0.03)
-    assert [half.error for half in found.halves] == pytest.approx([0.02, 0.01], rel=0.03)
+    reference = references.combine(halves, {"one": 5, "other": 7})
+    assert reference.error == pytest.approx(references.rms(reference.picture - true), rel=0.03)
+    assert reference.error < 0.01 / math.sqrt(2)
+    assert reference.differ == pytest.approx(reference.explained, rel=0.03)
+    assert [half.error for half in reference.halves] == pytest.approx([0.02, 0.01], rel=0.03)
 
 
 def test_sides_that_converge_to_different_pictures_are_told():
     rng = np.random.default_rng(2)
     true = rng.random((100, 100, 3))
     halves = {"one": noisy(rng, true, 0.01, 0.01), "other": noisy(rng, true, 0.01, 0.01, bias=0.02)}
-    found = references.combine(halves, {"one": 5, "other": 5})
-    assert found.differ > 2 * found.explained
+    reference = references.combine(halves, {"one": 5, "other": 5})
+    assert reference.differ > 2 * reference.explained
 
 
 def test_the_reference_s_own_variance_is_taken_off(tmp_path):
     rng = np.random.default_rng(3)
     true = rng.random((100, 100, 3))
-    found = references.combine({side: noisy(rng, true, 0.02, 0.02) for side in ("one", "other")}, {"one": 1, "other": 1})
+    reference = references.combine({side: noisy(rng, true, 0.02, 0.02) for side in ("one", "other")}, {"one": 1, "other": 1})
     test = (true + rng.normal(0, 0.01, true.shape)).astype(np.float32)
     image.write(tmp_path / "test.exr", image.Image({"Combined": np.dstack([test, np.ones_like(test[..., 0])])}))
-    assert found.error == pytest.approx(0.01, rel=0.03)  # as large as what is measured
-    assert found.error_of(tmp_path / "test.exr") == pytest.approx(0.01, rel=0.05)
+    assert reference.error == pytest.approx(0.01, rel=0.03)  # as large as what is measured
+    assert reference.error_of(tmp_path / "test.exr") == pytest.approx(0.01, rel=0.05)
 
 
 def test_a_reference_is_made_once_for_each_scene(tmp_path):
@@ -212,20 +212,20 @@ def test_a_reference_is_made_once_for_each_scene(tmp_path):
 
     scene = tmp_path / "scene.json"
     sides = {side: {"picture": picture} for side in ("one", "other")}
-    for text, made in (("a scene", 1), ("a scene", 1), ("another", 2)):
+    for text, count in (("a scene", 1), ("a scene", 1), ("another", 2)):
         scene.write_text(text)
-        found = references.reference("name", scene, sides, {"one": 256, "other": 64}, tmp_path / "kept")
-        assert len(asked) == 4 * made
-    assert {samples for _, samples in asked} == {half.samples for half in found.halves} == {256, 64}
+        reference = references.reference("name", scene, sides, {"one": 256, "other": 64}, tmp_path / "kept")
+        assert len(asked) == 4 * count
+    assert {samples for _, samples in asked} == {half.samples for half in reference.halves} == {256, 64}
     assert len({seed for seed, _ in asked}) == 2
 
 
 def test_uniform_curves_of_both_sides_go_on_with_the_reference_s_halves_and_no_other_does():
     halves = tuple(references.Half(side, 256, 0.001) for side in ("ours", "Cycles"))
-    made = references.Reference(np.zeros((1, 1, 3)), 0.0007, 0.001, 0.001, halves)
+    scene = references.Reference(np.zeros((1, 1, 3)), 0.0007, 0.001, 0.001, halves)
     adaptive = dataclasses.replace(OURS, name="adaptive", sampling="error")
     for method, more in ((OURS, 1), (CYCLES, 1), (adaptive, 0), (dataclasses.replace(CYCLES, rival=False), 0)):
-        points = figures._with_half(method, power_law(1.0, -0.5), made)
+        points = figures._with_half(method, power_law(1.0, -0.5), scene)
         assert len(points) == 4 + more, method
         assert not more or (points[-1].time, points[-1].error) == (pytest.approx(256.0), 0.001)
 
@@ -280,8 +280,8 @@ def test_a_scene_is_raced_from_the_blend_to_the_charts(tmp_path, monkeypatch):
         errors = [point["error"] for point in points]
         assert errors == sorted(errors, reverse=True), f"{name} does not get better: {errors}"
     # Both sides see the same: their difference is noise, but for what chance and a few bright edges add.
-    told = picture.figures()["reference"]
-    assert told["sides differ by"] < 1.5 * told["explained by noise"]
+    figures = picture.figures()["reference"]
+    assert figures["sides differ by"] < 1.5 * figures["explained by noise"]
 
 
 def test_mitsuba_converges_to_the_same_picture(tmp_path):
@@ -309,8 +309,8 @@ def test_mitsuba_converges_to_the_same_picture(tmp_path):
         film=Film("BOX"),
     )
     scene_file.write(scene, tmp_path / "scene.json")
-    with race.Contestant(mitsuba3.prepare, tmp_path / "scene.json", tmp_path / "theirs", mitsuba3.SCALAR, 2) as theirs:
-        theirs.runners()["picture"]("samples", 64, 1, tmp_path / "theirs.exr")
+    with race.Contestant(mitsuba3.prepare, tmp_path / "scene.json", tmp_path / "theirs", mitsuba3.SCALAR, 2) as expected:
+        expected.runners()["picture"]("samples", 64, 1, tmp_path / "theirs.exr")
     tracer.prepare(tmp_path / "scene.json", "direct", 2)["picture"]("samples", 64, 1, tmp_path / "ours.exr")
     difference = references.combined(tmp_path / "theirs.exr") - references.combined(tmp_path / "ours.exr")
     # An edge's pixel is off by about 0.35 · 64^−¾ = 0.015 of its contrast, here 1; a tenth of the pixels have an edge, and both

@@ -38,6 +38,23 @@ def add_camera(fresh_blender, scene):
 
 
 @pytest.fixture
+def add_rig(fresh_blender, scene):
+    """A function that adds an armature of one bone, Head, from (0, 0, 1) to (0, 1, 2)."""
+
+    def add(roll=0.0):
+        armature = fresh_blender.data.objects.new("Rig", fresh_blender.data.armatures.new("Rig"))
+        scene.collection.objects.link(armature)
+        fresh_blender.context.view_layer.objects.active = armature
+        fresh_blender.ops.object.mode_set(mode="EDIT")
+        bone = armature.data.edit_bones.new("Head")
+        bone.head, bone.tail, bone.roll = (0, 0, 1), (0, 1, 2), roll
+        fresh_blender.ops.object.mode_set(mode="OBJECT")
+        return armature
+
+    return add
+
+
+@pytest.fixture
 def camera_object(add_camera):
     """A new camera at the origin, looking down."""
     return add_camera()
@@ -216,14 +233,14 @@ def read_passes(exr_reader):
     """A function that reads EXRs: paths → a dict of passes each."""
 
     def read(paths):
-        found = []
+        result = []
         for path in paths:
             exr_reader.stdin.write(f"{path}\n")
             exr_reader.stdin.flush()
             assert exr_reader.stdout.readline() == "read\n", f"{path} can't be read"
             with np.load(f"{path}.npz") as archive:
-                found.append(dict(archive))
-        return found
+                result.append(dict(archive))
+        return result
 
     return read
 

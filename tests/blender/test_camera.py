@@ -103,14 +103,8 @@ def test_a_parents_place_rotation_and_uniform_scale_are_respected(camera_object,
     assert moved <= 9 * FLOAT32 * 100, f"{moved:.2e}"  # lengths below 100 went into it
 
 
-def test_a_bone_as_parent_is_respected(camera_object, scene):
-    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    scene.collection.objects.link(armature)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.object.mode_set(mode="EDIT")
-    bone = armature.data.edit_bones.new("Head")
-    bone.head, bone.tail, bone.roll = (0, 0, 1), (0, 1, 2), 0.4
-    bpy.ops.object.mode_set(mode="OBJECT")
+def test_a_bone_as_parent_is_respected(camera_object, scene, add_rig):
+    armature = add_rig(0.4)
     armature.location = (1, 2, 3)
     camera_object.parent, camera_object.parent_type, camera_object.parent_bone = armature, "BONE", "Head"
     pinhole = random_pinhole(np.random.default_rng(4))
@@ -125,12 +119,12 @@ def test_read_gives_back_what_apply_was_given(camera_object, scene):
     for mirrored in (False, True):
         pinhole = random_pinhole(random, mirrored=mirrored, principal_point=(1000.0, 500.0))
         cameras.apply(camera_object, pinhole, scene)
-        found = cameras.read(camera_object, scene)
-        assert found.mirrored == mirrored
-        np.testing.assert_allclose(np.stack(found.basis()), np.stack(pinhole.basis()), rtol=0, atol=ROTATION)
-        np.testing.assert_allclose(found.eye, pinhole.eye, rtol=FLOAT32)
-        np.testing.assert_allclose(found.distance, pinhole.distance, rtol=2 * FLOAT32)
-        np.testing.assert_allclose(found.principal_point, pinhole.principal_point, rtol=0, atol=2 * FLOAT32 * 1920)
+        read_back = cameras.read(camera_object, scene)
+        assert read_back.mirrored == mirrored
+        np.testing.assert_allclose(np.stack(read_back.basis()), np.stack(pinhole.basis()), rtol=0, atol=ROTATION)
+        np.testing.assert_allclose(read_back.eye, pinhole.eye, rtol=FLOAT32)
+        np.testing.assert_allclose(read_back.distance, pinhole.distance, rtol=2 * FLOAT32)
+        np.testing.assert_allclose(read_back.principal_point, pinhole.principal_point, rtol=0, atol=2 * FLOAT32 * 1920)
 
 
 def test_stated_gives_back_in_float64_what_apply_was_given(camera_object, scene):
@@ -153,9 +147,9 @@ def test_a_camera_that_is_not_enabled_states_nothing(camera_object, scene):
 )
 def test_a_scale_is_read_as_cycles_reads_it(camera_object, scene, scale, mirrored, looks_back):
     camera_object.scale = scale
-    found = cameras.read(camera_object, scene)
-    assert found.mirrored == mirrored
-    np.testing.assert_allclose(found.basis()[2], (0, 0, -1 if looks_back else 1), atol=1e-15)
+    pinhole = cameras.read(camera_object, scene)
+    assert pinhole.mirrored == mirrored
+    np.testing.assert_allclose(pinhole.basis()[2], (0, 0, -1 if looks_back else 1), atol=1e-15)
 
 
 @pytest.mark.parametrize("scale", [(2, 3, 4), (-1, 1, 1), (1, -2, 1), (1, 1, -1), (-1, -1, -1)])
@@ -282,9 +276,9 @@ def test_a_camera_of_another_scene_is_set_and_read_there(fresh_blender, camera_o
     other.collection.objects.link(elsewhere)
     pinhole = Pinhole((1, 2, 3), (0, 0, 0), (0, 0, 1), 100.0, 100, 200)
     assert cameras.apply(elsewhere, pinhole, other) == []
-    found = cameras.read(elsewhere, other)
-    assert (found.width, found.height) == (100, 200)
-    assert found.eye == (1, 2, 3)
+    read_back = cameras.read(elsewhere, other)
+    assert (read_back.width, read_back.height) == (100, 200)
+    assert read_back.eye == (1, 2, 3)
 
 
 def test_far_from_the_origin_reading_loses_no_digit_of_the_matrix(camera_object, scene):
@@ -321,11 +315,11 @@ def test_keyframes_of_the_focus_distance_win_and_animated_values_pull_the_focus_
     for frame, z in ((1, 1.0), (11, 3.0)):
         group.look_at = (0, 0, z)
         group.keyframe_insert("look_at", frame=frame)
-    found = {}
+    result = {}
     for frame in (1, 11):
         scene.frame_set(frame)
-        found[frame] = depsgraph.visit(scene, lambda graph: posed_camera.data.evaluated_get(graph).dof.focus_distance)
-    assert found == {frame: pytest.approx(math.dist((7, -6, 5), (0, 0, z)), rel=2.0**-23) for frame, z in ((1, 1), (11, 3))}
+        result[frame] = depsgraph.visit(scene, lambda graph: posed_camera.data.evaluated_get(graph).dof.focus_distance)
+    assert result == {frame: pytest.approx(math.dist((7, -6, 5), (0, 0, z)), rel=2.0**-23) for frame, z in ((1, 1), (11, 3))}
     focus.focus_distance = 2.0
     focus.keyframe_insert("focus_distance", frame=1)
     scene.frame_set(5)

@@ -27,12 +27,12 @@ def flight(scene, camera_object, tmp_path):
         camera_object.rotation_euler = (1.1, 0.02 * frame, 0.15 * frame)
         camera_object.keyframe_insert("location", frame=frame)
         camera_object.keyframe_insert("rotation_euler", frame=frame)
-    found = []
+    result = []
     for frame in range(1, COUNT + 1):
         scene.frame_set(frame)
-        found.append(Camera(f"{frame}", cameras.read(camera_object, scene), image=f"images/{frame:04d}.png"))
+        result.append(Camera(f"{frame}", cameras.read(camera_object, scene), image=f"images/{frame:04d}.png"))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "flight.blend"))
-    return tmp_path / "flight.blend", found
+    return tmp_path / "flight.blend", result
 
 
 def audited(folder, blend, capsys):
@@ -41,26 +41,26 @@ def audited(folder, blend, capsys):
 
 
 def test_cameras_of_the_frames_that_their_pictures_are_called_by_are_right(flight, tmp_path, capsys):
-    blend, found = flight
-    formats.save(found, tmp_path / "transforms.json", "transforms")
-    status, told = audited(tmp_path, blend, capsys)
-    assert status == 0 and "nothing is wrong" in told.out and f"by {60 * COUNT} observations of {blend}" in told.out
+    blend, pinholes = flight
+    formats.save(pinholes, tmp_path / "transforms.json", "transforms")
+    status, verdict = audited(tmp_path, blend, capsys)
+    assert status == 0 and "nothing is wrong" in verdict.out and f"by {60 * COUNT} observations of {blend}" in verdict.out
 
 
 def test_a_mistake_is_named_by_the_blend_alone(flight, tmp_path, capsys):
-    blend, found = flight
+    blend, pinholes = flight
     whole = [
-        dataclasses.replace(camera, pinhole=camera.pinhole.resized(640, 360)) for camera in found
+        dataclasses.replace(camera, pinhole=camera.pinhole.resized(640, 360)) for camera in pinholes
     ]  # the resolution percentage was ignored
     formats.save(whole, tmp_path / "transforms.json", "transforms")
-    status, told = audited(tmp_path, blend, capsys)
-    assert status == 1 and "resolution percentage: times 1/2 is right" in told.out
-    document = json.loads(formats.write(found, "transforms"))
+    status, verdict = audited(tmp_path, blend, capsys)
+    assert status == 1 and "resolution percentage: times 1/2 is right" in verdict.out
+    document = json.loads(formats.write(pinholes, "transforms"))
     for frame in document["frames"]:
         frame["transform_matrix"] = np.linalg.inv(frame["transform_matrix"]).tolist()
     (tmp_path / "transforms.json").write_text(json.dumps(document))
-    status, told = audited(tmp_path, blend, capsys)
-    assert status == 1 and "world to camera" in told.out
+    status, verdict = audited(tmp_path, blend, capsys)
+    assert status == 1 and "world to camera" in verdict.out
 
 
 def test_pictures_that_are_called_as_cameras_are_theirs(scene, add_camera, tmp_path):
@@ -69,8 +69,8 @@ def test_pictures_that_are_called_as_cameras_are_theirs(scene, add_camera, tmp_p
     bpy.context.view_layer.update()
     wanted = {each.name: cameras.read(each, scene) for each in scene.objects}
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
-    found = dataset_cameras.of_pictures(["right", "none", "left"], tmp_path / "a.blend")
-    assert {camera.name: camera.pinhole for camera in found} == {name: wanted[name] for name in ("right", "left")}
+    read_cameras = dataset_cameras.of_pictures(["right", "none", "left"], tmp_path / "a.blend")
+    assert {camera.name: camera.pinhole for camera in read_cameras} == {name: wanted[name] for name in ("right", "left")}
 
 
 def test_a_blend_that_does_not_tell_which_camera_took_a_picture_is_refused(camera_object, tmp_path):
@@ -82,11 +82,11 @@ def test_a_blend_that_does_not_tell_which_camera_took_a_picture_is_refused(camer
 
 
 def test_an_animated_camera_is_written_for_another_program_without_rendering(flight, tmp_path, capsys):
-    blend, found = flight
+    blend, pinholes = flight
     words = ["camera", str(blend), "--frames", f"1..{COUNT}", "--to", "colmap", "--out", str(tmp_path / "path")]
     assert cli.main(words) == 0 and f"{COUNT} cameras" in capsys.readouterr().out
     written = formats.read(tmp_path / "path")
-    assert [camera.pinhole for camera in written] == [camera.pinhole for camera in found]
+    assert [camera.pinhole for camera in written] == [camera.pinhole for camera in pinholes]
     assert len({camera.name for camera in written}) == COUNT
 
 
@@ -102,7 +102,7 @@ def test_all_cameras_of_a_blend_are_listed_and_one_that_is_not_there_is_told(fli
 
 
 def test_file_export_writes_each_frame_and_leaves_the_scene_at_its_own(flight, tmp_path):
-    _, found = flight
+    _, pinholes = flight
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end, scene.render.resolution_percentage = 2, COUNT, 100
     scene.frame_set(3, subframe=0.25)
@@ -110,5 +110,5 @@ def test_file_export_writes_each_frame_and_leaves_the_scene_at_its_own(flight, t
     assert bpy.ops.viewcam.export_cameras(filepath=str(path), format="transforms", which="FRAMES") == {"FINISHED"}
     assert (scene.frame_current, scene.frame_subframe) == (3, 0.25)
     written = formats.read(path)
-    assert [camera.pinhole.eye for camera in written] == [camera.pinhole.eye for camera in found[1:]]
+    assert [camera.pinhole.eye for camera in written] == [camera.pinhole.eye for camera in pinholes[1:]]
     assert all((camera.pinhole.width, camera.pinhole.height) == (640, 360) for camera in written)

@@ -242,9 +242,9 @@ def test_saving_and_opening_keep_the_roll_and_where_it_came_from(held_camera, tm
     held_camera.virtual_pinhole.eye = over_the_top(2)
     expected = held_camera.virtual_pinhole.held_roll, axes(held_camera).tolist()
     bpy.ops.wm.open_mainfile(filepath=path)
-    found = bpy.data.objects["Camera"]
-    found.virtual_pinhole.eye = over_the_top(2)
-    assert (found.virtual_pinhole.held_roll, axes(found).tolist()) == expected
+    camera_object = bpy.data.objects["Camera"]
+    camera_object.virtual_pinhole.eye = over_the_top(2)
+    assert (camera_object.virtual_pinhole.held_roll, axes(camera_object).tolist()) == expected
     assert abs(expected[0]) > 3
 
 
@@ -264,10 +264,10 @@ def test_a_library_override_holds_and_keeps_its_roll(held_camera, tmp_path, over
     assert abs(abs(roll) - math.pi) <= 2.0**-22
     bpy.ops.wm.save_as_mainfile(filepath=shot)
     bpy.ops.wm.open_mainfile(filepath=shot)
-    found = next(item for item in bpy.data.objects if item.override_library)
-    assert (found.virtual_pinhole.pole, found.virtual_pinhole.held_roll) == ("HOLD", roll)
-    np.testing.assert_array_equal(axes(found), before)
-    assert cameras.check(found, cameras.stated(found, bpy.context.scene), bpy.context.scene) == []
+    camera_object = next(item for item in bpy.data.objects if item.override_library)
+    assert (camera_object.virtual_pinhole.pole, camera_object.virtual_pinhole.held_roll) == ("HOLD", roll)
+    np.testing.assert_array_equal(axes(camera_object), before)
+    assert cameras.check(camera_object, cameras.stated(camera_object, bpy.context.scene), bpy.context.scene) == []
 
 
 def test_a_check_at_another_size_sees_the_held_camera_and_leaves_it_as_it_was(held_camera, scene, both_sides, over_the_top):
@@ -277,9 +277,9 @@ def test_a_check_at_another_size_sees_the_held_camera_and_leaves_it_as_it_was(he
     group.held_roll = 1.0
     group.when_set = group.when_set.replace("[", "[ ")  # as nobody but this test would write it
     expected, before = cameras.stated(held_camera, scene).basis(), (group.held_roll, group.when_set, axes(held_camera).tolist())
-    found = both_sides(width=120, height=90)
-    np.testing.assert_array_equal(found.exported.stated_camera.basis(), expected)
-    found.check()
+    comparison = both_sides(width=120, height=90)
+    np.testing.assert_array_equal(comparison.exported.stated_camera.basis(), expected)
+    comparison.check()
     assert (group.held_roll, group.when_set, axes(held_camera).tolist()) == before
 
 
@@ -532,9 +532,9 @@ def test_motion_blur_sees_the_held_camera_at_its_sub_frames(looping_camera, scen
 
 def test_what_cycles_is_compared_with_is_the_held_camera(looping_camera, scene, both_sides):
     bpy.ops.mesh.primitive_monkey_add(size=8)
-    found = both_sides(frame=37)
-    assert found.exported.stated_camera.basis()[1][2] < -0.2  # upside down
-    found.check()
+    comparison = both_sides(frame=37)
+    assert comparison.exported.stated_camera.basis()[1][2] < -0.2  # upside down
+    comparison.check()
 
 
 def test_a_frame_change_stays_fast_after_ten_thousand_frames(held_camera, scene):

@@ -68,10 +68,10 @@ def warnings_of(camera_object, scene):
 def use(camera_object, scene, capfd):
     """Everything that an artist may do next. Returns what the panel says first."""
     bpy.context.view_layer.update()
-    said, rows = warnings_of(camera_object, scene), panel.shown(camera_object, scene)
-    for sentence in said:
+    messages, rows = warnings_of(camera_object, scene), panel.readouts_of(camera_object, scene)
+    for sentence in messages:
         assert_sentence(sentence)
-    assert said or not any("nan" in text for row in rows for text in (*row.shown, row.exact)), rows
+    assert messages or not any("nan" in text for row in rows for text in (*row.texts, row.exact)), rows
     operate(bpy.ops.viewcam.apply_camera, camera_object)
     scene.frame_set(scene.frame_current + 1)
     operate(bpy.ops.viewcam.adopt_camera, camera_object)
@@ -81,7 +81,7 @@ def use(camera_object, scene, capfd):
     warnings_of(camera_object, scene)
     printed = "".join(capfd.readouterr())
     assert "Traceback" not in printed and "RuntimeWarning" not in printed, printed
-    return said
+    return messages
 
 
 @pytest.mark.parametrize("pole", ["CANONICAL", "HOLD"])
@@ -92,10 +92,10 @@ def test_a_hostile_value_never_makes_a_camera_of_nans(posed_camera, scene, capfd
     group.pole = pole
     for values in ((value, 1.0, 2.0), (value,) * 3) if name in ("eye", "look_at", "up") else (value,):
         setattr(group, name, values)
-        said = use(posed_camera, scene, capfd)
+        messages = use(posed_camera, scene, capfd)
         assert np.isfinite(numbers_of(posed_camera)).all(), numbers_of(posed_camera)
         if math.isnan(value) and (name != "held_roll" or pole == "HOLD") and name != "hold_within":
-            assert any("finite" in sentence for sentence in said), said
+            assert any("finite" in sentence for sentence in messages), messages
 
 
 @pytest.mark.parametrize("pole", ["CANONICAL", "HOLD"])
@@ -249,14 +249,14 @@ def test_a_hostile_blender_camera_is_read_or_refused_in_a_sentence(posed_camera,
         setter(posed_camera, parent, value)
         bpy.context.view_layer.update()
         try:
-            found = cameras.read(posed_camera, scene)
+            pinhole = cameras.read(posed_camera, scene)
         except InputError as error:
             assert ": " in str(error) and "\n" not in str(error), error
             if math.isnan(value):
                 assert "not finite" in str(error) or "nan" in str(error), error
         else:
             # Nothing has been lost on the way: Pinhole refuses what is not finite.
-            assert np.isfinite(np.concatenate(found.basis())).all()
+            assert np.isfinite(np.concatenate(pinhole.basis())).all()
         use(posed_camera, scene, capfd)
 
 

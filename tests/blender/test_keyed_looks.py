@@ -56,8 +56,8 @@ def test_a_render_has_the_keyed_lens(posed_camera, scene, name):
     first, last = LENSES[name]
     key(posed_camera.virtual_pinhole, name, first, last)
     scene.frame_set(6)
-    found = depsgraph.visit(scene, lambda graph: cameras.stated(posed_camera.evaluated_get(graph), scene).distance[0])
-    assert found * 36 / 1920 == pytest.approx(focal_length_of(name, (first + last) / 2), rel=1e-6)
+    pinhole = depsgraph.visit(scene, lambda graph: cameras.stated(posed_camera.evaluated_get(graph), scene).distance[0])
+    assert pinhole * 36 / 1920 == pytest.approx(focal_length_of(name, (first + last) / 2), rel=1e-6)
 
 
 def test_a_curve_keeps_its_meaning_whatever_unit_is_shown(posed_camera, scene):

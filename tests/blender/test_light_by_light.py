@@ -41,7 +41,7 @@ def stage(fresh_blender, scene, camera_object, make_material, add_lamp, read_pas
         boxes.append(bpy.context.object)
 
     def compare(light, samples=1, pictures=1, is_turned=True):
-        ours, paths = [], []
+        traced, paths = [], []
         for number in range(SCENES):
             rng = np.random.default_rng(number)
             for box in boxes:
@@ -49,13 +49,13 @@ def stage(fresh_blender, scene, camera_object, make_material, add_lamp, read_pas
                 box.rotation_euler = rng.uniform(-3, 3, 3) * is_turned
             added = light(rng)
             bpy.context.view_layer.update()
-            some = [tmp_path / f"{number}-{picture}.exr" for picture in range(pictures)]
-            exported = jobs.both_sides(Job(level="direct", samples=samples, seed=number), some)
-            ours.append((exported, render(exported, "direct", samples, seed=number, threads=1)))
-            paths += some
+            batch = [tmp_path / f"{number}-{picture}.exr" for picture in range(pictures)]
+            exported = jobs.both_sides(Job(level="direct", samples=samples, seed=number), batch)
+            traced.append((exported, render(exported, "direct", samples, seed=number, threads=1)))
+            paths += batch
             bpy.data.objects.remove(added)
         passes = read_passes(paths)
-        return [(*own, passes[first * pictures : (first + 1) * pictures]) for first, own in enumerate(ours)]
+        return [(*own, passes[first * pictures : (first + 1) * pictures]) for first, own in enumerate(traced)]
 
     return compare
 
@@ -71,13 +71,13 @@ def relative_errors(pairs):
     Without what gets less than a tenth of the most in its picture: where light grazes, the rounding of Cycles' normals counts.
     """
     errors, alone, lit = [], 0, 0
-    for _, ours, (theirs,) in pairs:
-        ours, theirs = (np.asarray(passes["Combined"][..., :3], np.float64) for passes in (ours, theirs))
-        both = (ours > 0) & (theirs > 0)
-        alone += int(((ours > 0) != (theirs > 0)).any(axis=-1).sum())
+    for _, traced, (cycles,) in pairs:
+        traced, cycles = (np.asarray(passes["Combined"][..., :3], np.float64) for passes in (traced, cycles))
+        both = (traced > 0) & (cycles > 0)
+        alone += int(((traced > 0) != (cycles > 0)).any(axis=-1).sum())
         lit += int(both.any(axis=-1).sum())
-        bright = theirs > theirs.max(axis=(0, 1)) / 10
-        errors.append(np.abs(ours[both & bright] / theirs[both & bright] - 1))
+        bright = cycles > cycles.max(axis=(0, 1)) / 10
+        errors.append(np.abs(traced[both & bright] / cycles[both & bright] - 1))
     assert lit > 2000, f"only {lit} pixels of {SCENES} pictures are lit"
     return np.concatenate(errors), alone
 
@@ -210,8 +210,8 @@ def test_a_picture_on_a_lamp_that_is_a_little_aside_is_told(stage, add_lamp, mon
         return lamp
 
     monkeypatch.setattr(native, "_described_node", described)
-    told = sum(not same_within_noise(*pair)[0] for pair in stage(light, 64, 4))
-    assert told > SCENES / 2, f"only {told} of {SCENES} pictures are found to be wrong"
+    failures = sum(not same_within_noise(*pair)[0] for pair in stage(light, 64, 4))
+    assert failures > SCENES / 2, f"only {failures} of {SCENES} pictures are found to be wrong"
 
 
 def test_a_sun_with_an_angle(stage, add_lamp):
@@ -221,10 +221,10 @@ def test_a_sun_with_an_angle(stage, add_lamp):
     assert_same_within_noise(stage(light, 64, 4))
 
 
-def same_within_noise(exported, ours, theirs):
+def same_within_noise(exported, traced, cycles):
     """True if light is the same but for noise, and the lines that say so."""
-    images = [Image(passes) for passes in theirs]
-    comparison = radiance.compare(Image(ours, {"samples": "64"}), images, exported.camera, test_samples=16)
+    images = [Image(passes) for passes in cycles]
+    comparison = radiance.compare(Image(traced, {"samples": "64"}), images, exported.camera, test_samples=16)
     return all(row.ok for row in comparison.rows if row.name != "Diffuse Color"), "\n".join(comparison.lines())
 
 
@@ -237,16 +237,16 @@ def assert_same_within_noise(pairs):
 def test_one_percent_more_light_is_told(stage, add_lamp):
     pairs = stage(lambda rng: add_lamp("AREA", (0, 0, 2), energy=200, size=2), 64, 4)
     brighter = [
-        (exported, dict(ours, Combined=ours["Combined"] * np.float32(1.01)), theirs) for exported, ours, theirs in pairs
+        (exported, dict(traced, Combined=traced["Combined"] * np.float32(1.01)), cycles) for exported, traced, cycles in pairs
     ]
-    told = sum(not same_within_noise(*pair)[0] for pair in brighter)
-    assert told == SCENES, f"only {told} of {SCENES} pictures are found to be wrong"
+    failures = sum(not same_within_noise(*pair)[0] for pair in brighter)
+    assert failures == SCENES, f"only {failures} of {SCENES} pictures are found to be wrong"
 
 
 def test_a_thousandth_more_light_of_one_sample_is_told(stage, add_lamp):
     """A thousandth more light is a thousand times more than Cycles' rounding."""
     pairs = stage(lambda rng: add_lamp("SUN", rotation=turned(rng, 0.9), energy=3, angle=0), is_turned=False)
-    for _, ours, _ in pairs:
-        ours["Combined"] *= np.float32(1.001)
+    for _, traced, _ in pairs:
+        traced["Combined"] *= np.float32(1.001)
     with pytest.raises(AssertionError, match="median"):
         assert_within(pairs, 7e-8, 1.9e-7)

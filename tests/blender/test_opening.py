@@ -36,16 +36,16 @@ def shots(**more):
     return render
 
 
-def told(ledger):
+def reasons(ledger):
     return [entry.reason for entry in ledger if entry.object.endswith(".blend")]
 
 
 COMMANDS = {
     "batch": shots(),
     "batch of VIEWCAM": shots(engine="VIEWCAM", level="geometry"),
-    "export": lambda blend, out, trust: told(jobs.export(Job(blend=blend, frame=2, trust=trust)).ledger),
-    "cycles": lambda blend, out, trust: told(jobs.cycles(Job(blend=blend, frame=2, trust=trust), out / "a.exr")),
-    "check": lambda blend, out, trust: told(
+    "export": lambda blend, out, trust: reasons(jobs.export(Job(blend=blend, frame=2, trust=trust)).ledger),
+    "cycles": lambda blend, out, trust: reasons(jobs.cycles(Job(blend=blend, frame=2, trust=trust), out / "a.exr")),
+    "check": lambda blend, out, trust: reasons(
         jobs.both_sides(Job(blend=blend, frame=2, trust=trust, level="direct", samples=1), [out / "b.exr"]).ledger
     ),
     "audit": lambda blend, out, trust: list(dataset_cameras.of_pictures(["2"], blend, trust)[0].notes),
@@ -221,11 +221,11 @@ def hostile_file(way, folder):
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))  # caches on disk are those of a file that has a name
     way(scene, cube, marks)
     bpy.ops.wm.save_mainfile()
-    remove(made(folder, {blend, marks, blend.parent, folder / "image.png"}))
+    remove(new_paths(folder, {blend, marks, blend.parent, folder / "image.png"}))
     return blend, marks
 
 
-def made(folder, known):
+def new_paths(folder, known):
     """The paths below a folder that were not known."""
     return sorted(path for path in folder.rglob("*") if path not in known and path.suffix != ".blend1")
 
@@ -241,7 +241,7 @@ def left_by(blend, trust, out):
     known = set(folder.rglob("*"))
     for name, command in COMMANDS.items():
         command(blend, out, trust)
-        new = made(folder, known)
+        new = new_paths(folder, known)
         left[name] = [str(path.relative_to(folder)) for path in new]
         remove(new)
     return left
@@ -411,11 +411,11 @@ def test_a_shader_of_the_file_shades_nothing_unless_it_is_trusted(fresh_blender,
     (tmp_path / "out").mkdir()
     red = {}
     for trust in (True, False):
-        told = COMMANDS["batch"](blend, tmp_path / "out", trust)
+        entries = COMMANDS["batch"](blend, tmp_path / "out", trust)
         image = bpy.data.images.load(str(tmp_path / "out" / "shot.png"), check_existing=False)
         middle = tuple(image.pixels)[4 * (8 * 16 + 8) :][:3]
         red[trust] = middle == (1, 0, 0)
-        assert any("Open Shading Language is off" in sentence for sentence in told) is not trust, told
+        assert any("Open Shading Language is off" in sentence for sentence in entries) is not trust, entries
         bpy.data.images.remove(image)
     assert red == {True: True, False: False}
 

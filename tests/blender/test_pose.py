@@ -176,8 +176,8 @@ def test_no_number_that_is_nothing_but_rounding_is_shown_as_minus_zero(camera_ob
     pinhole = Pinhole((7, -1e-9, -0.0), (0, 3e-8, -1e-10), (-4.4e-8, 0, 1), 1000.0, 1920, 1080)
     cameras.apply(camera_object, pinhole, scene)
     group = camera_object.virtual_pinhole
-    shown = [*group.eye, *group.up]
-    assert [math.copysign(1, number) for number in shown if number == 0] == [1, 1, 1, 1]
+    numbers = [*group.eye, *group.up]
+    assert [math.copysign(1, number) for number in numbers if number == 0] == [1, 1, 1, 1]
     assert cameras.stated(camera_object, scene) == pinhole
     camera_object.rotation_euler = (math.pi / 2, 0, math.pi)
     bpy.context.view_layer.update()

@@ -309,10 +309,10 @@ def test_saving_and_opening_keep_values_and_camera(posed_camera, scene, tmp_path
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.wm.open_mainfile(filepath=path)
-    found, scene = bpy.data.objects["Camera"], bpy.context.scene
-    assert (pose(found), found.virtual_pinhole.numbers()) == before
-    cameras.apply(found, Pinhole((1, 2, 4), (0, 0, 0), (0, 0, 1), 1000.0, 1920, 1080), scene)
-    assert found.data.sensor_width == 36  # the sensor that grew before saving comes back
+    camera_object, scene = bpy.data.objects["Camera"], bpy.context.scene
+    assert (pose(camera_object), camera_object.virtual_pinhole.numbers()) == before
+    cameras.apply(camera_object, Pinhole((1, 2, 4), (0, 0, 0), (0, 0, 1), 1000.0, 1920, 1080), scene)
+    assert camera_object.data.sensor_width == 36  # the sensor that grew before saving comes back
 
 
 def test_renaming_changes_nothing(posed_camera, scene):
@@ -361,11 +361,11 @@ def test_a_library_override_keeps_its_values(posed_camera, tmp_path):
     shot = str(tmp_path / "shot.blend")
     bpy.ops.wm.save_as_mainfile(filepath=shot)
     bpy.ops.wm.open_mainfile(filepath=shot)
-    found = next(item for item in bpy.data.objects if item.override_library)
-    assert tuple(found.virtual_pinhole.eye) == (0, -9, 0)
-    assert tuple(found.location) == (0, -9, 0)
-    group = found.virtual_pinhole
-    assert (group.roll, group.numbers(), found.data.lens) == before and group.keeps == "FIELD_OF_VIEW"
+    camera_object = next(item for item in bpy.data.objects if item.override_library)
+    assert tuple(camera_object.virtual_pinhole.eye) == (0, -9, 0)
+    assert tuple(camera_object.location) == (0, -9, 0)
+    group = camera_object.virtual_pinhole
+    assert (group.roll, group.numbers(), camera_object.data.lens) == before and group.keeps == "FIELD_OF_VIEW"
 
 
 def test_the_properties_work_in_edit_mode_of_another_object(posed_camera, scene):
@@ -391,8 +391,8 @@ def test_the_lens_is_said_in_any_unit_and_is_one_distance(posed_camera, scene, s
         assert group.field_of_view == pytest.approx(2 * math.atan(side / 2 / (2 * group.distance)), rel=1e-6)
         group.field_of_view = math.radians(60)
         assert 2 * group.distance == pytest.approx(side / 2 / math.tan(math.radians(30)), rel=1e-6)
-        found = cameras.read(posed_camera, scene).distance[0]
-        assert found == pytest.approx(2 * group.distance, rel=1e-6)
+        pinhole = cameras.read(posed_camera, scene).distance[0]
+        assert pinhole == pytest.approx(2 * group.distance, rel=1e-6)
     before = group.distance
     group.field_of_view = math.radians(200)
     assert group.distance == before, "no lens has this angle"

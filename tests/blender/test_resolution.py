@@ -24,8 +24,8 @@ def change(scene, picture):
 
 
 def warnings(camera_object, scene):
-    found = cameras.check(camera_object, cameras.stated(camera_object, scene), scene)
-    return [finding.sentence for finding in found]
+    pinhole = cameras.check(camera_object, cameras.stated(camera_object, scene), scene)
+    return [finding.sentence for finding in pinhole]
 
 
 @pytest.fixture
@@ -156,9 +156,9 @@ def test_undo_and_redo_of_a_resolution_bring_the_camera_along(posed_camera, fres
 def test_a_picture_that_a_script_renders_at_once_is_of_the_new_resolution(posed_camera, scene, render_positions, picture_error):
     scene.render.resolution_x, scene.render.resolution_y = 48, 24
     positions = render_positions()
-    found = cameras.stated(posed_camera, scene)
-    assert (found.width, found.height) == positions.shape[1::-1]
-    error, tolerance = picture_error(found, positions)
+    pinhole = cameras.stated(posed_camera, scene)
+    assert (pinhole.width, pinhole.height) == positions.shape[1::-1]
+    error, tolerance = picture_error(pinhole, positions)
     assert error <= tolerance, f"{error:.1e} px, and {tolerance:.1e} are rounding"
 
 
@@ -271,13 +271,13 @@ def plain(add_camera, scene):
 @pytest.fixture
 def square(plain, add_camera, scene):
     """A camera with one, which is not the scene's."""
-    found = add_camera("Square")
+    square_camera = add_camera("Square")
     scene.camera = plain
-    found.virtual_pinhole_picture.use = True
+    square_camera.virtual_pinhole_picture.use = True
     for name, value in SQUARE.items():
-        setattr(found.virtual_pinhole_picture, name, value)
+        setattr(square_camera.virtual_pinhole_picture, name, value)
     bpy.context.view_layer.update()
-    return found
+    return square_camera
 
 
 def activate(camera_object, scene):
@@ -324,10 +324,10 @@ def test_a_duplicate_of_the_active_camera_has_its_picture_as_it_is_now_and_then_
 
 def test_a_camera_at_rest_is_not_written_to(plain, square, scene):
     activate(square, scene)
-    told = []
+    result = []
 
     def note(_scene, depsgraph):
-        told.extend(update.id.name for update in depsgraph.updates)
+        result.extend(update.id.name for update in depsgraph.updates)
 
     bpy.app.handlers.depsgraph_update_post.append(note)
     try:
@@ -338,7 +338,7 @@ def test_a_camera_at_rest_is_not_written_to(plain, square, scene):
         bpy.context.view_layer.update()
     finally:
         bpy.app.handlers.depsgraph_update_post.remove(note)
-    assert "Square" not in told and "Plain" not in told, told
+    assert "Square" not in result and "Plain" not in result, result
 
 
 def test_from_one_own_picture_to_another_and_back_to_the_scene_s(plain, square, add_camera, scene):

@@ -134,7 +134,7 @@ def test_what_an_engine_is_given_is_the_same_to_the_bit_before_and_after_ticking
 
 def again(scene):
     """The frames that were rendered last, as render_positions reads them."""
-    found = {}
+    result = {}
     for frame in range(scene.frame_start, scene.frame_end + 1, scene.frame_step):
         image = bpy.data.images.load(f"{scene.render.filepath}{frame:04d}.exr")
         width, height = image.size
@@ -142,8 +142,8 @@ def again(scene):
         image.colorspace_settings.name = "Non-Color"
         image.pixels.foreach_get(pixels)
         bpy.data.images.remove(image)
-        found[frame] = pixels.reshape(height, width, 4)[..., :3]
-    return found
+        result[frame] = pixels.reshape(height, width, 4)[..., :3]
+    return result
 
 
 @pytest.mark.parametrize("is_ticked", [True, False])
@@ -289,8 +289,8 @@ def test_an_eye_on_a_keyed_location_and_a_look_at_target_go_together(rigged, sce
     camera_object.virtual_pinhole.look_at_target = empty("Target", (0, 1, 2))
     for frame, (matrix, lens) in zip(FRAMES, before, strict=True):
         scene.frame_set(frame)
-        found, now = stands(camera_object)
-        assert [row[3] for row in found] == [row[3] for row in matrix] and now == lens, f"frame {frame}"
+        eye, now = stands(camera_object)
+        assert [row[3] for row in eye] == [row[3] for row in matrix] and now == lens, f"frame {frame}"
         column, row, _ = cameras.read(camera_object, scene).project(np.array([0, 1, 2.0]))
         assert math.dist((column, row), (960, 540)) < 2e-3, f"frame {frame}"
         assert differences(camera_object, scene) == {}, f"frame {frame}"

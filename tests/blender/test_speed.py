@@ -381,12 +381,12 @@ def multiple_of_keyed(keyed_cameras, scene):
     for number, each in enumerate(keyed_cameras):
         key_eye_and_look_at(each, number)
     scene.frame_set(1)
-    ours = seconds_each(lambda i: scene.frame_set(2 + i), 30)
+    keyed = seconds_each(lambda i: scene.frame_set(2 + i), 30)
     for each in keyed_cameras:
         each.animation_data_clear()
         key_the_pose(each)
     scene.frame_set(1)
-    return ours / seconds_each(lambda i: scene.frame_set(2 + i), 30)
+    return keyed / seconds_each(lambda i: scene.frame_set(2 + i), 30)
 
 
 def test_two_hundred_keyed_cameras_are_carried_in_one_pass(two_hundred_cameras, scene):

@@ -124,10 +124,12 @@ def test_without_an_add_on_there_are_the_defaults():
 
 def test_the_defaults_are_those_that_blender_shows():
     """One of each: what a person sees before the first change is what a script without an add-on gets."""
-    shown = preferences.VIEWCAM_preferences.bl_rna.properties
+    properties = preferences.VIEWCAM_preferences.bl_rna.properties
     for name, default in vars(preferences.Defaults()).items():
-        found = shown[name].default_array if shown[name].type == "FLOAT" else shown[name].default
-        assert found == default if isinstance(default, str) else tuple(found) == pytest.approx(default, rel=2**-24), name
+        registered = properties[name].default_array if properties[name].type == "FLOAT" else properties[name].default
+        assert registered == default if isinstance(default, str) else tuple(registered) == pytest.approx(default, rel=2**-24), (
+            name
+        )
 
 
 @pytest.mark.parametrize(("name", "axis"), [("X", (1, 0, 0)), ("-Y", (0, -1, 0)), ("-Z", (0, 0, -1))])

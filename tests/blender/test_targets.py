@@ -276,9 +276,9 @@ def test_the_camera_of_another_scene_is_followed_in_a_render(
 def test_what_cycles_is_compared_with_follows_the_target(watching_camera, scene, moving_target, both_sides):
     hidden_in_renders(moving_target)
     bpy.ops.mesh.primitive_monkey_add(size=6, location=(6, 2, 3))
-    found = both_sides(frame=6)
-    assert found.exported.stated_camera.look_at == (6, 2, 3)
-    found.check()
+    comparison = both_sides(frame=6)
+    assert comparison.exported.stated_camera.look_at == (6, 2, 3)
+    comparison.check()
     assert targets.target_of(watching_camera, "look_at") == moving_target
 
 
@@ -336,8 +336,8 @@ def test_a_keyed_bone_is_followed_in_the_render(posed_camera, scene, rig):
         rig.pose.bones["Hip"].keyframe_insert("location", frame=frame)
     for frame, x in ((11, 2.0), (1, 0.0)):
         scene.frame_set(frame)
-        found = depsgraph.visit(scene, lambda graph: cameras.read(posed_camera.evaluated_get(graph), scene))
-        assert -np.array(found.basis()[2]) == pytest.approx(_unit(np.subtract((x, 0, 3), (7, -6, 5))), abs=1e-6)
+        pinhole = depsgraph.visit(scene, lambda graph: cameras.read(posed_camera.evaluated_get(graph), scene))
+        assert -np.array(pinhole.basis()[2]) == pytest.approx(_unit(np.subtract((x, 0, 3), (7, -6, 5))), abs=1e-6)
 
 
 def _unit(vector):
@@ -436,17 +436,17 @@ def test_a_vertex_group_is_followed_where_blenders_own_constraints_have_it(
     follow(posed_camera, point, patch)
     assert number_of(posed_camera, point) == pytest.approx((1, 2, 3), abs=1e-6)
     setattr(posed_camera.virtual_pinhole, f"{point}_group", "Some")
-    found = [number_of(posed_camera, point)]
-    assert found[0] == pytest.approx(where_blender_has_it(), abs=1e-6)
-    assert math.dist(found[0], (1, 2, 3)) > 0.1
+    numbers = [number_of(posed_camera, point)]
+    assert numbers[0] == pytest.approx(where_blender_has_it(), abs=1e-6)
+    assert math.dist(numbers[0], (1, 2, 3)) > 0.1
     change = deform(patch, empty)
     patch.hide_viewport = is_hidden
     for share in (0.25, 1.0):
         change(share)
         update()
-        found.append(number_of(posed_camera, point))
-        assert found[-1] == pytest.approx(where_blender_has_it(), abs=1e-6)  # sums of few numbers below 8, in float32 there
-        assert math.dist(*found[-2:]) > 1e-3, "the group has not moved, and nothing is tried"
+        numbers.append(number_of(posed_camera, point))
+        assert numbers[-1] == pytest.approx(where_blender_has_it(), abs=1e-6)  # sums of few numbers below 8, in float32 there
+        assert math.dist(*numbers[-2:]) > 1e-3, "the group has not moved, and nothing is tried"
         assert is_where_stated(posed_camera, scene)
     patch.location.x = 4
     update()
@@ -482,14 +482,14 @@ def test_a_keyed_vertex_group_is_followed_in_the_render(posed_camera, scene, pat
     for frame, share in ((1, 0.0), (11, 1.0)):
         key.value = share
         key.keyframe_insert("value", frame=frame)
-    found = {}
+    result = {}
     for frame in (11, 1):
         scene.frame_set(frame)
         at = number_of(posed_camera, "look_at")
         seen = depsgraph.visit(scene, lambda graph: cameras.read(posed_camera.evaluated_get(graph), scene))
         assert -np.array(seen.basis()[2]) == pytest.approx(_unit(np.subtract(at, (7, -6, 5))), abs=1e-6)
-        found[frame] = at
-    assert math.dist(found[1], found[11]) > 0.5
+        result[frame] = at
+    assert math.dist(result[1], result[11]) > 0.5
 
 
 @pytest.mark.parametrize("name", ["None", "Empty"])

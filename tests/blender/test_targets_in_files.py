@@ -81,9 +81,9 @@ def test_a_target_that_the_camera_moves_is_not_followed_and_the_panel_says_why(
         update()
     assert posed_camera.virtual_pinhole.numbers() == before
     assert is_where_stated(posed_camera, scene)
-    (said,) = targets.warnings(posed_camera)
+    (warning,) = targets.warnings(posed_camera)
     words = point.replace("_", "-")
-    assert said == f"The {words} target 'Target' {sentence}, and is not followed: choose another, or clear it"
+    assert warning == f"The {words} target 'Target' {sentence}, and is not followed: choose another, or clear it"
     assert capfd.readouterr().err == ""
 
 
@@ -341,10 +341,10 @@ def linked(path, name="Camera"):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     with bpy.data.libraries.load(path, link=True) as (_, names):
         names.objects = [name]
-    found = bpy.data.objects[name]
-    bpy.context.scene.collection.objects.link(found)
+    camera_object = bpy.data.objects[name]
+    bpy.context.scene.collection.objects.link(camera_object)
     update()
-    return found
+    return camera_object
 
 
 def test_a_linked_camera_follows_the_target_of_its_library(saved):

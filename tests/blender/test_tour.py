@@ -41,10 +41,10 @@ def test_every_step_does_what_it_is_for_and_is_undone_and_redone(fresh_blender):
 
 
 def test_every_picture_of_the_page_is_a_step_s_and_every_step_s_picture_is_on_the_page():
-    shown = set(re.findall(r"\(images/artists/([^)]+)\)", PAGE.read_text(encoding="utf-8")))
+    present = set(re.findall(r"\(images/artists/([^)]+)\)", PAGE.read_text(encoding="utf-8")))
     taken = [step.picture for step in tour.STEPS if step.picture]
     assert len(taken) == len(set(taken)), "two steps take one picture"
-    assert shown == set(taken)
+    assert present == set(taken)
     folder = PAGE.parent / "images" / "artists"
-    assert shown == {path.name for path in folder.iterdir()}, "docs/images/artists holds other pictures than the page shows"
-    assert sum((folder / name).stat().st_size for name in shown) < 2.5e6, "the pictures are too large for a page"
+    assert present == {path.name for path in folder.iterdir()}, "docs/images/artists holds other pictures than the page shows"
+    assert sum((folder / name).stat().st_size for name in present) < 2.5e6, "the pictures are too large for a page"

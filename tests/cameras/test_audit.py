@@ -205,13 +205,13 @@ def a_filmed_scene(seed=4, count=8):
     random = np.random.default_rng(seed)
     angle = np.arange(count) * 0.3
     eye = np.stack([5 * np.cos(angle), 5 * np.sin(angle), 2.5 + 0.1 * np.arange(count)], axis=-1)
-    found = [
+    result = [
         Pinhole(
             tuple(e), (0.1, 0.2, 0.7), (0.05, 0, 1), 150.0, 160, 100, tuple(np.array([84.0, 47.0]) + random.uniform(-1, 1, 2))
         )
         for e in eye
     ]
-    return [Camera(f"{i}", pinhole, image=f"images/{i}.png") for i, pinhole in enumerate(found)]
+    return [Camera(f"{i}", pinhole, image=f"images/{i}.png") for i, pinhole in enumerate(result)]
 
 
 BY_DEPTH = [
@@ -260,8 +260,8 @@ def test_a_focal_length_that_is_wrong_by_any_factor_is_told_with_it(tmp_path, ca
     """NeRF's data: the angle of a sensor of 36 mm for one of 24, a lens of 38 mm for one of 45."""
     true = a_filmed_scene()
     longer = [replace(c, pinhole=replace(c.pinhole, distance=tuple(d * factor for d in c.pinhole.distance))) for c in true]
-    for name, found in (("true", true), ("wrong", longer)):
-        cameras.save(found, tmp_path / f"{name}.json", "transforms")
+    for name, values in (("true", true), ("wrong", longer)):
+        cameras.save(values, tmp_path / f"{name}.json", "transforms")
     assert run("audit", tmp_path / "wrong.json", "--against", tmp_path / "true.json") == 1
     assert f"the focal length is {words}" in capsys.readouterr().out
 
@@ -279,20 +279,20 @@ def test_distances_in_place_of_depths_are_named(filmed):
 # ---- files, and bugs that others reported
 
 
-def written_model(folder, found, tracks):
+def written_model(folder, cameras_read, tracks):
     """A COLMAP model of the cameras, with the tracks in its images and points."""
-    cameras.save(found, folder, "colmap")
+    cameras.save(cameras_read, folder, "colmap")
     head, *lines = (folder / "images.txt").read_text().splitlines()
-    pictures = iter(range(len(found)))
+    pictures = iter(range(len(cameras_read)))
     out = [head]
     for line in lines:
         if line.startswith("#") or not line.strip():
             continue
         number = next(pictures)
-        mine = np.flatnonzero(tracks.which == number)
+        indices = np.flatnonzero(tracks.which == number)
         out += [
             line,
-            " ".join(f"{x!r} {y!r} {i}" for i, (x, y) in zip(mine.tolist(), tracks.places[mine].tolist(), strict=True)),
+            " ".join(f"{x!r} {y!r} {i}" for i, (x, y) in zip(indices.tolist(), tracks.places[indices].tolist(), strict=True)),
         ]
     (folder / "images.txt").write_text("\n".join(out) + "\n")
     points = [f"{i} {x!r} {y!r} {z!r} 0 0 0 0.5" for i, (x, y, z) in enumerate(tracks.points.tolist())]
@@ -305,16 +305,16 @@ def run(*words):
 
 @pytest.fixture
 def model(tmp_path):
-    found = a_filmed_scene()
-    tracks = tracks_through(found)
-    written_model(tmp_path / "model", found, tracks)
-    return found, tmp_path / "model"
+    actual = a_filmed_scene()
+    tracks = tracks_through(actual)
+    written_model(tmp_path / "model", actual, tracks)
+    return actual, tmp_path / "model"
 
 
 def test_a_right_model_is_told_to_be_right(model, capsys):
     assert run("audit", model[1]) == 0
-    said = capsys.readouterr().out
-    assert "nothing is wrong" in said and "Sure to e^" in said
+    output = capsys.readouterr().out
+    assert "nothing is wrong" in output and "Sure to e^" in output
 
 
 def test_a_binary_model_says_the_same(model, tmp_path):
@@ -345,8 +345,8 @@ def test_a_loader_that_leaves_the_principal_point_out_is_named(model, capsys):
 
 def test_depth_that_is_distance_is_named_of_files(filmed, tmp_path, capsys):
     """colmap/colmap #1768: z was taken for the distance."""
-    found, (views, maps) = a_filmed_scene(), filmed
-    document = json.loads(cameras.write(found, "transforms"))
+    actual, (views, maps) = a_filmed_scene(), filmed
+    document = json.loads(cameras.write(actual, "transforms"))
     columns, rows = np.meshgrid(np.arange(160) + 0.5, np.arange(100) + 0.5)
     for i, frame in enumerate(document["frames"]):
         frame["depth_file_path"] = f"depth{i}.npy"
@@ -361,14 +361,14 @@ def test_a_field_of_view_of_the_other_side_is_named_against_true_cameras(tmp_pat
     """KhronosGroup/glTF-Blender-IO #1125: the width's angle stood for the height's."""
     true = [replace(c, pinhole=replace(c.pinhole, principal_point=None)) for c in a_filmed_scene()]
     wrong = [replace(c, pinhole=replace(c.pinhole, distance=tuple(d * 100 / 160 for d in c.pinhole.distance))) for c in true]
-    for name, found in (("true", true), ("wrong", wrong)):
-        cameras.save(found, tmp_path / f"{name}.json", "transforms")
+    for name, values in (("true", true), ("wrong", wrong)):
+        cameras.save(values, tmp_path / f"{name}.json", "transforms")
     assert run("audit", tmp_path / "wrong.json", "--against", tmp_path / "true.json") == 1
     assert "field of view" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "sentence"),
     [
         # nerfstudio-project/nerfstudio #2255: c of OpenCV's calibration, where half a pixel is missing
         (lambda said: {"cx": said["cx"] - 0.5, "cy": said["cy"] - 0.5}, "half a pixel too small"),
@@ -376,19 +376,19 @@ def test_a_field_of_view_of_the_other_side_is_named_against_true_cameras(tmp_pat
         (lambda said: {"cx": said["cy"], "cy": said["cx"]}, "swapped"),
     ],
 )
-def test_a_principal_point_that_was_written_wrongly_in_transforms_json_is_named(tmp_path, capsys, change, told):
+def test_a_principal_point_that_was_written_wrongly_in_transforms_json_is_named(tmp_path, capsys, change, sentence):
     true = [replace(c, pinhole=replace(c.pinhole, principal_point=(70.0, 60.0))) for c in a_filmed_scene()]
     cameras.save(true, tmp_path / "true.json", "transforms")
     document = json.loads((tmp_path / "true.json").read_text())
     (tmp_path / "wrong.json").write_text(json.dumps(document | change(document)))
     assert run("audit", tmp_path / "wrong.json", "--against", tmp_path / "true.json") == 1
-    assert told in capsys.readouterr().out
+    assert sentence in capsys.readouterr().out
 
 
 def test_world_to_camera_with_opencvs_axes_in_transforms_json_is_named(tmp_path, capsys):
     """Matrices of OpenCV, written as they are."""
-    found = a_filmed_scene()
-    cameras.save(found, tmp_path / "true.json", "transforms")
+    actual = a_filmed_scene()
+    cameras.save(actual, tmp_path / "true.json", "transforms")
     document = json.loads((tmp_path / "true.json").read_text())
     for frame in document["frames"]:
         matrix = np.array(frame["transform_matrix"])
@@ -405,8 +405,8 @@ def test_without_evidence_it_says_what_to_give(tmp_path, capfd):
 
 
 def test_an_audit_takes_cameras_as_they_are_read(model):
-    found = cameras.read(model[1])
-    assert audit(found, tracks_through(found)).kind == "none"
+    cameras_read = cameras.read(model[1])
+    assert audit(cameras_read, tracks_through(cameras_read)).kind == "none"
 
 
 def head_of_a_png(width, height):
@@ -418,7 +418,7 @@ def head_of_a_png(width, height):
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "sentence"),
     [
         ("pipe.png", "no file"),
         ("large.png", "13000 × 10000"),
@@ -427,7 +427,7 @@ def head_of_a_png(width, height):
         ("huge.npy", "header"),
     ],
 )
-def test_no_depth_map_is_waited_for_or_larger_than_a_picture(tmp_path, capfd, name, told):
+def test_no_depth_map_is_waited_for_or_larger_than_a_picture(tmp_path, capfd, name, sentence):
     if name == "pipe.png" and not hasattr(os, "mkfifo"):
         pytest.skip("this system has no pipes in folders")
     pytest.importorskip("PIL")
@@ -446,8 +446,8 @@ def test_no_depth_map_is_waited_for_or_larger_than_a_picture(tmp_path, capfd, na
         whole = (tmp_path / name).read_bytes()
         (tmp_path / name).write_bytes(whole[:70] if name == "cut.npy" else whole.replace(b"(4, 4)", b"(4444444444, 4)"))
     assert run("audit", tmp_path) == 2
-    said = capfd.readouterr().err
-    assert told in said and "bug" not in said and said.count("\n") == 1
+    output = capfd.readouterr().err
+    assert sentence in output and "bug" not in output and output.count("\n") == 1
 
 
 BENT = {
@@ -462,20 +462,20 @@ BENT = {
 def test_what_is_wrong_with_a_lens_is_named_and_nothing_where_it_is_right(true):
     """The pictures were taken through one lens, and the cameras say another."""
     change, kind = BENT[true]
-    said = distortion.opencv({"k1": -0.2, "k2": 0.05, "p1": 0.004, "p2": -0.003})
+    values = distortion.opencv({"k1": -0.2, "k2": 0.05, "p1": 0.004, "p2": -0.003})
     for seed in range(20):
         random = np.random.default_rng(seed)
         views, middle = a_right_dataset(random)
-        lens = change(said)
+        lens = change(values)
         straight = points_in_pictures(random, views, middle, 0.0)
         in_plane = (straight.places - views.center[straight.which]) / views.focal[straight.which]
         taken = (in_plane if lens is None else lens.distort(in_plane)) * views.focal[straight.which] + views.center[
             straight.which
         ]
         evidence = Tracks(straight.which, taken + 0.3 * random.normal(size=taken.shape), straight.points)
-        verdict = _audited(replace(views, lenses=(said,) * len(views.eye)), evidence)
+        verdict = _audited(replace(views, lenses=(values,) * len(views.eye)), evidence)
         off = np.median(
-            np.hypot(*(taken - (said.distort(in_plane) * views.focal[straight.which] + views.center[straight.which])).T)
+            np.hypot(*(taken - (values.distort(in_plane) * views.focal[straight.which] + views.center[straight.which])).T)
         )
         if not true or off > 1:  # a telephoto shows too little of a lens to tell
             assert verdict.kind == kind, (seed, off, verdict)
@@ -509,8 +509,8 @@ def test_a_data_set_of_colmap_with_a_lens_is_right(tmp_path, capsys):
     for number, x in enumerate(where, start=1):
         seen = points + np.array([x, 0, 0])
         places = lens.distort(seen[:, :2] / seen[:, 2:]) * 600 + [320, 180]
-        shown = " ".join(f"{a!r} {b!r} {i}" for i, (a, b) in enumerate(places.tolist(), start=1))
-        images.append(f"{number} 1 0 0 0 {float(x)!r} 0 0 1 {number}.png\n{shown}\n")
+        observations = " ".join(f"{a!r} {b!r} {i}" for i, (a, b) in enumerate(places.tolist(), start=1))
+        images.append(f"{number} 1 0 0 0 {float(x)!r} 0 0 1 {number}.png\n{observations}\n")
     (tmp_path / "images.txt").write_text("".join(images))
     (tmp_path / "cameras.txt").write_text("1 SIMPLE_RADIAL 640 360 600 320 180 -0.2\n")
     lines = [f"{i} {x!r} {y!r} {z!r} 1 1 1 0 1 0" for i, (x, y, z) in enumerate(points.tolist(), start=1)]

@@ -54,14 +54,14 @@ def of_colmap(model, folder):
 def test_a_lens_of_colmap_moves_points_there_and_back_as_pycolmap_does(tmp_path, model):
     pycolmap = pytest.importorskip("pycolmap")
     camera, numbers, points = of_colmap(model, tmp_path)
-    theirs = pycolmap.Camera(model=model, width=640, height=360, params=numbers)
+    pycolmap_camera = pycolmap.Camera(model=model, width=640, height=360, params=numbers)
     (d_x, d_y), (c_x, c_yb) = camera.pinhole.distance, camera.pinhole.principal_point
-    moved = theirs.img_from_cam(np.c_[points, np.ones(len(points))])
+    moved = pycolmap_camera.img_from_cam(np.c_[points, np.ones(len(points))])
     ours = camera.lens.distort(points) * [d_x, d_y] + [c_x, 360 - c_yb]
     assert np.abs(ours - moved).max() < 1000 * ROUNDING, "pixels"
     back = camera.lens.undistort((moved - [c_x, 360 - c_yb]) / [d_x, d_y])
     assert np.abs(back - points).max() < 1e-11, "at distance 1"
-    assert np.abs(theirs.cam_from_img(moved) - back).max() < THEIR_INVERSE
+    assert np.abs(pycolmap_camera.cam_from_img(moved) - back).max() < THEIR_INVERSE
     assert not camera.lens.folds(points).any()
 
 
@@ -175,10 +175,10 @@ def test_a_lens_that_is_written_for_colmap_is_the_same_to_pycolmap(tmp_path, mod
     (back,) = cameras.read(tmp_path / "out")
     assert back.lens == camera.lens and back.pinhole == camera.pinhole
     (tmp_path / "out" / "points3D.txt").touch()
-    (theirs,) = pycolmap.Reconstruction(tmp_path / "out").cameras.values()
-    given = pycolmap.Camera(model=model, width=640, height=360, params=numbers)
-    seen, expected = (each.img_from_cam(np.c_[points, np.ones(len(points))]) for each in (theirs, given))
-    assert np.abs(seen - expected).max() < 1000 * ROUNDING, theirs.model
+    (pycolmap_camera,) = pycolmap.Reconstruction(tmp_path / "out").cameras.values()
+    written = pycolmap.Camera(model=model, width=640, height=360, params=numbers)
+    seen, expected = (each.img_from_cam(np.c_[points, np.ones(len(points))]) for each in (pycolmap_camera, written))
+    assert np.abs(seen - expected).max() < 1000 * ROUNDING, pycolmap_camera.model
 
 
 @pytest.mark.parametrize("model", ["SIMPLE_RADIAL", "OPENCV", "OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE"])

@@ -109,9 +109,9 @@ def read_or_refused(given_, options=GIVEN):
 def test_json_with_anything_in_place_of_anything_is_read_or_refused(index, data):
     document = copy.deepcopy(documents()[index])
     for _ in range(data.draw(st.integers(1, 2))):
-        if not (found := [path for path in places(document) if path]):
+        if not (result := [path for path in places(document) if path]):
             break
-        *path, last = data.draw(st.sampled_from(found))
+        *path, last = data.draw(st.sampled_from(result))
         holder = document
         for key in path:
             holder = holder[key]
@@ -125,9 +125,9 @@ def test_json_with_anything_in_place_of_anything_is_read_or_refused(index, data)
 
 def texts():
     known = files.Known("plain")
-    one = [camera("plain")]
+    single = [camera("plain")]
     return [
-        *(cameras.write(one, name) for name in ("transforms", "opencv", "ros", "bop", "gltf")),
+        *(cameras.write(single, name) for name in ("transforms", "opencv", "ros", "bop", "gltf")),
         files.metashape(known),
         "# Bundle file v0.3\n1 0\n600 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 0\n",
         "1 1 2 3 0 0 0 1\n2 1 2 3 0 0 0 1\n",
@@ -152,10 +152,10 @@ def test_a_damaged_text_is_read_or_refused(index, data):
 
 
 def binaries(folder):
-    one = [camera("plain"), camera("shifted")]
-    cameras.save(one, folder, "colmap_binary")
+    singles = [camera("plain"), camera("shifted")]
+    cameras.save(singles, folder, "colmap_binary")
     state = json.dumps({"cameraParameters": None}).encode()
-    document = cameras.write(one[:1], "gltf").encode()
+    document = cameras.write(singles[:1], "gltf").encode()
     np.save(folder / "poses_bounds.npy", np.zeros((2, 17)))
     np.savez(folder / "k.npz", K=np.eye(3), R=np.eye(3), t=np.zeros(3))
     (folder / "a.fspy").write_bytes(b"fspy" + struct.pack("<III", 1, len(state), 0) + state)
@@ -189,10 +189,10 @@ VALUES = st.fixed_dictionaries(
 @SETTINGS
 @given(values=VALUES)
 def test_whatever_values_stand_beside_the_numbers_the_numbers_are_read(form, values):
-    said = {"height": 360, **values}
-    text = re.sub(r"\{[^{}]*\"up\"[^{}]*\}", lambda _: json.dumps(said), cameras.write([camera("plain")], form))
-    (found,) = cameras.read(text, options=GIVEN)
-    assert math.dist(found.pinhole.eye, camera("plain").pinhole.eye) < 1e-14 * 64
+    document = {"height": 360, **values}
+    text = re.sub(r"\{[^{}]*\"up\"[^{}]*\}", lambda _: json.dumps(document), cameras.write([camera("plain")], form))
+    (cameras_read,) = cameras.read(text, options=GIVEN)
+    assert math.dist(cameras_read.pinhole.eye, camera("plain").pinhole.eye) < 1e-14 * 64
 
 
 @pytest.mark.parametrize("eye", [1e307, 5e307, 1.7e308])
@@ -374,8 +374,8 @@ def test_names_and_sentences_are_lines_of_characters_that_show():
     name = "a\nb\0c\x1b[2J\ud83d"
     document = json.loads(cameras.write([camera("plain")], "gltf"))
     document["nodes"][0]["name"] = name
-    (found,) = cameras.read(json.dumps(document))
-    assert found.name == r"a\nb\x00c\x1b[2J\ud83d"
+    (cameras_read,) = cameras.read(json.dumps(document))
+    assert cameras_read.name == r"a\nb\x00c\x1b[2J\ud83d"
     document["cameras"][0]["perspective"]["yfov"] = 4
     with pytest.raises(InputError) as refused:
         cameras.read(json.dumps(document))

@@ -57,9 +57,9 @@ def test_what_pycolmap_writes_we_see_through_as_it_does(tmp_path, name, binary):
     pycolmap = pytest.importorskip("pycolmap")
     cameras.save([of(name)], tmp_path, "colmap")
     model = pycolmap.Reconstruction(tmp_path)
-    theirs = tmp_path / "theirs" / "sparse" / "0"
-    theirs.mkdir(parents=True)
-    (model.write_binary if binary else model.write_text)(theirs)
+    expected = tmp_path / "theirs" / "sparse" / "0"
+    expected.mkdir(parents=True)
+    (model.write_binary if binary else model.write_text)(expected)
     (read,) = cameras.read(tmp_path / "theirs")
     same_picture(read, CAMERAS[name])
     assert read.name == name and read.size_stated
@@ -90,15 +90,15 @@ def test_opencv_and_we_see_the_same(tmp_path, name, suffix):
     judged(pinhole, seen[:, 0, 0] + 0.5, seen[:, 0, 1] + 0.5, points, unit=2.0**-51)
     assert np.abs(cv2.Rodrigues(read["rvec"])[0] - read["R"]).max() < 1e-14
 
-    theirs = tmp_path / f"theirs{suffix}"
-    storage = cv2.FileStorage(str(theirs), cv2.FILE_STORAGE_WRITE)
+    expected = tmp_path / f"theirs{suffix}"
+    storage = cv2.FileStorage(str(expected), cv2.FILE_STORAGE_WRITE)
     storage.write("image_width", pinhole.width)
     storage.write("image_height", pinhole.height)
     storage.write("K", read["camera_matrix"])
     storage.write("rvec", read["rvec"])
     storage.write("tvec", read["t"])
     storage.release()
-    (back,) = cameras.read(theirs)
+    (back,) = cameras.read(expected)
     same_picture(back, pinhole, unit=2.0**-51)
 
 
@@ -150,11 +150,11 @@ def test_ros_camera_info_as_pyyaml_reads_it_has_our_intrinsics(tmp_path, name):
     yaml = pytest.importorskip("yaml")
     pinhole = CAMERAS[name]
     cameras.save([of(name)], tmp_path / "ours.yaml", "ros")
-    said = yaml.safe_load((tmp_path / "ours.yaml").read_text())
-    k = np.array(said["camera_matrix"]["data"]).reshape(3, 3)
+    values = yaml.safe_load((tmp_path / "ours.yaml").read_text())
+    k = np.array(values["camera_matrix"]["data"]).reshape(3, 3)
     expected = np.array(axes.intrinsics(pinhole)) - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
-    assert np.array_equal(k, expected) and said["camera_name"] == name
-    (tmp_path / "theirs.yaml").write_text(yaml.safe_dump(said))
+    assert np.array_equal(k, expected) and values["camera_name"] == name
+    (tmp_path / "theirs.yaml").write_text(yaml.safe_dump(values))
     (back,) = cameras.read(tmp_path / "theirs.yaml")
     assert np.allclose(axes.intrinsics(back.pinhole), axes.intrinsics(pinhole), rtol=1e-15, atol=0)
     assert any("no pose" in note for note in back.notes)
@@ -164,10 +164,10 @@ def test_ros_camera_info_as_pyyaml_reads_it_has_our_intrinsics(tmp_path, name):
 def test_bop_projects_as_its_format_says_and_comes_back(name):
     pinhole = CAMERAS[name]
     text = cameras.write([of(name)], "bop", Options(scale=0.001))
-    said = json.loads(text)["0"]
+    record = json.loads(text)["0"]
     points = points_before(pinhole)
-    local = points * 1000 @ np.array(said["cam_R_w2c"]).reshape(3, 3).T + said["cam_t_w2c"]
-    seen = local @ np.array(said["cam_K"]).reshape(3, 3).T
+    local = points * 1000 @ np.array(record["cam_R_w2c"]).reshape(3, 3).T + record["cam_t_w2c"]
+    seen = local @ np.array(record["cam_K"]).reshape(3, 3).T
     judged(pinhole, seen[:, 0] / seen[:, 2] + 0.5, seen[:, 1] / seen[:, 2] + 0.5, points)
     (back,) = cameras.read(text, options=Options(scale=0.001, size=(pinhole.width, pinhole.height)))
     same_picture(back, pinhole)
@@ -179,10 +179,10 @@ def test_transforms_as_nerfstudios_rays_go_pass_through_our_pixels(name):
     """Its formula, in NumPy: ((column + 0.5 − cx)/fl_x, −(row + 0.5 − cy)/fl_y, −1) turned by the matrix."""
     pinhole = CAMERAS[name]
     text = cameras.write([of(name)], "transforms")
-    said = json.loads(text)
-    matrix = np.array(said["frames"][0]["transform_matrix"])
+    record = json.loads(text)
+    matrix = np.array(record["frames"][0]["transform_matrix"])
     column, row = np.array([0, 17, pinhole.width - 1]), np.array([0, 33, pinhole.height - 1])
-    local = np.c_[(column + 0.5 - said["cx"]) / said["fl_x"], -(row + 0.5 - said["cy"]) / said["fl_y"], -np.ones(3)]
+    local = np.c_[(column + 0.5 - record["cx"]) / record["fl_x"], -(row + 0.5 - record["cy"]) / record["fl_y"], -np.ones(3)]
     rays = local @ matrix[:3, :3].T
     ours = pinhole.ray_directions(column, pinhole.height - 1 - row)
     assert np.abs(rays / np.linalg.norm(rays, axis=1)[:, None] - ours).max() < 1e-14
@@ -224,11 +224,11 @@ def test_the_displacement_that_a_lens_makes_is_pycolmaps(tmp_path, model):
     straight = {"f": 600.0, "fx": 600.0, "fy": 610.0, "cx": 310.0, "cy": 190.0}
     bent = {"k": -0.05, "k1": -0.06, "k2": 0.02, "k3": 0.01, "k4": 0.03, "k5": 0.01, "k6": 0.002, "p1": 0.001, "p2": -0.002}
     numbers = [(straight | bent | {"omega": 0.7})[name] for name in cameras.FORMATS["colmap"].MODELS[model][1]]
-    theirs = pycolmap.Camera(model=model, width=640, height=360, params=numbers)
-    f_x, f_y = theirs.focal_length_x, theirs.focal_length_y
-    c_x, c_y = theirs.principal_point_x, theirs.principal_point_y
+    pycolmap_camera = pycolmap.Camera(model=model, width=640, height=360, params=numbers)
+    f_x, f_y = pycolmap_camera.focal_length_x, pycolmap_camera.focal_length_y
+    c_x, c_y = pycolmap_camera.principal_point_x, pycolmap_camera.principal_point_y
     corners = np.array([[x, y] for x in (0, 640) for y in (0, 360)], dtype=float)
-    moved = theirs.img_from_cam(np.c_[(corners - [c_x, c_y]) / [f_x, f_y], np.ones(4)])
+    moved = pycolmap_camera.img_from_cam(np.c_[(corners - [c_x, c_y]) / [f_x, f_y], np.ones(4)])
     pixels = np.hypot(*(moved - corners).T).max()
     (tmp_path / "cameras.txt").write_text(f"1 {model} 640 360 {' '.join(map(repr, numbers))}\n")
     (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n")

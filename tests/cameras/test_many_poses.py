@@ -25,9 +25,9 @@ def test_matrices_at_once_are_the_pinholes_and_the_notes_of_each():
     assert [bool(notes) for _, notes in together] == [
         name in names[:2] or pinhole.mirrored for name, pinhole in CAMERAS.items()
     ]
-    for (one, _), (other, _) in zip(together, apart, strict=True):
-        assert (one.eye, one.plane, one.mirrored) == (other.eye, other.plane, other.mirrored)
-        assert np.abs(np.array(one.axes()) - other.axes()).max() < 2e-15
+    for (first, _), (other, _) in zip(together, apart, strict=True):
+        assert (first.eye, first.plane, first.mirrored) == (other.eye, other.plane, other.mirrored)
+        assert np.abs(np.array(first.axes()) - other.axes()).max() < 2e-15
     matrices[4, :, 0] *= 2
     with pytest.raises(InputError, match=f"{names[4]} has axes of the lengths 2 by 1 by 1"):
         axes.pinholes(matrices, planes, names)
@@ -36,17 +36,17 @@ def test_matrices_at_once_are_the_pinholes_and_the_notes_of_each():
 def test_pinholes_of_arrays_are_those_of_the_constructor():
     pinholes = [dataclasses.replace(pinhole, mirrored=False) for pinhole in CAMERAS.values()]
     points = [[getattr(pinhole, name) for pinhole in pinholes] for name in ("eye", "look_at", "up")]
-    made = Pinhole.of_poses(*points, [pinhole.plane for pinhole in pinholes])
-    assert made == pinholes and [hash(each) for each in made] == [hash(each) for each in pinholes]
-    assert [each.axes() for each in made] == [each.axes() for each in pinholes]
-    assert repr(dataclasses.replace(made[0], width=7)) == repr(dataclasses.replace(pinholes[0], width=7))
+    many = Pinhole.of_poses(*points, [pinhole.plane for pinhole in pinholes])
+    assert many == pinholes and [hash(each) for each in many] == [hash(each) for each in pinholes]
+    assert [each.axes() for each in many] == [each.axes() for each in pinholes]
+    assert repr(dataclasses.replace(many[0], width=7)) == repr(dataclasses.replace(pinholes[0], width=7))
     points[0][2] = points[1][2]
     with pytest.raises(InputError, match="pose 2: "):
         Pinhole.of_poses(*points, [pinhole.plane for pinhole in pinholes])
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "sentence"),
     [
         ("3 1 2 x 0 0 0 1", "line 32 of"),
         ("3 1 2 3 0 0 0", "line 32 of .* has 7 numbers and others have 8"),
@@ -55,9 +55,9 @@ def test_pinholes_of_arrays_are_those_of_the_constructor():
         ("3 1 2 3 0 0 1 1", "quaternion of pose 30 has the length 1.41421"),
     ],
 )
-def test_a_wrong_line_of_a_trajectory_is_named(tmp_path, line, told):
+def test_a_wrong_line_of_a_trajectory_is_named(tmp_path, line, sentence):
     path = tmp_path / "groundtruth.txt"
     right = "".join(f"{second} 1 2 3 0 0 0 1\n" for second in range(30))  # by more lines than it is recognized by
     path.write_text(f"# timestamp tx ty tz qx qy qz qw\n{right}{line}\n")
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=sentence):
         cameras.read(path, format="trajectories", options=Options(base=PLAIN))

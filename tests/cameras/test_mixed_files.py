@@ -135,25 +135,25 @@ MIXED = (
 
 
 def given(make, folder) -> Path | str:
-    made = make(folder) if make in (colmap_binary, realitycapture) else make()
-    if isinstance(made, dict):
-        for name, text in made.items():
+    contents = make(folder) if make in (colmap_binary, realitycapture) else make()
+    if isinstance(contents, dict):
+        for name, text in contents.items():
             (folder / name).write_text(text)
         return folder
-    return made
+    return contents
 
 
 @pytest.mark.parametrize("make", MIXED)
 def test_one_camera_that_is_no_pinhole_keeps_none_of_the_others_back(tmp_path, make):
-    found = cameras.read(given(make, tmp_path), options=GIVEN)
-    assert [camera.name for camera in found] == ["good"]
-    (note,) = (note for note in found[0].notes if note.startswith("Left out"))
+    cameras_read = cameras.read(given(make, tmp_path), options=GIVEN)
+    assert [camera.name for camera in cameras_read] == ["good"]
+    (note,) = (note for note in cameras_read[0].notes if note.startswith("Left out"))
     assert re.search("bad", note) and re.search("pinhole", note), note
-    assert cameras.choose(found, "good") is found[0]
+    assert cameras.choose(cameras_read, "good") is cameras_read[0]
     with pytest.raises(InputError, match="pinhole"):  # and not: there is no such camera
-        cameras.choose(found, "bad")
+        cameras.choose(cameras_read, "bad")
     with pytest.raises(InputError, match="name one of 'good'"):
-        cameras.choose(found, "nobody")
+        cameras.choose(cameras_read, "nobody")
 
 
 def test_where_all_are_no_pinholes_the_first_is_named():
@@ -174,11 +174,11 @@ def test_a_camera_that_is_damaged_is_no_other_kind_of_camera_and_refuses_the_fil
 
 def test_a_hundred_panoramas_are_one_note():
     images = "".join(f"{i} 1 0 0 0 0 0 4 {min(i, 2)} p{i}.png\n\n" for i in range(1, 101))
-    found = cameras.FORMATS["colmap"]
+    actual = cameras.FORMATS["colmap"]
     texts = colmap() | {"images.txt": images}
     from viewcam_addon.cameras.source import Source
 
-    (camera,) = found.read(Source(texts), GIVEN)
+    (camera,) = actual.read(Source(texts), GIVEN)
     assert len(camera.notes) == 1 and len(camera.notes[0]) < 300 and len(camera.left_out) == 99
 
 

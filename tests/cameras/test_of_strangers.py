@@ -38,11 +38,11 @@ def read(text):
 @pytest.mark.parametrize("name", ["OrbitControls", "TrackballControls", "MapControls", "ArcballControls"])
 @pytest.mark.parametrize("before", ["", "camera.lookAt(0, 5, 0);"])
 def test_controls_turn_the_camera_to_their_target_whatever_it_looked_at_before(name, before):
-    made = f"{before} const controls = new THREE.{name}(camera, canvas);"
-    assert read(THREE + made).pinhole.look_at == (0, 0, 0)
+    program = f"{before} const controls = new THREE.{name}(camera, canvas);"
+    assert read(THREE + program).pinhole.look_at == (0, 0, 0)
     with pytest.raises(InputError, match="write the target in plain numbers"):
-        read(THREE + made + "controls.target.set(1, height, 0);")
-    aimed = read(THREE + made + "controls.target.set(1, 2, 0);")
+        read(THREE + program + "controls.target.set(1, height, 0);")
+    aimed = read(THREE + program + "controls.target.set(1, 2, 0);")
     assert aimed.pinhole.look_at == (1, 2, 0) and any(name in note for note in aimed.notes)
 
 
@@ -95,8 +95,8 @@ REFUSED = {
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_would_be_another_camera_is_refused(what):
-    text, told = REFUSED[what]
-    with pytest.raises(InputError, match=told):
+    text, sentence = REFUSED[what]
+    with pytest.raises(InputError, match=sentence):
         read(text)
 
 
@@ -174,9 +174,9 @@ def test_a_scene_of_three_js_editor_has_its_windows_camera_and_its_own():
     matrices = ([*(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0), 0, 0, z, 1] for z in (3, 7))
     first, second = ({**lens, "name": f"{index}", "matrix": matrix} for index, matrix in enumerate(matrices))
     document = {"metadata": {}, "camera": {"object": first}, "scene": {"object": {"type": "Scene", "children": [second]}}}
-    found = cameras.read(json.dumps(document), options=VGA)
-    assert [camera.pinhole.eye[2] for camera in found] == [3, 7]
-    assert all(math.isclose(camera.pinhole.distance[1], 240, rel_tol=4 * 2**-53) for camera in found)
+    cameras_read = cameras.read(json.dumps(document), options=VGA)
+    assert [camera.pinhole.eye[2] for camera in cameras_read] == [3, 7]
+    assert all(math.isclose(camera.pinhole.distance[1], 240, rel_tol=4 * 2**-53) for camera in cameras_read)
 
 
 def test_a_stray_sign_before_pbrts_first_statement_hides_nothing_of_it():

@@ -16,7 +16,7 @@ from .conftest import CAMERAS, allowed, picture_error, points_before
 
 UNMIRRORED = [name for name, pinhole in CAMERAS.items() if not pinhole.mirrored]
 ONE_FOCAL = [name for name in UNMIRRORED if CAMERAS[name].distance[0] == CAMERAS[name].distance[1]]
-CENTRED = [name for name in ONE_FOCAL if CAMERAS[name].principal_point == (CAMERAS[name].width / 2, CAMERAS[name].height / 2)]
+CENTERED = [name for name in ONE_FOCAL if CAMERAS[name].principal_point == (CAMERAS[name].width / 2, CAMERAS[name].height / 2)]
 
 
 class Known:
@@ -264,7 +264,7 @@ def test_openmvg_names_a_type_once_and_numbers_it_then(name):
         cameras.read(json.dumps(sfm))
 
 
-@pytest.mark.parametrize("name", CENTRED)
+@pytest.mark.parametrize("name", CENTERED)
 def test_bundler_looks_along_minus_z(name):
     known = Known(name)
     turn = np.array([known.u, known.v, known.w])
@@ -274,7 +274,7 @@ def test_bundler_looks_along_minus_z(name):
     assert not read.size_stated and any("1 cameras that were not placed" in note for note in read.notes)
 
 
-@pytest.mark.parametrize("name", CENTRED)
+@pytest.mark.parametrize("name", CENTERED)
 def test_llff_has_its_axes_down_right_and_backwards(tmp_path, name):
     known = Known(name)
     matrix = np.column_stack([-known.v, known.u, known.w, known.e, [known.height, known.width, known.f_x]])
@@ -404,9 +404,9 @@ def test_record3ds_intrinsics_may_be_another_for_each_picture():
     poses = [[0, 0, 0, 1, index, 0, 0] for index in range(2)]
     record = {"poses": poses, "K": [700, 0, 0, 0, 700, 0, 320, 240, 1], "w": 640, "h": 480}
     record["perFrameIntrinsicCoeffs"] = [[710, 720, 310, 250], [800, 810, 300, 260]]
-    found = [camera.pinhole for camera in cameras.read(json.dumps(record))]
-    assert [pinhole.distance for pinhole in found] == [(710, 720), (800, 810)]
-    assert [pinhole.principal_point for pinhole in found] == [(310, 480 - 250), (300, 480 - 260)]  # from below
+    cameras_read = [camera.pinhole for camera in cameras.read(json.dumps(record))]
+    assert [pinhole.distance for pinhole in cameras_read] == [(710, 720), (800, 810)]
+    assert [pinhole.principal_point for pinhole in cameras_read] == [(310, 480 - 250), (300, 480 - 260)]  # from below
     with pytest.raises(InputError, match="perFrameIntrinsicCoeffs"):
         cameras.read(json.dumps(record | {"perFrameIntrinsicCoeffs": [[710, 720, 310, 250]]}))
 
@@ -419,27 +419,27 @@ def test_polycams_pictures_are_named_from_whichever_folder_is_given(tmp_path):
         folder = tmp_path / "keyframes" / f"{kind}cameras"
         folder.mkdir(parents=True)
         (folder / "123.json").write_text(document)
-        for given in (tmp_path, folder, folder / "123.json"):
-            (camera,) = cameras.read(given)
+        for path in (tmp_path, folder, folder / "123.json"):
+            (camera,) = cameras.read(path)
             assert (camera.name, camera.image) == ("123", f"keyframes/{kind}images/123.jpg")
     (tmp_path / "frame_00001.json").write_text(document)
     assert cameras.read(tmp_path / "frame_00001.json")[0].image == "frame_00001.jpg"
 
 
-@pytest.mark.parametrize("name", CENTRED)
+@pytest.mark.parametrize("name", CENTERED)
 def test_gaussian_splatting_lists_camera_to_world(name):
     known = Known(name)
-    said = {"id": 0, "img_name": "00001", "width": known.width, "height": known.height, "fx": known.f_x, "fy": known.f_y}
-    said |= {"position": known.e.tolist(), "rotation": known.opencv.T.tolist()}
-    read = the_same(cameras.read(json.dumps([said])), known)
+    values = {"id": 0, "img_name": "00001", "width": known.width, "height": known.height, "fx": known.f_x, "fy": known.f_y}
+    values |= {"position": known.e.tolist(), "rotation": known.opencv.T.tolist()}
+    read = the_same(cameras.read(json.dumps([values])), known)
     assert read.name == "00001" and any("principal point" in note for note in read.notes)
 
 
 def test_gaussian_splattings_principal_point_counts_where_it_is_said():
     known = Known("shifted")
-    said = {"id": 0, "img_name": "1", "width": known.width, "height": known.height, "fx": known.f_x, "fy": known.f_y}
-    said |= {"position": known.e.tolist(), "rotation": known.opencv.T.tolist(), "cx": known.c_x, "cy": known.c_y}
-    read = the_same(cameras.read(json.dumps([said])), known)
+    values = {"id": 0, "img_name": "1", "width": known.width, "height": known.height, "fx": known.f_x, "fy": known.f_y}
+    values |= {"position": known.e.tolist(), "rotation": known.opencv.T.tolist(), "cx": known.c_x, "cy": known.c_y}
+    read = the_same(cameras.read(json.dumps([values])), known)
     assert not any("principal point" in note for note in read.notes)
 
 
@@ -456,7 +456,7 @@ def nerfstudio_path(*known, fov=None):
     return {"camera_type": "perspective", "render_width": known[0].width, "render_height": known[0].height, "camera_path": path}
 
 
-@pytest.mark.parametrize("name", CENTRED)
+@pytest.mark.parametrize("name", CENTERED)
 def test_nerfstudios_path_has_the_degrees_of_the_height(name):
     known = Known(name)
     wide = 1 + known.f_y / known.height  # of a telephoto's angle less is kept
@@ -465,10 +465,10 @@ def test_nerfstudios_path_has_the_degrees_of_the_height(name):
 
 
 def test_nerfstudios_world_is_undone_by_the_file_beside_the_path(tmp_path):
-    known = Known(CENTRED[0])
+    known = Known(CENTERED[0])
     turn = pytest.importorskip("scipy.spatial.transform").Rotation.from_rotvec([0.3, -1.2, 0.7]).as_matrix()
     moved, scale = np.array([0.2, -0.5, 1.1]), 0.37
-    there = Known(CENTRED[0])
+    there = Known(CENTERED[0])
     there.opengl = np.column_stack([turn @ known.opengl[:, :3], scale * (turn @ known.e + moved)])
     (tmp_path / "path.json").write_text(json.dumps(nerfstudio_path(there)))
     world = {"transform": np.column_stack([turn, moved]).tolist(), "scale": scale}
@@ -479,7 +479,7 @@ def test_nerfstudios_world_is_undone_by_the_file_beside_the_path(tmp_path):
 
 
 def test_a_path_flies_at_its_frames_a_second_and_other_cameras_are_refused():
-    known = Known(CENTRED[0])
+    known = Known(CENTERED[0])
     read = cameras.read(json.dumps(nerfstudio_path(known, known, known) | {"fps": 10}))
     assert [camera.time for camera in read] == [0, 0.1, 0.2]
     with pytest.raises(InputError, match="equirectangular"):
@@ -571,7 +571,7 @@ K = {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "image_size": [640, 480]}
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "sentence"),
     [
         ({"radial_distortion": [0.1, 0.2]}, "radialdistortion"),
         ({"kc": [0.1, 0.2]}, "kc"),
@@ -590,8 +590,8 @@ K = {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "image_size": [640, 480]}
         ({"K": [[1.2, 0, 0.5], [0, 1.6, 0.5], [0, 0, 1]]}, "widths of the picture"),
     ],
 )
-def test_what_opencvs_names_leave_open_is_refused_and_not_guessed(more, told):
-    with pytest.raises(InputError, match=told):
+def test_what_opencvs_names_leave_open_is_refused_and_not_guessed(more, sentence):
+    with pytest.raises(InputError, match=sentence):
         cameras.read(json.dumps({**K, **more}))
 
 
@@ -602,7 +602,7 @@ def test_a_distortion_that_no_picture_shows_is_taken_and_its_figure_said():
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "sentence"),
     [
         ({"camera_intrinsics": [700, 700, 400, 300]}, "has camera_intrinsics, which programs read differently"),
         ({"K": [[700, 0, 400], [0, 700, 300], [0, 0, 1]]}, "has K, which"),
@@ -612,13 +612,13 @@ def test_a_distortion_that_no_picture_shows_is_taken_and_its_figure_said():
         ({"w": 800}, "w 800 and the size is given as 640 × 480"),
     ],
 )
-def test_what_a_transforms_json_says_in_other_words_is_not_passed_over(more, told):
+def test_what_a_transforms_json_says_in_other_words_is_not_passed_over(more, sentence):
     frame = {"file_path": "a.png", "transform_matrix": np.eye(4).tolist()}
-    given = Options(size=(640, 480))
-    assert cameras.read(json.dumps({"camera_angle_x": 0.7, "frames": [frame]}), options=given)
+    options = Options(size=(640, 480))
+    assert cameras.read(json.dumps({"camera_angle_x": 0.7, "frames": [frame]}), options=options)
     for document in ({**more, "frames": [frame]}, {"frames": [{**frame, **more}]}):
-        with pytest.raises(InputError, match=told):
-            cameras.read(json.dumps({"camera_angle_x": 0.7, **document}), options=given)
+        with pytest.raises(InputError, match=sentence):
+            cameras.read(json.dumps({"camera_angle_x": 0.7, **document}), options=options)
 
 
 def test_a_camera_of_usd_stands_at_every_time_that_has_a_sample(tmp_path):
@@ -630,9 +630,9 @@ def test_a_camera_of_usd_stands_at_every_time_that_has_a_sample(tmp_path):
         uniform token[] xformOpOrder = ["xformOp:translate"]
     }}"""
     (tmp_path / "a.usda").write_text(text)
-    found = cameras.read(tmp_path / "a.usda", options=Options(size=(640, 480)))
+    cameras_read = cameras.read(tmp_path / "a.usda", options=Options(size=(640, 480)))
     meters = 0.01  # a unit of a stage that says none
-    assert [camera.pinhole.eye for camera in found] == [pytest.approx((meters * x, 0, 0), rel=1e-15) for x in (1, 2, 3)]
+    assert [camera.pinhole.eye for camera in cameras_read] == [pytest.approx((meters * x, 0, 0), rel=1e-15) for x in (1, 2, 3)]
 
 
 @pytest.mark.parametrize("pointer", ["/nodes/1/translation", "/cameras/0/perspective/yfov"])
@@ -691,16 +691,16 @@ def test_a_window_of_a_sensor_sees_what_the_sensor_sees_there(form, size, binnin
     sensor = points[:, :2] / points[:, 2:] * f + [c_x + 0.5, c_y + 0.5]  # from the corner of the sensor
     there = (sensor - roi[:2]) / [across, down]
     assert np.abs(np.column_stack([column, wanted[1] - row]) - there).max() < 1e-9
-    told = any("window of its sensor" in note for note in camera.notes)
-    assert told == ((across, down, *roi) != (1, 1, 0, 0, 0, 0))
+    is_noted = any("window of its sensor" in note for note in camera.notes)
+    assert is_noted == ((across, down, *roi) != (1, 1, 0, 0, 0, 0))
 
 
 def test_yaml_in_brackets_is_read_as_pyyaml_reads_it():
     from viewcam_addon.cameras import yaml as ours
 
-    theirs = pytest.importorskip("yaml")
+    yaml = pytest.importorskip("yaml")
     text = "a: {rows: 3, 'b c': [1.5, 2, [x y, 4]], d: {e: http://f/g, h: {}}}\nk: [[1, 2], [3, -4.0e-3]]\n"
-    assert ours.read(text) == theirs.safe_load(text)
+    assert ours.read(text) == yaml.safe_load(text)
     for broken in ("[1, 2", "[1 2]]", "{a: 1", "{a: 1]", "[" * 50 + "]" * 50, "{[1]: 2}"):
         assert ours.read(f"k: {broken}\nl: 1\n").get("k") in (broken, f"{broken} l: 1", None)
 

@@ -66,7 +66,7 @@ def pinholes(draw):
     middle = (width / 2, height / 2)
     point = draw(st.one_of(st.none(), st.tuples(*[st.floats(-0.5, 1.5)] * 2)))
     reach = draw(st.floats(0.01, 100))
-    found = Pinhole(
+    pinhole = Pinhole(
         eye,
         tuple(a + reach * b for a, b in zip(eye, view, strict=True)),
         up,
@@ -76,8 +76,8 @@ def pinholes(draw):
         middle if point is None else (point[0] * width, point[1] * height),
         draw(st.booleans()),
     )
-    assume(found.sine_to_up > 1e-3)
-    return found
+    assume(pinhole.sine_to_up > 1e-3)
+    return pinhole
 
 
 def fitting(pinhole, form):
@@ -118,10 +118,10 @@ def test_it_comes_back_as_the_same_camera(tmp_path_factory, form, pinhole, axes,
     size = max(have.width, have.height)
     # An angle θ of half the picture is told to unit · θ, which is d/W + W/d times that of the distance.
     bent = 1 + max(pinhole.distance) / min(pinhole.width, pinhole.height) if form in ANGLES else 1
-    for one, other in zip(have.distance, pinhole.distance, strict=True):
-        assert abs(one - other) <= 16 * bent * unit * other, f"d is {one!r} and was {other!r}"
-    for one, other in zip(have.principal_point, pinhole.principal_point, strict=True):
-        assert abs(one - other) <= 16 * unit * max(abs(other), size), f"c is {one!r} and was {other!r}"
+    for first, other in zip(have.distance, pinhole.distance, strict=True):
+        assert abs(first - other) <= 16 * bent * unit * other, f"d is {first!r} and was {other!r}"
+    for first, other in zip(have.principal_point, pinhole.principal_point, strict=True):
+        assert abs(first - other) <= 16 * unit * max(abs(other), size), f"c is {first!r} and was {other!r}"
     if form in NO_POSE:
         return
     # The look-at point is near, and eye and look-at are rounded each where the scale is applied, and where it is taken off.
@@ -185,17 +185,17 @@ def test_values_that_are_not_those_of_the_numbers_beside_them_do_not_count(tmp_p
     path = tmp_path / f"a{suffix}" if (suffix := cameras.FORMATS[form].SUFFIX) else tmp_path
     options = Options(size=(640, 360))
     wrong = json.dumps(own.document(dataclasses.replace(CAMERAS["plain"], **OTHERS[other])))
-    found = []
-    for said in (None, "{}", wrong):
+    result = []
+    for record in (None, "{}", wrong):
         cameras.save([Camera("a", CAMERAS["plain"])], path, form)
-        if said is not None:
+        if record is not None:
             file = path if suffix else path / {"colmap": "images.txt", "colmap_binary": "virtual_pinhole.txt"}[form]
-            text, count = re.subn(r"\{[^{}]*\"up\"[^{}]*\}", said, file.read_text())
+            text, count = re.subn(r"\{[^{}]*\"up\"[^{}]*\}", record, file.read_text())
             assert count == 1
             file.write_text(text)
         (camera,) = cameras.read(path, options=options)
-        found.append(camera.pinhole)
-    exact, own_numbers, edited = found
+        result.append(camera.pinhole)
+    exact, own_numbers, edited = result
     assert exact == CAMERAS["plain"] and edited == own_numbers
 
 
@@ -206,9 +206,9 @@ def test_where_somebody_changed_the_matrix_it_counts_and_not_the_values_of_which
     text = (tmp_path / file).read_text()
     assert "virtual_pinhole" in text and cameras.read(path)[0].pinhole == CAMERAS["plain"]
     if form == "transforms":
-        said = json.loads(text)
-        said["frames"][0]["transform_matrix"][0][3] += 1
-        (tmp_path / file).write_text(json.dumps(said))
+        record = json.loads(text)
+        record["frames"][0]["transform_matrix"][0][3] += 1
+        (tmp_path / file).write_text(json.dumps(record))
     else:
         *head, number, _, _ = text.split("\n")
         words = number.split(" ")
@@ -234,28 +234,30 @@ def test_what_it_can_not_say_it_refuses_and_never_leaves_out(tmp_path, form, nam
     assert not (form in NO_MIRROR and pinhole.mirrored)
     if form not in NO_POSE:
         points = points_before(pinhole)
-        ours, theirs = pinhole.project(points), back.pinhole.project(points)
+        ours, expected = pinhole.project(points), back.pinhole.project(points)
         limit = max(1e-3, 64 * (FLOAT32 if form == "usd" else FLOAT64) * max(*pinhole.distance) * 1e6)
-        assert np.hypot(ours[0] - theirs[0], ours[1] - theirs[1]).max() < limit
+        assert np.hypot(ours[0] - expected[0], ours[1] - expected[1]).max() < limit
 
 
 @pytest.mark.parametrize("form", [form for form in OURS if form not in NO_POSE])
 def test_several_are_written_in_their_order_and_none_is_chosen_silently(tmp_path, form):
-    given = [Camera(name, CAMERAS[name]) for name in ("plain", "portrait", "wide", "rolled")]
+    written_cameras = [Camera(name, CAMERAS[name]) for name in ("plain", "portrait", "wide", "rolled")]
     several = cameras.FORMATS[form].SUFFIX == "" or form in ("sidecar", "opencv")
     path = tmp_path if several else tmp_path / f"all{cameras.FORMATS[form].SUFFIX}"
     if form == "opencv":  # a file for each
-        assert {file.name for file in cameras.save(given, path, form)} == {f"{camera.name}.yml" for camera in given}
+        assert {file.name for file in cameras.save(written_cameras, path, form)} == {
+            f"{camera.name}.yml" for camera in written_cameras
+        }
         return
-    cameras.save(given, path, form)
+    cameras.save(written_cameras, path, form)
     back = cameras.read(path, options=Options(size=(640, 360)))
     names = [camera.name for camera in back]
     assert names == (
         ["0", "1", "2", "3"]
         if form == "bop"
-        else sorted(c.name for c in given)
+        else sorted(c.name for c in written_cameras)
         if form == "sidecar"
-        else [c.name for c in given]
+        else [c.name for c in written_cameras]
     )
     with pytest.raises(InputError, match=f"{names[0]}.*{names[3]}"):
         cameras.choose(back)
@@ -326,19 +328,19 @@ def test_a_folder_with_files_of_others_says_which_were_not_read(tmp_path):
     cameras.save([Camera(name, CAMERAS["plain"]) for name in ("left", "right")], tmp_path, "ros")
     (tmp_path / "settings.yaml").write_text("rate: 30\n")
     (tmp_path / "omni.yml").write_text((tmp_path / "left.yaml").read_text().replace("plumb_bob", "omni"))
-    found = cameras.read(tmp_path)
-    assert [camera.name for camera in found] == ["left", "right"]
-    assert all(any("settings.yaml" in note for note in camera.notes) for camera in found)
-    assert all(any("omni" in note for note in camera.notes) for camera in found)
-    assert cameras.read(tmp_path, format="ros") == found
+    cameras_read = cameras.read(tmp_path)
+    assert [camera.name for camera in cameras_read] == ["left", "right"]
+    assert all(any("settings.yaml" in note for note in camera.notes) for camera in cameras_read)
+    assert all(any("omni" in note for note in camera.notes) for camera in cameras_read)
+    assert cameras.read(tmp_path, format="ros") == cameras_read
 
 
 @pytest.mark.parametrize("form", ["transforms", "colmap", "gltf", "usd", "opencv", "ros"])
 def test_what_is_written_remembers_axes_and_scale_and_says_so_where_others_are_chosen(tmp_path, form):
-    given = Options(axes="y_up", scale=0.01)
+    options = Options(axes="y_up", scale=0.01)
     path = tmp_path / f"a{cameras.FORMATS[form].SUFFIX}"
-    cameras.save([Camera("a", CAMERAS["plain"])], path, form, given)
-    (as_written,), (otherwise,) = cameras.read(path, options=given), cameras.read(path)
+    cameras.save([Camera("a", CAMERAS["plain"])], path, form, options)
+    (as_written,), (otherwise,) = cameras.read(path, options=options), cameras.read(path)
     assert not any("was written with" in note for note in as_written.notes)
     assert any("axes=y_up scale=0.01" in note for note in otherwise.notes)
 
@@ -359,21 +361,21 @@ def test_a_world_is_leveled_by_its_cameras_as_nerfstudio_does(tilt):
     turn, _ = rotations.Rotation.align_vectors([tilt], [(0, 0, 1)])
     angles = np.linspace(0, 2 * np.pi, 8, endpoint=False)
     eyes = np.stack([7 * np.cos(angles), 7 * np.sin(angles), np.full(8, 3.0)], axis=-1)
-    made = [
+    turned = [
         Camera(f"{i}", Pinhole(tuple(eye), tuple(turn.apply((0, 0, 1))), tilt, 600, 640, 360))
         for i, eye in enumerate(turn.apply(eyes))
     ]
-    found = cameras.read(cameras.write(made, "transforms"), options=Options(up_from="cameras"))
-    ups = np.mean([camera.pinhole.picture_axes()[1] for camera in found], axis=0)
+    cameras_read = cameras.read(cameras.write(turned, "transforms"), options=Options(up_from="cameras"))
+    ups = np.mean([camera.pinhole.picture_axes()[1] for camera in cameras_read], axis=0)
     assert ups / np.linalg.norm(ups) == pytest.approx((0, 0, 1), abs=1e-14)
-    assert [camera.pinhole.eye[2] for camera in found] == pytest.approx([3.0] * 8, abs=1e-13)
-    between = [np.linalg.norm(np.subtract(a.pinhole.eye, b.pinhole.eye)) for a, b in itertools.pairwise(found)]
+    assert [camera.pinhole.eye[2] for camera in cameras_read] == pytest.approx([3.0] * 8, abs=1e-13)
+    between = [np.linalg.norm(np.subtract(a.pinhole.eye, b.pinhole.eye)) for a, b in itertools.pairwise(cameras_read)]
     assert between == pytest.approx(np.linalg.norm(np.diff(eyes, axis=0), axis=1), rel=1e-13), "no world is stretched"
     degrees = np.degrees(np.arccos(tilt[2] / np.linalg.norm(tilt)))
-    assert all(any(f"turned by {degrees:.4g}°" in note for note in camera.notes) for camera in found)
+    assert all(any(f"turned by {degrees:.4g}°" in note for note in camera.notes) for camera in cameras_read)
 
 
 def test_cameras_whose_ups_cancel_out_level_nothing():
-    made = [Camera(f"{up}", Pinhole((7, 0, 0), (0, 0, 0), (0, 0, up), 600, 640, 360)) for up in (-1, 1)]
+    with_ups = [Camera(f"{up}", Pinhole((7, 0, 0), (0, 0, 0), (0, 0, up), 600, 640, 360)) for up in (-1, 1)]
     with pytest.raises(InputError, match="cancel out"):
-        cameras.read(cameras.write(made, "transforms"), options=Options(up_from="cameras"))
+        cameras.read(cameras.write(with_ups, "transforms"), options=Options(up_from="cameras"))

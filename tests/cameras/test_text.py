@@ -118,10 +118,10 @@ def test_any_order_and_punctuation_says_the_same_and_only_what_was_given(order, 
         with pytest.raises(InputError):
             said(text)
         return
-    found = said(text)
-    assert pose(found) == pose(expected) and found.distance == expected.distance
+    actual = said(text)
+    assert pose(actual) == pose(expected) and actual.distance == expected.distance
     # A view plane is said as a whole or not at all.
-    assert (found.principal_point, found.mirrored) == (((960, 540), False) if distance else (BASE.principal_point, True))
+    assert (actual.principal_point, actual.mirrored) == (((960, 540), False) if distance else (BASE.principal_point, True))
 
 
 def test_without_a_camera_that_stands_there_what_is_missing_is_named():
@@ -143,8 +143,8 @@ def test_a_camera_of_a_scene_file_keeps_its_whole_view_plane():
 
 def test_of_a_scene_file_the_stated_camera_is_read_in_the_worlds_coordinates(tmp_path):
     stated = Pinhole((0.1, 0.2, 0.3), (0, 0, -1), (0, 1, 0), 1200.0, 1920, 1080)
-    made = Pinhole((0.1000001, 0.2, 0.3), (0, 0, -1), (0, 1, 0), 1200.0, 1920, 1080)
-    scene_file.write(Scene(made, {}, (), stated_camera=stated, origin=(10.0, 0.0, 0.0)), tmp_path / "scene.json")
+    written = Pinhole((0.1000001, 0.2, 0.3), (0, 0, -1), (0, 1, 0), 1200.0, 1920, 1080)
+    scene_file.write(Scene(written, {}, (), stated_camera=stated, origin=(10.0, 0.0, 0.0)), tmp_path / "scene.json")
     camera = read(tmp_path / "scene.json")
     assert camera.pinhole == Pinhole((10.1, 0.2, 0.3), (10.0, 0.0, -1.0), (0.0, 1.0, 0.0), 1200, 1920, 1080)
 
@@ -216,11 +216,11 @@ def test_each_line_of_the_page_is_the_same_camera():
     lines = page.split("```text\n")[1].split("```")[0].splitlines()
     assert len(lines) >= 7
     for line in lines:
-        found = read(line)
-        assert pose(found.pinhole) == POSE, line
+        reread = read(line)
+        assert pose(reread.pinhole) == POSE, line
         # Sixteen digits of an angle, its tangent, a quotient.
-        assert found.pinhole.distance == pytest.approx((960, 960), rel=1e-14), line
-        assert found.notes == () and not found.pinhole.mirrored, line
+        assert reread.pinhole.distance == pytest.approx((960, 960), rel=1e-14), line
+        assert reread.notes == () and not reread.pinhole.mirrored, line
 
 
 PIECES = "eye|=|(|)|{|}|<|>|1|-|.|e9|nan|inf|\"|'|look_at|LookAt |camera {|<lookat |/>|up|,| |\n|#|/*|//|<!--|d=|fov|axis|[|]|:"
@@ -243,11 +243,11 @@ PIECES = [
 @given(st.lists(st.sampled_from(PIECES), max_size=40).map("".join) | st.text(max_size=60))
 def test_any_text_is_read_or_refused_in_a_sentence(text):
     try:
-        found = cameras.read(text, options=Options(size=(640, 360), base=BASE))
+        cameras_read = cameras.read(text, options=Options(size=(640, 360), base=BASE))
     except InputError as error:
         assert str(error)
     else:
-        assert all(isinstance(camera.pinhole, Pinhole) for camera in found)
+        assert all(isinstance(camera.pinhole, Pinhole) for camera in cameras_read)
 
 
 LENGTH = 250_000

@@ -167,11 +167,11 @@ def test_what_mitsuba_reads_we_read_as_it_does(mitsuba, sensor, transform, film)
         f'</transform><film type="hdrfilm">{FILMS[film]}</film></sensor><emitter type="spot"><transform name="to_world">'
         '<lookat origin="1,1,1" target="0,0,0" up="0,1,0"/></transform></emitter></scene>'
     )
-    (theirs,) = mitsuba.load_string(text).sensors()
+    (expected,) = mitsuba.load_string(text).sensors()
     (camera,) = cameras.read(text)
     pinhole = camera.pinhole
-    assert (pinhole.width, pinhole.height) == tuple(theirs.film().crop_size())
-    check_rays(pinhole, rays_of_mitsuba(mitsuba, theirs, PLACES), PLACES)
+    assert (pinhole.width, pinhole.height) == tuple(expected.film().crop_size())
+    check_rays(pinhole, rays_of_mitsuba(mitsuba, expected, PLACES), PLACES)
     assert pinhole.mirrored == (transform == "mirror")
 
 
@@ -186,11 +186,11 @@ def test_several_sensors_are_several_cameras():
         f'<sensor type="{kind}" id="{name}"><transform name="to_world">{TRANSFORMS["lookat"]}</transform></sensor>'
         for kind, name in (("perspective", "left"), ("thinlens", "blurred"), ("perspective", "right"))
     )
-    found = cameras.read(text + "</scene>", options=Options(size=(640, 480)))
-    assert [camera.name for camera in found] == ["left", "right"]
-    assert "blurred" in found[0].notes[-1]
+    cameras_read = cameras.read(text + "</scene>", options=Options(size=(640, 480)))
+    assert [camera.name for camera in cameras_read] == ["left", "right"]
+    assert "blurred" in cameras_read[0].notes[-1]
     with pytest.raises(InputError, match="name one of 'left', 'right'"):
-        cameras.choose(found)
+        cameras.choose(cameras_read)
 
 
 @pytest.mark.parametrize(
@@ -209,10 +209,10 @@ def test_several_sensors_are_several_cameras():
     ],
 )
 def test_what_mitsuba_reads_as_a_dictionary_we_read_as_it_does(mitsuba, text):
-    theirs = eval(text, {"mi": mitsuba})
+    expected = eval(text, {"mi": mitsuba})
     (camera,) = cameras.read(text)
-    assert (camera.pinhole.width, camera.pinhole.height) == tuple(theirs.film().size())
-    check_rays(camera.pinhole, rays_of_mitsuba(mitsuba, theirs, PLACES), PLACES)
+    assert (camera.pinhole.width, camera.pinhole.height) == tuple(expected.film().size())
+    check_rays(camera.pinhole, rays_of_mitsuba(mitsuba, expected, PLACES), PLACES)
 
 
 # ---- pbrt: its source's formulas, each matrix as it stands there
@@ -346,12 +346,13 @@ def test_what_of_pbrt_is_no_pinhole_or_unsaid_is_refused(text, sentence):
 )
 def test_a_camera_of_pbrt_that_stands_still_may_be_said_at_both_times(text):
     still = 'LookAt 1 2 3 0 0 0 0 0 1 Camera "perspective"'
-    given = Options(size=(640, 480))
+    options = Options(size=(640, 480))
     assert (
-        cameras.read(f'{text} Camera "perspective"', options=given)[0].pinhole == cameras.read(still, options=given)[0].pinhole
+        cameras.read(f'{text} Camera "perspective"', options=options)[0].pinhole
+        == cameras.read(still, options=options)[0].pinhole
     )
     with pytest.raises(InputError, match="moves while the shutter"):
-        cameras.read(f'{text} ActiveTransform StartTime Translate 1 0 0 Camera "perspective"', options=given)
+        cameras.read(f'{text} ActiveTransform StartTime Translate 1 0 0 Camera "perspective"', options=options)
 
 
 # ---- POV-Ray: the documented ray through each place of the picture
@@ -372,17 +373,17 @@ def pov_vectors(text):
 
 @pytest.mark.parametrize("name", CAMERAS)
 def test_by_pov_rays_formula_what_we_write_is_the_same_picture(name):
-    given = pov_vectors(cameras.write([of(name)], "pov_ray"))
-    if "look_at" in given:
-        ahead = given["look_at"] - given["location"]
+    vectors = pov_vectors(cameras.write([of(name)], "pov_ray"))
+    if "look_at" in vectors:
+        ahead = vectors["look_at"] - vectors["location"]
         ahead /= np.linalg.norm(ahead)
-        right = np.cross(given["sky"], ahead)
+        right = np.cross(vectors["sky"], ahead)
         right /= np.linalg.norm(right)
-        handed = math.copysign(1, np.cross(given["up"], given["direction"]) @ given["right"])
-        given["up"] = np.cross(ahead, right) * np.linalg.norm(given["up"])
-        given["right"] = handed * right * np.linalg.norm(given["right"])
-        given["direction"] = ahead * np.linalg.norm(given["direction"])
-    rays = pov_rays(*(given[key] for key in ("location", "right", "up", "direction")), PLACES)
+        handed = math.copysign(1, np.cross(vectors["up"], vectors["direction"]) @ vectors["right"])
+        vectors["up"] = np.cross(ahead, right) * np.linalg.norm(vectors["up"])
+        vectors["right"] = handed * right * np.linalg.norm(vectors["right"])
+        vectors["direction"] = ahead * np.linalg.norm(vectors["direction"])
+    rays = pov_rays(*(vectors[key] for key in ("location", "right", "up", "direction")), PLACES)
     pinhole = CAMERAS[name]
     # Of the eye far away the look-at point's rounding remains: 2⁻⁵³ of it, across the distance to it.
     reach = max(map(abs, pinhole.look_at)) / math.dist(pinhole.eye, pinhole.look_at)
@@ -498,11 +499,11 @@ def glm_places(glm, view, projection, size, points):
 def test_glm_sees_through_the_matrices_that_we_write_as_we_do(name):
     glm = pytest.importorskip("glm")
     pinhole = CAMERAS[name]
-    said = {}
-    exec(cameras.write([of(name)], "matrices"), {"np": np}, said)
-    view, projection = (glm.dmat4(*said[key].T.ravel().tolist()) for key in ("view", "projection"))
+    result = {}
+    exec(cameras.write([of(name)], "matrices"), {"np": np}, result)
+    view, projection = (glm.dmat4(*result[key].T.ravel().tolist()) for key in ("view", "projection"))
     points = points_before(pinhole)
-    judged(pinhole, *glm_places(glm, view, projection, said["size"], points), points)
+    judged(pinhole, *glm_places(glm, view, projection, result["size"], points), points)
 
 
 @pytest.mark.parametrize("hand", ["RH", "LH"])
@@ -611,10 +612,10 @@ def test_three_js_view_offset_shows_a_part_of_the_full_picture(part, size):
     assert (camera.pinhole.width, camera.pinhole.height) == size
     points = np.random.default_rng(5).normal(size=(100, 3))
     column, row, _ = full.pinhole.project(points)
-    found = camera.pinhole.project(points)
+    actual = camera.pinhole.project(points)
     x, y, width, height = part
-    assert found[0] == pytest.approx((column - x) * size[0] / width, abs=1e-9 * full_width)
-    assert size[1] - found[1] == pytest.approx((full_height - row - y) * size[1] / height, abs=1e-9 * full_width)
+    assert actual[0] == pytest.approx((column - x) * size[0] / width, abs=1e-9 * full_width)
+    assert size[1] - actual[1] == pytest.approx((full_height - row - y) * size[1] / height, abs=1e-9 * full_width)
 
 
 def test_three_js_view_offset_says_the_size_and_may_be_cleared():
@@ -695,14 +696,14 @@ def test_glm_sees_through_the_frustum_that_we_write_as_we_do(name):
     judged(pinhole, *glm_places(glm, view, glm.frustum(*frustum), size, points), points, FLOAT32)
 
 
-def test_vtks_window_centre_and_horizontal_angle_are_its_formulas():
+def test_vtks_window_center_and_horizontal_angle_are_its_formulas():
     """vtkCamera::ComputeProjectionTransform: xmin = (center − 1) · w, of a w that the angle gives."""
     text = CODE["vtk"] + "\ncamera.SetWindowCenter(0.1, -0.2)\n"
-    centred = cameras.read(text, options=GL)[0].pinhole
+    centered = cameras.read(text, options=GL)[0].pinhole
     half = math.tan(math.radians(20)) * 16 / 9
     left, right = (0.1 - 1) * half, (0.1 + 1) * half
-    assert centred.principal_point[0] == pytest.approx(-left / (right - left) * 640)
-    assert centred.principal_point[1] == pytest.approx((1 + 0.2) / 2 * 360)
+    assert centered.principal_point[0] == pytest.approx(-left / (right - left) * 640)
+    assert centered.principal_point[1] == pytest.approx((1 + 0.2) / 2 * 360)
     across = cameras.read(text + "camera.SetUseHorizontalViewAngle(1)", options=GL)[0].pinhole
     assert across.distance[0] == pytest.approx(320 / math.tan(math.radians(20)))
 
@@ -793,8 +794,8 @@ def test_a_film_of_pbrt_without_its_size_has_the_size_that_is_asked_for():
 def test_an_angle_below_pi_is_taken_as_what_the_options_say():
     text = "lookfrom = vec3(1,2,3); lookat = vec3(0,0,0); vup = vec3(0,1,0); vfov = 0.7"
     for unit, angle in (("radians", 0.7), ("degrees", math.radians(0.7))):
-        found = cameras.read(text, options=dataclasses.replace(GL, angle_unit=unit))[0].pinhole
-        assert found.distance[1] == pytest.approx(180 / math.tan(angle / 2))
+        cameras_read = cameras.read(text, options=dataclasses.replace(GL, angle_unit=unit))[0].pinhole
+        assert cameras_read.distance[1] == pytest.approx(180 / math.tan(angle / 2))
 
 
 # ---- engines
@@ -816,16 +817,17 @@ def test_unitys_matrices_show_its_left_handed_world_as_the_pinhole_shows_ours():
     import json
 
     pinhole = CAMERAS["shifted_and_not_square"]
-    (said,) = json.loads(cameras.write([of("shifted_and_not_square")], "unity"))["cameras"]
+    (record,) = json.loads(cameras.write([of("shifted_and_not_square")], "unity"))["cameras"]
     points = points_before(pinhole)
     clip = (
-        np.c_[points * [1, 1, -1], np.ones(len(points))] @ (np.array(said["projectionMatrix"]) @ said["worldToCameraMatrix"]).T
+        np.c_[points * [1, 1, -1], np.ones(len(points))]
+        @ (np.array(record["projectionMatrix"]) @ record["worldToCameraMatrix"]).T
     )
     column, row = (clip[:, 0] / clip[:, 3] + 1) / 2 * pinhole.width, (1 - clip[:, 1] / clip[:, 3]) / 2 * pinhole.height
     judged(pinhole, column, row, points)
-    rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_quat(said["rotation"]).as_matrix()
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_quat(record["rotation"]).as_matrix()
     assert np.diag([1, 1, -1]) @ rotation[:, 2] == pytest.approx(-pinhole.basis()[2], abs=1e-15)
-    assert "fieldOfView" not in said
+    assert "fieldOfView" not in record
 
 
 def test_what_a_field_of_view_can_not_say_unreal_refuses():

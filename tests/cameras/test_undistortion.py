@@ -26,7 +26,7 @@ def photograph():
     return np.clip(smooth + random.normal(0, 8, smooth.shape), 0, 255).astype(np.uint8)
 
 
-def theirs(numbers, model, blank):
+def undistorted_by_judge(numbers, model, blank):
     options = pycolmap.UndistortCameraOptions()
     options.blank_pixels = blank
     return options, pycolmap.Camera(model=model, width=WIDTH, height=HEIGHT, params=numbers)
@@ -36,7 +36,7 @@ def theirs(numbers, model, blank):
 @pytest.mark.parametrize("model", COLMAP)
 def test_the_pinhole_that_is_cut_from_a_lens_is_colmaps(tmp_path, model, blank):
     camera, numbers, _ = of_colmap(model, tmp_path)
-    options, bent = theirs(numbers, model, blank)
+    options, bent = undistorted_by_judge(numbers, model, blank)
     straight = pycolmap.undistort_camera(options, bent)
     cut = undistorted(camera.lens, camera.pinhole.plane, blank)
     f_x, f_y, c_x, c_y = straight.params
@@ -49,23 +49,25 @@ def test_the_pinhole_that_is_cut_from_a_lens_is_colmaps(tmp_path, model, blank):
 @pytest.mark.parametrize("model", BENT)
 def test_the_undistorted_picture_is_colmaps_but_for_rounding(tmp_path, model, blank):
     camera, numbers, _ = of_colmap(model, tmp_path)
-    options, bent = theirs(numbers, model, blank)
+    options, bent = undistorted_by_judge(numbers, model, blank)
     picture = photograph()
     bitmap, _ = pycolmap.undistort_image(options, pycolmap.Bitmap.from_array(picture), bent)
     expected = bitmap.to_array().astype(int)
     plane = camera.pinhole.plane
     ours = resampled(picture, camera.lens, plane, undistorted(camera.lens, plane, blank)).astype(int)
-    shown = (expected.sum(axis=-1) > 0) & (ours.sum(axis=-1) > 0)
-    assert np.abs(ours - expected)[shown].max() <= 1, "a half that is rounded up there and to even here"
+    both_lit = (expected.sum(axis=-1) > 0) & (ours.sum(axis=-1) > 0)
+    assert np.abs(ours - expected)[both_lit].max() <= 1, "a half that is rounded up there and to even here"
     edge = (expected.sum(axis=-1) > 0) != (ours.sum(axis=-1) > 0)
     assert edge.mean() < 1e-4, "whether a place is the last pixel's center is rounding"
     if not blank:
-        assert shown.mean() > 0.999
+        assert both_lit.mean() > 0.999
 
 
 def test_another_lens_is_seen_in_the_picture(tmp_path):
     camera, numbers, _ = of_colmap("OPENCV", tmp_path)
-    options, bent = theirs([*numbers[:6], numbers[7], numbers[6]], "OPENCV", 0.0)  # p1 and p2 swapped, as Metashape's are
+    options, bent = undistorted_by_judge(
+        [*numbers[:6], numbers[7], numbers[6]], "OPENCV", 0.0
+    )  # p1 and p2 swapped, as Metashape's are
     expected = pycolmap.undistort_image(options, pycolmap.Bitmap.from_array(photograph()), bent)[0].to_array().astype(int)
     plane = camera.pinhole.plane
     ours = resampled(photograph(), camera.lens, plane, undistorted(camera.lens, plane)).astype(int)
@@ -99,11 +101,11 @@ def dataset(folder, lens="OPENCV", wide=(600.0, 610.0, 310.0, 190.0)):
 
 
 def test_a_colmap_data_set_comes_out_as_pycolmap_reads_it_with_pictures_masks_and_points(tmp_path, capfd):
-    given = dataset(tmp_path / "given")
-    assert cli.main(["camera", str(given), "--undistort", str(tmp_path / "out")]) == 0
+    folder = dataset(tmp_path / "given")
+    assert cli.main(["camera", str(folder), "--undistort", str(tmp_path / "out")]) == 0
     assert "2 pictures, 1 of them undistorted" in capfd.readouterr().out
     model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
-    options, bent = theirs([600, 610, 310, 190, *COLMAP["OPENCV"][0]], "OPENCV", 0.0)
+    options, bent = undistorted_by_judge([600, 610, 310, 190, *COLMAP["OPENCV"][0]], "OPENCV", 0.0)
     straight = pycolmap.undistort_camera(options, bent)
     (first,) = (image for image in model.images.values() if image.name == "a.png")
     assert first.camera.params == pytest.approx(straight.params, abs=1e-6) and first.camera.model.name == "PINHOLE"
@@ -113,34 +115,34 @@ def test_a_colmap_data_set_comes_out_as_pycolmap_reads_it_with_pictures_masks_an
     assert picture.shape[:2] == mask.shape == (straight.height, straight.width)
     assert set(np.unique(mask)) == {0, 255}, "a mask has no values between"
     same = (tmp_path / "out" / "images" / "b.png").read_bytes()
-    assert same == (given / "images" / "b.png").read_bytes(), "what no lens bends stays to the bit"
+    assert same == (folder / "images" / "b.png").read_bytes(), "what no lens bends stays to the bit"
 
 
 def test_a_data_set_of_nerfstudio_keeps_its_depth_maps_and_masks(tmp_path):
-    given = dataset(tmp_path / "given", "OPENCV_FISHEYE", (300.0, 300.0, 310.0, 190.0))
+    folder = dataset(tmp_path / "given", "OPENCV_FISHEYE", (300.0, 300.0, 310.0, 190.0))
     k = dict(zip(("k1", "k2", "k3", "k4"), COLMAP["OPENCV_FISHEYE"][0], strict=True))
     frame = {"file_path": "images/a.png", "mask_path": "masks/a.png.png", "depth_file_path": "depth/a.npy"}
     frame["transform_matrix"] = np.eye(4).tolist()
     document = {"camera_model": "OPENCV_FISHEYE", "fl_x": 300, "fl_y": 300, "cx": 310, "cy": 190, "w": 640, "h": 360, **k}
-    (given / "transforms.json").write_text(json.dumps(document | {"depth_unit_scale_factor": 0.5, "frames": [frame]}))
-    (given / "depth").mkdir()
+    (folder / "transforms.json").write_text(json.dumps(document | {"depth_unit_scale_factor": 0.5, "frames": [frame]}))
+    (folder / "depth").mkdir()
     depth = np.where(photograph()[..., 2] > 127, 3.0, 5.0).astype(np.float32)
-    np.save(given / "depth" / "a.npy", depth)
+    np.save(folder / "depth" / "a.npy", depth)
     out = tmp_path / "out"
-    assert cli.main(["camera", str(given / "transforms.json"), "--undistort", str(out), "--blank", "0.5"]) == 0
+    assert cli.main(["camera", str(folder / "transforms.json"), "--undistort", str(out), "--blank", "0.5"]) == 0
     written = json.loads((out / "transforms.json").read_text())
     assert written["depth_unit_scale_factor"] == 0.5 and "k1" not in written
     (frame,) = written["frames"]
     (camera,) = cameras.read(out)
-    found = np.load(out / frame["depth_file_path"])
+    actual = np.load(out / frame["depth_file_path"])
     mask = cv2.imread(str(out / frame["mask_path"]), cv2.IMREAD_UNCHANGED)
-    assert found.shape == mask.shape == (camera.pinhole.height, camera.pinhole.width) and found.dtype == np.float32
-    assert set(np.unique(found)) <= {0.0, 3.0, 5.0}, "no depth lies between two"
-    assert ((found == 3) == (mask == 255)).all()
+    assert actual.shape == mask.shape == (camera.pinhole.height, camera.pinhole.width) and actual.dtype == np.float32
+    assert set(np.unique(actual)) <= {0.0, 3.0, 5.0}, "no depth lies between two"
+    assert ((actual == 3) == (mask == 255)).all()
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "sentence"),
     [
         (["--to", "pbrt"], "transforms or colmap"),
         (["--axes", "y_up"], "leaves the world"),
@@ -148,32 +150,34 @@ def test_a_data_set_of_nerfstudio_keeps_its_depth_maps_and_masks(tmp_path):
         (["--blank", "2"], "no number from 0 to 1"),
     ],
 )
-def test_what_can_not_be_undistorted_is_told_in_a_sentence(tmp_path, capfd, words, told):
-    given = dataset(tmp_path / "given")
-    assert cli.main(["camera", str(given), "--undistort", str(tmp_path / "out"), *words]) == 2
-    assert told in capfd.readouterr().err and not (tmp_path / "out").exists()
+def test_what_can_not_be_undistorted_is_told_in_a_sentence(tmp_path, capfd, words, sentence):
+    folder = dataset(tmp_path / "given")
+    assert cli.main(["camera", str(folder), "--undistort", str(tmp_path / "out"), *words]) == 2
+    assert sentence in capfd.readouterr().err and not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(("change", "told"), [("missing", "can't be found"), ("size", "320 × 180"), ("damage", "no picture")])
-def test_a_picture_that_is_not_its_cameras_is_told(tmp_path, capfd, change, told):
-    given = dataset(tmp_path / "given")
-    picture = given / "images" / "a.png"
+@pytest.mark.parametrize(
+    ("change", "sentence"), [("missing", "can't be found"), ("size", "320 × 180"), ("damage", "no picture")]
+)
+def test_a_picture_that_is_not_its_cameras_is_told(tmp_path, capfd, change, sentence):
+    folder = dataset(tmp_path / "given")
+    picture = folder / "images" / "a.png"
     if change == "missing":
         picture.unlink()
     elif change == "size":
         cv2.imwrite(str(picture), photograph()[::2, ::2])
     else:
         picture.write_bytes(picture.read_bytes()[:40])
-    assert cli.main(["camera", str(given), "--undistort", str(tmp_path / "out")]) == 2
-    assert told in capfd.readouterr().err
+    assert cli.main(["camera", str(folder), "--undistort", str(tmp_path / "out")]) == 2
+    assert sentence in capfd.readouterr().err
     assert not (tmp_path / "out").exists(), "half a data set"
 
 
 def test_a_folder_that_holds_something_is_left_as_it_is(tmp_path, capfd):
-    given = dataset(tmp_path / "given")
-    before = (given / "images" / "a.png").read_bytes()
-    assert cli.main(["camera", str(given), "--undistort", str(given)]) == 2
-    assert "not an empty folder" in capfd.readouterr().err and (given / "images" / "a.png").read_bytes() == before
+    folder = dataset(tmp_path / "given")
+    before = (folder / "images" / "a.png").read_bytes()
+    assert cli.main(["camera", str(folder), "--undistort", str(folder)]) == 2
+    assert "not an empty folder" in capfd.readouterr().err and (folder / "images" / "a.png").read_bytes() == before
 
 
 def test_sixteen_bits_and_alpha_stay(tmp_path):

@@ -71,9 +71,9 @@ def test_what_is_chosen_comes_on_top_of_what_the_stage_says():
 
 @pytest.mark.parametrize("name", ["plain", "shifted_and_not_square", "telephoto"])
 def test_what_was_written_with_y_up_is_the_same_camera_whether_that_is_chosen_or_not(name):
-    given = [Camera("a", CAMERAS[name])]
+    written_cameras = [Camera("a", CAMERAS[name])]
     for options in (Options(), Options(axes="y_up")):
-        text = cameras.write(given, "usd", options)
+        text = cameras.write(written_cameras, "usd", options)
         assert read(text)[0].pinhole == read(text, Options(axes="y_up"))[0].pinhole == CAMERAS[name] or options.axes == "as_is"
         assert read(text)[0].pinhole == CAMERAS[name] and not any("written with" in note for note in read(text)[0].notes)
 
@@ -100,7 +100,7 @@ def outside(request, folder):
         if not hasattr(os, "mkfifo"):
             pytest.skip("there are no pipes in folders here")
         os.mkfifo(folder / "pipe.usda")
-    return OUTSIDE[request.param].format(folder=folder)
+    return OUTSIDE[request.param].format(folder=folder.as_posix())
 
 
 OUTSIDE = {
@@ -135,10 +135,10 @@ def test_no_stage_opens_what_lies_outside_of_its_folder_or_is_no_file(folder, ou
         text = text[: text.rindex("}")] + variant
     (folder / "a.usda").write_text(text)
     started = time.monotonic()
-    found = cameras.read(folder / "a.usda", options=GIVEN)
+    cameras_read = cameras.read(folder / "a.usda", options=GIVEN)
     assert time.monotonic() - started < SECONDS
-    assert [camera.name for camera in found] == ["Cam"]
-    (note,) = (note for note in found[0].notes if note.startswith("Not read"))
+    assert [camera.name for camera in cameras_read] == ["Cam"]
+    (note,) = (note for note in cameras_read[0].notes if note.startswith("Not read"))
     assert outside[:20] in note
 
 
@@ -147,9 +147,9 @@ def test_a_stage_is_composed_of_the_layers_in_its_folder(folder, arc):
     head = "subLayers = [@parts/part.usda@]" if arc == "layers" else ""
     body = "" if arc == "layers" else 'def "group" (\n prepend references = @./parts/part.usda@</part>\n)\n{\n}\n'
     (folder / "a.usda").write_text(stage(head=f'metersPerUnit = 1\n upAxis = "Z"\n {head}') + body)
-    found = cameras.read(folder / "a.usda", options=GIVEN)
-    assert {camera.name for camera in found} == {"Cam", "part" if arc == "layers" else "group"}
-    assert not any(note.startswith("Not read") for camera in found for note in camera.notes)
+    cameras_read = cameras.read(folder / "a.usda", options=GIVEN)
+    assert {camera.name for camera in cameras_read} == {"Cam", "part" if arc == "layers" else "group"}
+    assert not any(note.startswith("Not read") for camera in cameras_read for note in camera.notes)
 
 
 def test_value_clips_are_left_out(folder):
@@ -174,8 +174,8 @@ def test_a_package_is_read_from_its_first_file_on_with_the_layers_in_it(tmp_path
     (tmp_path / "part.usda").write_text(stage(name="part"))
     (tmp_path / "a.usda").write_text(stage(head='metersPerUnit = 1\n upAxis = "Z"\n subLayers = [@./part.usda@]'))
     assert UsdUtils.CreateNewUsdzPackage(str(tmp_path / "a.usda"), str(tmp_path / "a.usdz"))
-    found = cameras.read(tmp_path / "a.usdz", options=GIVEN)
-    assert {camera.name for camera in found} == {"Cam", "part"}
+    cameras_read = cameras.read(tmp_path / "a.usdz", options=GIVEN)
+    assert {camera.name for camera in cameras_read} == {"Cam", "part"}
 
 
 def doubling(times):
@@ -224,12 +224,12 @@ def test_a_hostile_stage_is_refused_in_a_sentence_in_time(tmp_path, name):
 def test_a_time_of_a_camera_that_moves_is_what_the_stage_counts_by():
     text = stage(head='metersPerUnit = 1\n upAxis = "Z"\n timeCodesPerSecond = 25')
     moving = "double3 xformOp:translate.timeSamples = { 0: (0, 0, 5), 50: (3, 0, 5) }"
-    found = read(text.replace("double3 xformOp:translate = (3, -1.5, -4.5)", moving))
-    assert [(camera.name, camera.time, camera.pinhole.eye) for camera in found] == [
+    reread = read(text.replace("double3 xformOp:translate = (3, -1.5, -4.5)", moving))
+    assert [(camera.name, camera.time, camera.pinhole.eye) for camera in reread] == [
         ("Cam 0", 0.0, (0, 0, 5)),
         ("Cam 50", 2.0, (3, 0, 5)),
     ]
-    assert all(math.isfinite(camera.pinhole.distance[0]) for camera in found)
+    assert all(math.isfinite(camera.pinhole.distance[0]) for camera in reread)
 
 
 def test_where_openusd_is_not_here_a_sentence_says_what_to_do(monkeypatch):

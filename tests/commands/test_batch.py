@@ -43,9 +43,9 @@ def batch(capfd, *words, status=0):
 
 
 def fails(capfd, *words, status=2):
-    said = batch(capfd, *words, status=status)
-    assert said.out == "" and len(said.err.splitlines()) == 1 and "bug" not in said.err, said
-    return said.err
+    output = batch(capfd, *words, status=status)
+    assert output.out == "" and len(output.err.splitlines()) == 1 and "bug" not in output.err, output
+    return output.err
 
 
 def files(folder):
@@ -60,21 +60,21 @@ def test_a_thousand_rows_with_forty_kinds_of_bad_ones_are_named_by_line_and_colu
         rows[line - 2][HEADER.split(",").index(column)] = text
     path, out, result = tmp_path / "shots.csv", tmp_path / "out", tmp_path / "result.json"
     path.write_text("\n".join([HEADER, *map(",".join, rows)]), encoding="utf-8")
-    said = batch(capfd, CORNELL, path, "--out", out, "--json", result, "--log-json", status=2)
-    told = said.err.splitlines()
-    assert told[0].startswith(f"viewcam batch: {path}: ") and told[0].endswith("problems, nothing is rendered")
+    output = batch(capfd, CORNELL, path, "--out", out, "--json", result, "--log-json", status=2)
+    lines = output.err.splitlines()
+    assert lines[0].startswith(f"viewcam batch: {path}: ") and lines[0].endswith("problems, nothing is rendered")
     for line, (column, text) in wrong.items():
-        about = [sentence for sentence in told if f"  line {line}, column" in sentence]
+        about = [sentence for sentence in lines if f"  line {line}, column" in sentence]
         places = "".join(sentence.partition(":")[0].partition(" is ")[0] for sentence in about)
         assert column in places, f"line {line}, {column} = {text!r}: told was {about}"
-    assert {int(sentence.split()[1].rstrip(",")) for sentence in told[1:]} == {*wrong}, "a right line is called wrong"
-    error = next(event for event in map(json.loads, said.out.splitlines()) if event["event"] == "error")
-    assert error["problems"] == json.loads(result.read_text())["problems"] == [sentence.strip() for sentence in told[1:]]
+    assert {int(sentence.split()[1].rstrip(",")) for sentence in lines[1:]} == {*wrong}, "a right line is called wrong"
+    error = next(event for event in map(json.loads, output.out.splitlines()) if event["event"] == "error")
+    assert error["problems"] == json.loads(result.read_text())["problems"] == [sentence.strip() for sentence in lines[1:]]
     assert not out.exists()
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "sentence"),
     [
         ([], "--out"),
         ([CORNELL], "--out"),
@@ -105,10 +105,10 @@ def test_a_thousand_rows_with_forty_kinds_of_bad_ones_are_named_by_line_and_colu
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_each_wrong_word_is_one_sentence_and_nothing_is_written(tmp_path, capfd, monkeypatch, words, told):
+def test_each_wrong_word_is_one_sentence_and_nothing_is_written(tmp_path, capfd, monkeypatch, words, sentence):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "FILE").write_text("camera.lookAt(eye=(7, -6, 4), look_at=(0, 0, 1), up=(0, 0, 1))")
-    assert told in fails(capfd, *words)
+    assert sentence in fails(capfd, *words)
     assert files(tmp_path) == ["FILE"]
 
 
@@ -130,8 +130,8 @@ def test_a_shot_s_own_words_count_more_than_the_command_line_s(tmp_path, capfd):
     (tmp_path / "shots.csv").write_text(f"name,camera,width,height,samples,frame\nown,{CAMERA},12,8,2,3\nother,{CAMERA},,,,\n")
     batch(capfd, CORNELL, tmp_path / "shots.csv", "--out", tmp_path / "out", *SMALL, "--frame", "5", "--engine", "CYCLES")
     shots = {name: json.loads((tmp_path / "out" / f"{name}.json").read_text())["shot"] for name in ("own", "other")}
-    told = [[shot[key] for key in ("width", "height", "samples", "frame", "engine")] for shot in shots.values()]
-    assert told == [[12, 8, 2, 3, "CYCLES"], [16, 16, 1, 5, "CYCLES"]]
+    entries = [[shot[key] for key in ("width", "height", "samples", "frame", "engine")] for shot in shots.values()]
+    assert entries == [[12, 8, 2, 3, "CYCLES"], [16, 16, 1, 5, "CYCLES"]]
 
 
 def test_shards_are_the_whole_and_have_summaries_of_their_own(tmp_path, capfd):
@@ -144,8 +144,8 @@ def test_shards_are_the_whole_and_have_summaries_of_their_own(tmp_path, capfd):
 
 def test_frames_and_cameras_make_shots_of_their_names(tmp_path, capfd):
     out = tmp_path / "out"
-    said = batch(capfd, CORNELL, "--frames=-1..1", "--out", out, *SMALL)
-    assert said.out.startswith("3 shots, in ") and str(out / "contact-sheet.html") in said.out and said.err == ""
+    output = batch(capfd, CORNELL, "--frames=-1..1", "--out", out, *SMALL)
+    assert output.out.startswith("3 shots, in ") and str(out / "contact-sheet.html") in output.out and output.err == ""
     batch(capfd, CORNELL, "--cameras", "Virtual*", "--out", out, *SMALL)
     assert {"frame_-001.exr", "frame_000.exr", "frame_001.exr", f"{CAMERA}.exr"} < {*files(out)}
 
@@ -181,8 +181,8 @@ def test_what_can_not_be_known_is_said_and_resume_known_renders_it_anew(tmp_path
     ):
         assert any("'stage.usdc' is binary USD" in sentence for sentence in warned["warnings"])
     assert "is binary USD" in (out / "contact-sheet.html").read_text()
-    said = batch(capfd, blend, *words, "--resume").out
-    assert rendered() == 0 and "--resume-known" in said and "'stage.usdc' is binary USD" in said
+    output = batch(capfd, blend, *words, "--resume").out
+    assert rendered() == 0 and "--resume-known" in output and "'stage.usdc' is binary USD" in output
     assert "not sure" not in batch(capfd, blend, *words, "--resume-known").out
     assert rendered() == 2
     known = ("--orbit", "2", "--out", tmp_path / "known", *SMALL)
@@ -191,14 +191,14 @@ def test_what_can_not_be_known_is_said_and_resume_known_renders_it_anew(tmp_path
 
 
 def test_every_event_of_a_batch_is_a_line(tmp_path, capfd):
-    said = batch(capfd, CORNELL, "--orbit", "2", "--out", tmp_path / "out", *SMALL, "--log-json")
-    told = [json.loads(line) for line in said.out.splitlines()]
+    output = batch(capfd, CORNELL, "--orbit", "2", "--out", tmp_path / "out", *SMALL, "--log-json")
+    record = [json.loads(line) for line in output.out.splitlines()]
     shot = ["shot_started", "shot_done"]
-    assert [event["event"] for event in told] == [
+    assert [event["event"] for event in record] == [
         *("started", "batch_started", *shot, *shot, "batch_finished", "message", "finished")
     ]
-    assert told[3]["shot"] == "orbit_000" and Path(told[3]["image"]) == tmp_path / "out" / "orbit_000.exr"
-    assert said.err == ""
+    assert record[3]["shot"] == "orbit_000" and Path(record[3]["image"]) == tmp_path / "out" / "orbit_000.exr"
+    assert output.err == ""
 
 
 def test_a_shot_that_fails_is_a_sentence_and_the_rest_are_there(tmp_path, symlink, capfd):
@@ -206,15 +206,15 @@ def test_a_shot_that_fails_is_a_sentence_and_the_rest_are_there(tmp_path, symlin
     out.mkdir()
     (tmp_path / "file").touch()
     symlink(out / "orbit_001.png", tmp_path / "file" / "picture.png")  # which is no folder
-    said = batch(capfd, CORNELL, "--orbit", "3", "--out", out, *SMALL, status=4)
-    failed, summary = said.err.splitlines()
+    output = batch(capfd, CORNELL, "--orbit", "3", "--out", out, *SMALL, status=4)
+    failed, summary = output.err.splitlines()
     assert failed.startswith("viewcam batch: orbit_001: ") and "orbit_001.png" in failed
-    assert "of 3 shots, 1 failed and 0 are left" in summary and "--resume" in summary and said.out == ""
+    assert "of 3 shots, 1 failed and 0 are left" in summary and "--resume" in summary and output.out == ""
     assert {"orbit_000.json", "orbit_002.json"} < {*files(out)} and "orbit_001.json" not in files(out)
 
 
 def test_on_a_terminal_a_bar_counts_the_shots(tmp_path, on_a_terminal):
     pytest.importorskip("tqdm")
     command = [sys.executable, "-m", "viewcam_addon", "batch", CORNELL, "--orbit", "3", "--out", tmp_path / "out", *SMALL]
-    status, shown = on_a_terminal(command, os.environ | {"PYTHONPATH": str(ROOT)})
-    assert status == 0 and "orbit_000: " in shown and "| 0/3 [" in shown, shown
+    status, printed = on_a_terminal(command, os.environ | {"PYTHONPATH": str(ROOT)})
+    assert status == 0 and "orbit_000: " in printed and "| 0/3 [" in printed, printed

@@ -54,8 +54,8 @@ def check(*words):
 )
 def test_words_that_contradict_each_other_are_one_sentence(capfd, words, sentence):
     assert check(CORNELL, *words) == 2
-    told = capfd.readouterr().err
-    assert sentence in told and told.count("\n") == 1, told
+    output = capfd.readouterr().err
+    assert sentence in output and output.count("\n") == 1, output
 
 
 @pytest.mark.parametrize("name", ["scene.json", "scene.npz", "cycles.exr", "reference.exr", "everything.exr", "index.html"])
@@ -63,8 +63,8 @@ def test_a_folder_where_a_file_of_the_report_belongs_is_refused_before_anything_
     monkeypatch.setattr("viewcam_addon.blender.rendering.cycles.render", lambda *_: pytest.fail("it is rendered"))
     (tmp_path / name).mkdir()
     assert check(CORNELL, *SMALL, "--report", tmp_path) == 2
-    told = capfd.readouterr().err
-    assert f"{name} is a folder" in told and told.count("\n") == 1, told
+    output = capfd.readouterr().err
+    assert f"{name} is a folder" in output and output.count("\n") == 1, output
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
@@ -75,9 +75,9 @@ def test_each_camera_is_a_shot_with_its_report_and_a_junit_case(tmp_path, capfd)
     assert check(CORNELL, *words) == 0
     assert "1 shot, in " in capfd.readouterr().out
     (sidecar,) = (path for path in out.glob("*.json") if path.name != "summary.json")
-    name, told = sidecar.stem, json.loads(sidecar.read_text(encoding="utf-8"))
-    assert told["check"]["passed"] and told["check"]["answer"] == "same" and told["check"]["level"] == "geometry"
-    assert told["report"] == [f"{name}.html", f"{name}.test.png"] and told["bytes"].keys() == set(told["report"])
+    name, record = sidecar.stem, json.loads(sidecar.read_text(encoding="utf-8"))
+    assert record["check"]["passed"] and record["check"]["answer"] == "same" and record["check"]["level"] == "geometry"
+    assert record["report"] == [f"{name}.html", f"{name}.test.png"] and record["bytes"].keys() == set(record["report"])
     assert "viewcam" not in (out / f"{name}.html").read_text(encoding="utf-8").partition("check cornell.blend")[0][-20:]
     assert f'href="{name.replace(" ", "%20")}.html"' in (out / "contact-sheet.html").read_text(encoding="utf-8")
     (case,) = ElementTree.parse(junit).getroot().iter("testcase")

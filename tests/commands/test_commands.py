@@ -83,22 +83,22 @@ def test_one_is_written_in_another_format_with_other_axes_and_scale(model, tmp_p
     assert cli.main([*words, "--out-scale", "0.01", "--json", str(tmp_path / "result.json")]) == 0
     (back,) = cameras.read(out, options=Options(axes="y_up", scale=0.01))
     assert back.pinhole.eye == pytest.approx(RIGHT.eye, abs=1e-14) and back.pinhole.distance == pytest.approx((600, 600))
-    (said,) = json.loads((tmp_path / "result.json").read_text())["cameras"]
-    assert said["name"] == "right" and said["camera"]["eye"] == pytest.approx(RIGHT.eye, abs=1e-14)
+    (record,) = json.loads((tmp_path / "result.json").read_text())["cameras"]
+    assert record["name"] == "right" and record["camera"]["eye"] == pytest.approx(RIGHT.eye, abs=1e-14)
     assert "right.gltf" in capfd.readouterr().out
 
 
 def test_text_on_standard_input_is_answered_on_standard_output(monkeypatch, capfd):
     monkeypatch.setattr("sys.stdin", io.StringIO(cameras.write([Camera("left", LEFT)], "opencv")))
     assert cli.main(["camera", "-", "--to", "transforms"]) == 0
-    told = capfd.readouterr()
-    (back,) = cameras.read(told.out)
+    output = capfd.readouterr()
+    (back,) = cameras.read(output.out)
     assert back.pinhole.principal_point == LEFT.principal_point
-    assert "half a pixel was added" in told.err, "how it was taken must be said, and not among what is written"
+    assert "half a pixel was added" in output.err, "how it was taken must be said, and not among what is written"
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "sentence"),
     [
         (["camera", "MODEL", "--camera", "middle"], "'left', 'right'"),
         (["camera", "MODEL", "--list", "--to", "gltf"], "--list and --to"),
@@ -111,12 +111,12 @@ def test_text_on_standard_input_is_answered_on_standard_output(monkeypatch, capf
         (["camera", "none.json"], "none.json"),
     ],
 )
-def test_what_is_wrong_is_one_sentence_and_nothing_is_written(model, tmp_path, monkeypatch, capfd, words, told):
+def test_what_is_wrong_is_one_sentence_and_nothing_is_written(model, tmp_path, monkeypatch, capfd, words, sentence):
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.rglob("*"))
     assert cli.main([str(model) if word == "MODEL" else word for word in words]) == 2
     (line,) = capfd.readouterr().err.splitlines()
-    assert line.startswith("viewcam camera: ") and told in line
+    assert line.startswith("viewcam camera: ") and sentence in line
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -138,8 +138,8 @@ def test_a_picture_and_itself_are_the_same_and_a_longer_lens_is_found(scene):
     same = vp.compare(picture, vp.render(scene, level="geometry"), scene)
     assert same.passed and same.sentence.startswith("The same picture"), same.sentence
     longer = replace(scene.camera, distance=60.06)
-    found = vp.compare(picture, vp.render(replace(scene, camera=longer), level="geometry"), scene)
-    assert not found.passed and "magnified by 0.999001" in found.sentence, found.sentence
+    comparison = vp.compare(picture, vp.render(replace(scene, camera=longer), level="geometry"), scene)
+    assert not comparison.passed and "magnified by 0.999001" in comparison.sentence, comparison.sentence
 
 
 def test_a_file_is_the_same_as_what_was_read_of_it(scene, tmp_path):

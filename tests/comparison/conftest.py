@@ -41,21 +41,21 @@ class PaperScene:
             distance = (offset[2] - origin[2]) / directions[:, 2]
             flat = np.linalg.norm((origin + distance[:, None] * directions - offset)[:, :2], axis=1)
         distance = np.where((distance > 0) & (flat < self.radius), distance, np.inf)
-        found = np.where(np.isfinite(distance), 0, -1)
-        for i, (*centre, radius) in enumerate(self.spheres):
-            to_centre = np.array(centre) + offset - origin
-            middle = directions @ to_centre
-            half = radius**2 - ((middle[:, None] * directions - to_centre) ** 2).sum(axis=1)
+        actual = np.where(np.isfinite(distance), 0, -1)
+        for i, (*center, radius) in enumerate(self.spheres):
+            to_center = np.array(center) + offset - origin
+            middle = directions @ to_center
+            half = radius**2 - ((middle[:, None] * directions - to_center) ** 2).sum(axis=1)
             with np.errstate(invalid="ignore"):
                 near = middle - np.sqrt(half)
             closer = (half > 0) & (near > 0) & (near < distance)
-            distance, found = np.where(closer, near, distance), np.where(closer, i + 1, found)
+            distance, actual = np.where(closer, near, distance), np.where(closer, i + 1, actual)
 
-        hit = found >= 0
+        hit = actual >= 0
         position = np.where(hit[:, None], origin + np.where(hit, distance, 0.0)[:, None] * directions, 0.0)
-        centres = np.array([(0.0, 0.0, 0.0), *(sphere[:3] for sphere in self.spheres)])[found] + offset
-        radii = np.array([self.radius, *(sphere[3] for sphere in self.spheres)])[found]
-        normal = np.where((found == 0)[:, None], (0.0, 0.0, 1.0), (position - centres) / radii[:, None]) * hit[:, None]
+        centers = np.array([(0.0, 0.0, 0.0), *(sphere[:3] for sphere in self.spheres)])[actual] + offset
+        radii = np.array([self.radius, *(sphere[3] for sphere in self.spheres)])[actual]
+        normal = np.where((actual == 0)[:, None], (0.0, 0.0, 1.0), (position - centers) / radii[:, None]) * hit[:, None]
         local = (position - offset) / self.radius
         away = np.linalg.norm(position - origin, axis=1)
         passes = {
@@ -63,9 +63,9 @@ class PaperScene:
             "Position": position,
             "Normal": normal,
             "UV": np.column_stack([local[:, :2], np.ones(count)]) * hit[:, None],
-            "Object Index": np.where(hit, found + 1, 0)[:, None],
-            "Material Index": np.where(hit, 10 + found % 2, 0)[:, None],
-            "Magnitude": (np.maximum(np.abs(centres).max(axis=1) + radii, np.abs(origin).max()) + away)[:, None] * hit[:, None],
+            "Object Index": np.where(hit, actual + 1, 0)[:, None],
+            "Material Index": np.where(hit, 10 + actual % 2, 0)[:, None],
+            "Magnitude": (np.maximum(np.abs(centers).max(axis=1) + radii, np.abs(origin).max()) + away)[:, None] * hit[:, None],
             "Facing": np.abs((normal * directions).sum(axis=1))[:, None],
         }
         return {name: values.astype(np.float32) for name, values in passes.items()}

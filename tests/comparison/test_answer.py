@@ -25,7 +25,7 @@ def test_what_is_not_modelled_is_named_with_its_share_and_fails_under_strict_alo
     answer = answered(True, "The same picture", "over 9 pixels.", NotModelled((HAIR, FOG), 0.125, 0.1))
     assert (answer.answer, answer.passed, answer.color) == (SAME_BUT, True, "amber")
     assert answer.sentence == (
-        "The same picture, but for 2 objects that are not modelled (Hair, Fog; 12 % of the picture): over 9 pixels."
+        "The same picture, but for 2 objects that are not modeled (Hair, Fog; 12 % of the picture): over 9 pixels."
     )
     assert answer.exit_status(strict=False) == 0 and answer.exit_status(strict=True) == 3
     assert answer.to_json() == {
@@ -44,10 +44,10 @@ def test_what_is_not_modelled_is_named_with_its_share_and_fails_under_strict_alo
 
 
 def test_what_is_modelled_and_still_said_nothing_of_is_told_as_what_it_is():
-    found = NotModelled((HAIR, "Floor", "Carpet", "Lamp"), 0.25).sorted_by(("Floor", "Carpet", "Unseen"), ("Lamp",))
-    answer = answered(True, "The same picture", "over 9 pixels.", found)
+    actual = NotModelled((HAIR, "Floor", "Carpet", "Lamp"), 0.25).sorted_by(("Floor", "Carpet", "Unseen"), ("Lamp",))
+    answer = answered(True, "The same picture", "over 9 pixels.", actual)
     assert answer.headline == (
-        "The same picture, but for 1 object that is not modelled and 2 objects with surfaces in one place "
+        "The same picture, but for 1 object that is not modeled and 2 objects with surfaces in one place "
         "and 1 shadow that not all rays see (Hair, Floor, Carpet and 1 more; 25 % of the picture)"
     )
 
@@ -72,28 +72,28 @@ def test_what_differs_is_different_whatever_is_not_modelled():
 )
 def test_a_share_is_told_as_large_as_it_is(share, words):
     answer = answered(True, "The same picture", "", NotModelled(tuple("abcdef"), share))
-    assert "but for 6 objects that are not modelled (a, b, c and 3 more; " in answer.headline and words in answer.headline
+    assert "but for 6 objects that are not modeled (a, b, c and 3 more; " in answer.headline and words in answer.headline
 
 
 def test_an_object_that_no_pixel_shows_and_that_changes_none_is_not_in_the_picture():
-    found = in_the_picture((HAIR, FOG), {HAIR: mask()}, mask(), is_lit=True)
-    assert found == NotModelled((), 0.0, 0.0)
+    actual = in_the_picture((HAIR, FOG), {HAIR: mask()}, mask(), is_lit=True)
+    assert actual == NotModelled((), 0.0, 0.0)
 
 
 def test_an_object_is_in_the_picture_by_the_pixels_that_show_it():
-    found = in_the_picture((HAIR, FOG), {HAIR: mask(1, 2)}, mask(1, 2), is_lit=True)
-    assert found == NotModelled((HAIR,), 0.1, 0.1)
+    actual = in_the_picture((HAIR, FOG), {HAIR: mask(1, 2)}, mask(1, 2), is_lit=True)
+    assert actual == NotModelled((HAIR,), 0.1, 0.1)
 
 
 def test_a_stand_in_that_changes_no_bit_of_the_passes_of_geometry_is_no_reason_for_amber():
-    shown = {HAIR: mask(1, 2, 3), FOG: mask(4)}
-    assert in_the_picture((HAIR, FOG), shown, mask(), is_lit=False) == NotModelled((), 0.0, 0.0)
-    assert in_the_picture((HAIR, FOG), shown, mask(1, 2), is_lit=False) == NotModelled((HAIR,), 0.1, 0.1)
+    pixels_by_object = {HAIR: mask(1, 2, 3), FOG: mask(4)}
+    assert in_the_picture((HAIR, FOG), pixels_by_object, mask(), is_lit=False) == NotModelled((), 0.0, 0.0)
+    assert in_the_picture((HAIR, FOG), pixels_by_object, mask(1, 2), is_lit=False) == NotModelled((HAIR,), 0.1, 0.1)
 
 
 def test_what_is_not_seen_is_in_the_picture_where_it_changes_another_pixel():
-    found = in_the_picture((HAIR, FOG), {HAIR: mask(1, 2)}, mask(2, 3, 4), is_lit=True)
-    assert found == NotModelled((HAIR, FOG), 0.2, 0.1)
+    actual = in_the_picture((HAIR, FOG), {HAIR: mask(1, 2)}, mask(2, 3, 4), is_lit=True)
+    assert actual == NotModelled((HAIR, FOG), 0.2, 0.1)
 
 
 def test_without_a_picture_of_everything_the_share_of_what_has_no_surface_is_unknown():

@@ -72,11 +72,11 @@ def test_shift_zoom_and_roll_are_told_apart():
     pixels = np.arange(0, STATED.width * STATED.height, 997)
     x, y = pixels % STATED.width + 0.5 - 960, pixels // STATED.width + 0.5 - 540
     off_x, off_y = 0.25 + 1e-3 * x - 2e-4 * y, -0.5 + 1e-3 * y + 2e-4 * x
-    found = systematic_error(STATED, pixels, off_x, off_y, np.full(len(x), 1e-4))
-    assert (found.shift_x, found.shift_y) == pytest.approx((0.25, -0.5))
-    assert (found.zoom_x, found.zoom_y) == pytest.approx((1e-3, 1e-3))
-    assert found.roll == pytest.approx(2e-4, rel=2e-3)  # arctan of 2e-4 / 1.001
-    assert not found.ok
+    actual = systematic_error(STATED, pixels, off_x, off_y, np.full(len(x), 1e-4))
+    assert (actual.shift_x, actual.shift_y) == pytest.approx((0.25, -0.5))
+    assert (actual.zoom_x, actual.zoom_y) == pytest.approx((1e-3, 1e-3))
+    assert actual.roll == pytest.approx(2e-4, rel=2e-3)  # arctan of 2e-4 / 1.001
+    assert not actual.ok
 
 
 def test_what_all_share_is_not_hidden_by_a_few_uncertain_pixels():

@@ -34,11 +34,11 @@ def a_scene(lift=0.0, only=None, colours=COLOURS, energy=2.0):
     wall = quad((-3, 3, -1), (3, 3, -1), (3, 3, 3), (-3, 3, 3))
     side = quad((3, -3, -1), (3, 3, -1), (3, 3, 3), (3, -3, 3))
     geometries = {"Floor": floor, "Carpet": carpet, "Wall": wall, "Side": side}
-    shown = [name for name in geometries if name != only]
+    kept_names = [name for name in geometries if name != only]
     return Scene(
         CAMERA,
         geometries,
-        tuple(Object(name, name, np.eye(4), i, materials=(name,)) for i, name in enumerate(shown, start=1)),
+        tuple(Object(name, name, np.eye(4), i, materials=(name,)) for i, name in enumerate(kept_names, start=1)),
         materials={name: Material(surface=node("diffuse", color=color)) for name, color in colours.items()},
         lamps=(Sun("sun", towards=(0.2, -0.6, 1.0), irradiance=(energy,) * 3, angle=0.3),),
         film=Film("BOX"),
@@ -73,17 +73,17 @@ def as_cycles(seed, **scene):
     """Pictures as Cycles makes them: rounding gives each pixel the floor's light, the carpet's, or none by the two."""
     random = np.random.default_rng(seed)
     without_carpet, without_floor = (pictures(a_scene(only=name, **scene)) for name in ("Carpet", "Floor"))
-    shown = Tracer(a_scene(lift=1e-4), 1).render()["Object Index"][..., 0] == 2
-    share = random.integers(0, 3, shown.shape)
+    rendered = Tracer(a_scene(lift=1e-4), 1).render()["Object Index"][..., 0] == 2
+    share = random.integers(0, 3, rendered.shape)
     images = []
     for bare, carpeted in zip(without_carpet, without_floor, strict=True):
         passes = {name: values.copy() for name, values in bare.passes.items()}
         for name, values in passes.items():
-            values[shown & (share == 1)] = carpeted[name][shown & (share == 1)]
+            values[rendered & (share == 1)] = carpeted[name][rendered & (share == 1)]
             if name != "Depth" and values.shape[2] < 4:
-                values[shown & (share == 2)] = 0.0
+                values[rendered & (share == 2)] = 0.0
             elif name == "Combined":
-                values[shown & (share == 2), :3] = 0.0
+                values[rendered & (share == 2), :3] = 0.0
         images.append(replace(bare, passes=passes))
     return images
 
@@ -95,20 +95,20 @@ def honest():
 
 def test_pixels_that_show_surfaces_in_one_place_are_taken_out_and_the_rest_is_the_same(reference, honest, coincident):
     assert not radiance.compare(reference, honest, CAMERA).passed
-    found = radiance.compare(reference, honest, CAMERA, make_coincident=lambda: coincident)
-    assert found.passed, "\n".join(found.lines())
-    assert found.taken_out.pairs.keys() == {("Carpet", "Floor")}
-    assert 0.05 < found.taken_out.pixels.mean() < 0.3
-    assert f"the {found.taken_out.count:,} pixels that show surfaces in one place" in found.sentence
-    assert found.to_json()["in_one_place"]["pairs"] == [{"objects": ["Carpet", "Floor"]}]
+    comparison = radiance.compare(reference, honest, CAMERA, make_coincident=lambda: coincident)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert comparison.taken_out.pairs.keys() == {("Carpet", "Floor")}
+    assert 0.05 < comparison.taken_out.pixels.mean() < 0.3
+    assert f"the {comparison.taken_out.count:,} pixels that show surfaces in one place" in comparison.sentence
+    assert comparison.to_json()["in_one_place"]["pairs"] == [{"objects": ["Carpet", "Floor"]}]
 
 
 def test_nothing_is_taken_out_where_the_pictures_are_the_same(reference):
     def never():
         raise AssertionError("nobody has to ask")
 
-    found = radiance.compare(reference, pictures(a_scene()), CAMERA, make_coincident=never)
-    assert found.passed and not found.taken_out.pairs
+    comparison = radiance.compare(reference, pictures(a_scene()), CAMERA, make_coincident=never)
+    assert comparison.passed and not comparison.taken_out.pairs
 
 
 def test_nothing_is_taken_out_where_no_two_surfaces_are_in_one_place(honest):
@@ -149,15 +149,15 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_sabotage_is_found_in_the_rest(reference, coincident, fault):
-    found = radiance.compare(reference, as_cycles(1, **FAULTS[fault]), CAMERA, make_coincident=lambda: coincident)
-    assert not found.passed and found.taken_out.count, "\n".join(found.lines())
+    comparison = radiance.compare(reference, as_cycles(1, **FAULTS[fault]), CAMERA, make_coincident=lambda: coincident)
+    assert not comparison.passed and comparison.taken_out.count, "\n".join(comparison.lines())
 
 
 def test_the_light_by_surfaces_in_one_place_is_what_all_of_them_scatter(coincident):
     """At the carpet's middle: its own light and the floor's, as if each were there alone."""
     alone = sum(pictures(a_scene(only=name), (5,))[0]["Combined"][..., :3].astype(float) for name in ("Carpet", "Floor"))
-    shown = Tracer(a_scene(lift=1e-4), 1).render()["Object Index"][..., 0] == 2
-    ratio = coincident.light["Combined"][..., :3][shown].mean(axis=0) / alone[shown].mean(axis=0)
+    rendered = Tracer(a_scene(lift=1e-4), 1).render()["Object Index"][..., 0] == 2
+    ratio = coincident.light["Combined"][..., :3][rendered].mean(axis=0) / alone[rendered].mean(axis=0)
     # With both in one place they light the wall, and that them: a little more than either alone.
     assert ((ratio > 0.95) & (ratio < 1.15)).all(), ratio
     far = Tracer(a_scene(), 1).render()["Object Index"][..., 0] == 4

@@ -48,24 +48,24 @@ def test_a_picture_with_everything_that_is_the_same_shows_nothing_that_is_not_mo
 def test_a_single_other_bit_of_geometry_is_counted(paper_scene, name):
     test = geometry(paper_scene)
     everything = changed(test, name, (3, 4), by=np.spacing(np.abs(test[name][3, 4]).max()) * 2)
-    found = not_modelled(("Hair",), {}, test, [test], everything)
-    assert found.names == ("Hair",) and found.share == 1 / (WIDTH * HEIGHT) and found.shown == 0.0
+    actual = not_modelled(("Hair",), {}, test, [test], everything)
+    assert actual.names == ("Hair",) and actual.share == 1 / (WIDTH * HEIGHT) and actual.shown == 0.0
 
 
 def test_other_normals_count_where_an_object_is_not_modelled_and_nowhere_else(paper_scene):
     test = geometry(paper_scene)
     everything = changed(test, "Normal", np.s_[12, :], by=0.1)
-    found = not_modelled(("Ball", "Hair"), {"Ball": BALL}, test, [test], everything)
-    assert found.names == ("Ball",) and found.share == BALL[12].sum() / BALL.size
+    actual = not_modelled(("Ball", "Hair"), {"Ball": BALL}, test, [test], everything)
+    assert actual.names == ("Ball",) and actual.share == BALL[12].sum() / BALL.size
 
 
 @pytest.mark.parametrize("seeds", [1, SEEDS])
 def test_light_that_is_another_beyond_noise_is_counted_where_it_is(seeds):
     reference, tests = lit(seeds)
     everything = changed(tests[0], "Combined", np.s_[16:32, 16:32, :3], by=4.0)
-    found = not_modelled(("Lamp",), {}, reference, tests, everything, PINHOLE)
-    assert found.names == ("Lamp",)
-    assert found.share == pytest.approx(16 * 16 / (WIDTH * HEIGHT), rel=0.6), "its pixels, and the tiles that they reach into"
+    actual = not_modelled(("Lamp",), {}, reference, tests, everything, PINHOLE)
+    assert actual.names == ("Lamp",)
+    assert actual.share == pytest.approx(16 * 16 / (WIDTH * HEIGHT), rel=0.6), "its pixels, and the tiles that they reach into"
 
 
 def test_a_faint_change_of_all_light_is_found_in_the_sum_and_is_all_of_the_picture():
@@ -84,8 +84,8 @@ def test_other_noise_of_the_same_light_is_no_change():
 
 def test_what_is_seen_counts_at_levels_of_light_however_like_its_stand_in_it_is():
     reference, tests = lit()
-    found = not_modelled(("Ball", "Hair"), {"Ball": BALL}, reference, tests, tests[0], PINHOLE)
-    assert found.names == ("Ball",) and found.share == found.shown == BALL.mean()
+    actual = not_modelled(("Ball", "Hair"), {"Ball": BALL}, reference, tests, tests[0], PINHOLE)
+    assert actual.names == ("Ball",) and actual.share == actual.shown == BALL.mean()
 
 
 def test_a_pixel_that_is_no_number_with_everything_is_another():

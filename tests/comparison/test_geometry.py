@@ -38,14 +38,14 @@ def test_errors_within_the_tolerance_pass_from_anywhere(azimuth, height, distanc
 
 
 def test_crossed_silhouettes_are_found_and_all_of_them_explained(far_scene):
-    found = 0
+    actual = 0
     for seed in range(4):
         comparison = compare(far_scene.picture(), far_scene.rendered(seed=seed), far_scene.pinhole, far_scene.surfaces_at)
         assert comparison.passed, "\n".join(comparison.lines())
-        found += len(comparison.mismatches.kinds)
+        actual += len(comparison.mismatches.kinds)
         largest = np.nanmax(comparison.mismatches.shifts, initial=0.0)
         assert largest <= tolerances.ROUNDINGS[-1] * np.nanmax(comparison.mismatches.reach, initial=0.0)
-    assert found >= 4, f"only {found} rays crossed an edge: the scene tests nothing"
+    assert actual >= 4, f"only {actual} rays crossed an edge: the scene tests nothing"
 
 
 def test_without_a_scene_a_crossed_silhouette_stays_unexplained_and_the_verdict_says_why(far_scene):
@@ -77,12 +77,12 @@ def test_the_result_is_plain_json_and_says_what_the_lines_say(paper_scene):
     comparison = compare(
         paper_scene.picture(), paper_scene.rendered(), paper_scene.pinhole, paper_scene.surfaces_at, paper_scene.pinhole
     )
-    told = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
-    assert told["passed"] and told["passes"][0]["name"] == "Position"
-    assert told["passes"][0]["count"] == comparison.rows[0].count
-    assert told["conversion"]["largest"] < 1e-9  # float64 rounding of 320 px
+    record = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
+    assert record["passed"] and record["passes"][0]["name"] == "Position"
+    assert record["passes"][0]["count"] == comparison.rows[0].count
+    assert record["conversion"]["largest"] < 1e-9  # float64 rounding of 320 px
     lines = comparison.lines()
-    assert lines[-1] == told["sentence"]
+    assert lines[-1] == record["sentence"]
     assert all(any(line.startswith(row.name) for line in lines) for row in comparison.rows)
     assert max(map(len, lines[:-1])) < 150
 

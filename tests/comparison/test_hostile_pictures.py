@@ -46,8 +46,8 @@ def lit(seed, samples=64):
 
 def assert_told(comparison, write_report, reference, test, folder):
     """That all of it can be said and drawn, in finite figures."""
-    told = json.dumps(checks.for_json(comparison.to_json()), allow_nan=False)
-    assert comparison.sentence and all(comparison.lines()) and told
+    text = json.dumps(checks.for_json(comparison.to_json()), allow_nan=False)
+    assert comparison.sentence and all(comparison.lines()) and text
     write_report(comparison, reference, test, folder, (), "viewcam compare")
     difference.write(comparison, folder / "difference.png")
     for name, values in comparison.maps.items():

@@ -28,10 +28,10 @@ TRUTH = np.stack([0.2 + 0.5 * columns / WIDTH, 0.3 + 0.3 * rows / HEIGHT, np.ful
 COVER = np.clip((columns - WIDTH / 3 + 0.3 * rows) / 3, 0.0, 1.0)[..., None]
 
 
-def rounding(one):
+def rounding(allowed):
     """One rounding of each pixel's value; nothing is shifted, nothing stored in short."""
     none = np.zeros((HEIGHT, WIDTH))
-    return Allowance(none, none + one, none, none)
+    return Allowance(none, none + allowed, none, none)
 
 
 NO_ROUNDING = rounding(1e-9)
@@ -82,13 +82,13 @@ def endless(rng, samples):
     return drawn.mean(axis=0), drawn.var(axis=0) / (samples - 1)
 
 
-def sides_of(kind, rng, samples, each, seeds, told=1.0):
-    """The reference at so many samples, the mean of so many pictures with `each` samples; told : factor on the variance."""
+def sides_of(kind, rng, samples, each, seeds, claimed=1.0):
+    """The reference at so many samples, the mean of so many pictures with `each` samples; claimed : factor on the variance."""
     reference, variance = kind(rng, samples)
     pictures = np.stack([kind(rng, each)[0] for _ in range(seeds)])
     test = pictures.mean(axis=0)
     spread = pictures.var(axis=0, ddof=1) / seeds if seeds > 1 else np.full(TRUTH.shape, np.inf)
-    return Sides("Combined", reference, test, told * variance, spread, np.zeros((HEIGHT, WIDTH), bool))
+    return Sides("Combined", reference, test, claimed * variance, spread, np.zeros((HEIGHT, WIDTH), bool))
 
 
 def run(sides, samples, seeds):
@@ -97,7 +97,7 @@ def run(sides, samples, seeds):
 
 
 @pytest.mark.parametrize(
-    ("kind", "samples", "each", "seeds", "told"),
+    ("kind", "samples", "each", "seeds", "claimed"),
     [
         pytest.param(even, 256, 32, 8, 1.0, id="variances are right"),
         pytest.param(batched, 256, 32, 8, 1.0, id="the reference's variance is that of 16 batches"),
@@ -116,9 +116,9 @@ def run(sides, samples, seeds):
     ],
 )
 @pytest.mark.parametrize(("trials", "most"), TRIALS)
-def test_chance_raises_no_more_than_one_false_alarm_in_a_hundred(kind, samples, each, seeds, told, trials, most):
+def test_chance_raises_no_more_than_one_false_alarm_in_a_hundred(kind, samples, each, seeds, claimed, trials, most):
     rng = np.random.default_rng(1)
-    asked = [run(sides_of(kind, rng, samples, each, seeds, told), samples, seeds) for _ in range(trials)]
+    asked = [run(sides_of(kind, rng, samples, each, seeds, claimed), samples, seeds) for _ in range(trials)]
     alarms = [[test.name for test in trial if not test.ok] for trial in asked]
     count = sum(bool(names) for names in alarms)
     assert count <= most, f"{count} of {trials}: {[names for names in alarms if names]}"
@@ -145,23 +145,23 @@ def visible_bias(sides, limit):
 def test_a_bias_of_the_whole_picture_is_found_as_the_formula_says(share, least, most):
     """At the bias b = limit · σ / (√n · mean) the sum lies at the limit in the mean, and half of the time above. The limit is
     some 3.7 standard errors: half the bias lies 1.8 of them below it, 1.6 times the bias 2.2 above."""
-    rng, trials, found = np.random.default_rng(4), 200, 0
+    rng, trials, actual = np.random.default_rng(4), 200, 0
     for _ in range(trials):
         sides = sides_of(grey, rng, 256, 32, 8)
         sides = replace(sides, **{name: getattr(sides, name)[..., :1] for name in ("reference", "test", "variance", "spread")})
         bias = share * visible_bias(sides, run(sides, 256, 8)[-1].limit)
-        found += not run(replace(sides, test=sides.test * (1.0 + bias)), 256, 8)[-1].ok
+        actual += not run(replace(sides, test=sides.test * (1.0 + bias)), 256, 8)[-1].ok
     # 200 trials: 0.5 ± 0.15 is four standard deviations of the binomial distribution.
-    assert least <= found / trials <= most
+    assert least <= actual / trials <= most
 
 
 def test_two_hundredths_too_bright_are_found_at_256_samples_of_1280_pixels():
     """Noise of 1/16 on either side: the mean is known to √2/16/√1280 = 0.25 %, and the bias is eight times that."""
     rng = np.random.default_rng(5)
-    found = [
+    result = [
         not run(replace(s, test=s.test * 1.02), 256, 8)[-1].ok for s in (sides_of(even, rng, 256, 32, 8) for _ in range(20))
     ]
-    assert all(found)
+    assert all(result)
 
 
 @pytest.mark.parametrize("size", hypothesis_tests.SIZES[:3])
@@ -205,10 +205,10 @@ def test_what_is_softer_or_sharper_is_told_along_contours_where_no_tile_tells_it
 def test_a_pixels_own_noise_is_not_in_its_weight():
     """Else what is noise alone would look softer than its reference: by a standard error for each of √960 pixels, near 30."""
     rng = np.random.default_rng(10)
-    found = [run(sides_of(grey, rng, 256, 32, 8), 256, 8)[3].errors[0, 0, 0] for _ in range(100)]
-    assert abs(np.mean(found)) < 0.4 and 0.5 < np.std(found) < 1.2  # of 100 draws the mean is off by 0.1, times four
+    result = [run(sides_of(grey, rng, 256, 32, 8), 256, 8)[3].errors[0, 0, 0] for _ in range(100)]
+    assert abs(np.mean(result)) < 0.4 and 0.5 < np.std(result) < 1.2  # of 100 draws the mean is off by 0.1, times four
     sides = sides_of(grey, rng, 256, 32, 8)
-    assert run(replace(sides, shared=sides.variance), 256, 8)[3].is_open, "neighbours that share noise have no such weights"
+    assert run(replace(sides, shared=sides.variance), 256, 8)[3].is_open, "neighbors that share noise have no such weights"
 
 
 def test_a_pixel_without_noise_may_differ_by_rounding_and_by_no_more():
@@ -235,12 +235,12 @@ def test_a_shift_of_cycles_filter_table_is_allowed_and_one_of_a_tenth_of_a_pixel
 
 
 def test_a_row_of_the_result_is_plain_json():
-    told = [test.to_json() for test in run(sides_of(even, np.random.default_rng(8), 64, 8, 8), 64, 8)]
-    assert json.loads(json.dumps(told)) == [
+    entries = [test.to_json() for test in run(sides_of(even, np.random.default_rng(8), 64, 8, 8), 64, 8)]
+    assert json.loads(json.dumps(entries)) == [
         {**entry, "worst": {**entry["worst"], **{name: list(entry["worst"][name]) for name in ("columns", "rows")}}}
-        for entry in told
+        for entry in entries
     ]
-    assert [entry["name"] for entry in told] == ["pixels", "tiles of 8 × 8", "tiles of 32 × 32", "contours", "whole picture"]
+    assert [entry["name"] for entry in entries] == ["pixels", "tiles of 8 × 8", "tiles of 32 × 32", "contours", "whole picture"]
 
 
 def test_a_shift_of_the_picture_is_no_excuse_for_a_bias_of_noisy_light():
@@ -257,13 +257,13 @@ def test_a_shift_of_the_picture_is_no_excuse_for_a_bias_of_noisy_light():
 def test_pixels_that_share_their_noise_are_judged_by_that_of_their_samples():
     """Each pixel is the mean of a window: its own noise is a fifth, and that of a tile's sum what it was."""
     rng = np.random.default_rng(8)
-    found = sides_of(even, rng, 64, 1024, 8)
-    noise = found.reference - TRUTH
+    actual = sides_of(even, rng, 64, 1024, 8)
+    noise = actual.reference - TRUTH
     for axis in (0, 1):
         noise = sum(np.roll(noise, shift, axis) for shift in range(-2, 3)) / 5.0
-    smooth = replace(found, reference=TRUTH + noise)
+    smooth = replace(actual, reference=TRUTH + noise)
     failing = [test.name for test in run(smooth, 64, 8) if not test.ok]
     assert failing, "sums of what is not independent look certain"
-    told = replace(smooth, shared=found.variance)
-    assert all(test.ok for test in run(told, 64, 8)), [test.name for test in run(told, 64, 8) if not test.ok]
-    assert not all(test.ok for test in run(replace(told, test=told.test * 1.02), 64, 8)), "2 % is not found"
+    claimed = replace(smooth, shared=actual.variance)
+    assert all(test.ok for test in run(claimed, 64, 8)), [test.name for test in run(claimed, 64, 8) if not test.ok]
+    assert not all(test.ok for test in run(replace(claimed, test=claimed.test * 1.02), 64, 8)), "2 % is not found"

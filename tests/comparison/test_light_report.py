@@ -52,9 +52,9 @@ class Page(HTMLParser):
 
 
 def picture(values, samples, source):
-    made = {"Combined": np.concatenate([values, np.ones((48, 64, 1))], axis=-1), "Depth": np.full((48, 64, 1), 8.0)}
-    made["Variance"] = TRUTH**2 / samples if samples > 1 else 0 * TRUTH
-    return Image({name: v.astype(np.float32) for name, v in made.items()}, PINHOLE, {"samples": str(samples)}, source)
+    passes = {"Combined": np.concatenate([values, np.ones((48, 64, 1))], axis=-1), "Depth": np.full((48, 64, 1), 8.0)}
+    passes["Variance"] = TRUTH**2 / samples if samples > 1 else 0 * TRUTH
+    return Image({name: v.astype(np.float32) for name, v in passes.items()}, PINHOLE, {"samples": str(samples)}, source)
 
 
 def noisy(factor, samples, seeds=8):

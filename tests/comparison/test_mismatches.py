@@ -28,19 +28,21 @@ def test_a_ray_that_was_moved_within_tolerance_is_explained_and_the_shift_is_abo
     shift = 0.05
     exact, moved, rows, columns = edge_pixels(far_scene, shift)
     test = with_pixels_of(exact, moved, rows, columns)
-    found = compare(exact, test, far_scene.pinhole, far_scene.surfaces_at).mismatches
-    assert len(found.kinds) >= len(rows) > 5
-    assert found.explained.all()
-    assert (found.shifts <= found.reach).all()
+    comparison = compare(exact, test, far_scene.pinhole, far_scene.surfaces_at).mismatches
+    assert len(comparison.kinds) >= len(rows) > 5
+    assert comparison.explained.all()
+    assert (comparison.shifts <= comparison.reach).all()
     # A smaller shift in another direction may do; the rings grow by at most a factor of 2.2, and directions are 22.5° apart.
-    assert found.shifts.max() <= 2.3 * shift
+    assert comparison.shifts.max() <= 2.3 * shift
 
 
 def test_a_ray_that_was_moved_beyond_tolerance_is_not_explained(paper_scene):
     shift = 0.3
     exact, moved, rows, columns = edge_pixels(paper_scene, shift)
-    found = compare(exact, with_pixels_of(exact, moved, rows, columns), paper_scene.pinhole, paper_scene.surfaces_at).mismatches
-    beyond = (~found.explained).sum()
+    comparison = compare(
+        exact, with_pixels_of(exact, moved, rows, columns), paper_scene.pinhole, paper_scene.surfaces_at
+    ).mismatches
+    beyond = (~comparison.explained).sum()
     assert beyond > 0.9 * len(rows), f"{beyond} of {len(rows)} stayed unexplained"
 
 
@@ -52,8 +54,8 @@ def test_the_right_object_at_a_wrong_depth_is_not_explained(far_scene):
     # Only where the ray slipped to the ground: next to the rim of a sphere depth has no slope that bounds it.
     on_ground = deeper["Object Index"][rows, columns, 0] == 1
     test = with_pixels_of(exact, deeper, rows[on_ground], columns[on_ground])
-    found = compare(exact, test, far_scene.pinhole, far_scene.surfaces_at).mismatches
-    assert found.unexplained_count == on_ground.sum() > 0
+    comparison = compare(exact, test, far_scene.pinhole, far_scene.surfaces_at).mismatches
+    assert comparison.unexplained_count == on_ground.sum() > 0
 
 
 def test_kinds_are_counted(far_scene):
@@ -67,16 +69,22 @@ def test_kinds_are_counted(far_scene):
     passes["Depth"][row, column + 3] *= 2
     for name in passes:
         passes[name][row, column + 4] = 1e10 if name == "Depth" else 0
-    found = compare(exact, replace(exact, passes=passes), far_scene.pinhole, far_scene.surfaces_at).mismatches
-    assert found.counts() == {
+    comparison = compare(exact, replace(exact, passes=passes), far_scene.pinhole, far_scene.surfaces_at).mismatches
+    assert comparison.counts() == {
         "not a number": (1, 0),
         "object index": (1, 0),
         "material index": (1, 0),
         "surface": (1, 0),
         "coverage": (1, 0),
     }
-    assert [KINDS[kind] for kind in found.kinds] == ["not a number", "object index", "material index", "surface", "coverage"]
-    assert (found.columns == column + np.arange(5)).all() and (found.rows == row).all()
+    assert [KINDS[kind] for kind in comparison.kinds] == [
+        "not a number",
+        "object index",
+        "material index",
+        "surface",
+        "coverage",
+    ]
+    assert (comparison.columns == column + np.arange(5)).all() and (comparison.rows == row).all()
 
 
 def test_one_unexplained_pixel_in_a_million_is_allowed_and_in_a_small_picture_none(paper_scene):

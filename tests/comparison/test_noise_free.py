@@ -21,15 +21,15 @@ def light(scene, px=0.5, py=0.5, albedo=1.0):
     height, width = scene.pinhole.height, scene.pinhole.width
     position, normal, index = (passes[name].astype(np.float64) for name in ("Position", "Normal", "Object Index"))
     cosine = np.maximum(normal @ SUN, 0.0)
-    for *centre, radius in scene.spheres:
-        to_centre = np.array(centre) + scene.offset - position
-        along = to_centre @ SUN
-        cosine[(along > 1e-6) & ((to_centre**2).sum(axis=-1) - along**2 < radius**2 * (1 - 1e-9))] = 0.0
+    for *center, radius in scene.spheres:
+        to_center = np.array(center) + scene.offset - position
+        along = to_center @ SUN
+        cosine[(along > 1e-6) & ((to_center**2).sum(axis=-1) - along**2 < radius**2 * (1 - 1e-9))] = 0.0
     colour = albedo * COLOURS[index[..., 0].astype(int)]
     direct = 3.0 / np.pi * cosine[..., None] * (index > 0)
     combined = np.concatenate([colour * direct, np.ones((height, width, 1))], axis=-1)
-    made = {"Combined": combined, "Diffuse Direct": direct * np.ones(3), "Diffuse Color": colour}
-    return {name: values.astype(np.float32) for name, values in made.items()} | {
+    channels = {"Combined": combined, "Diffuse Direct": direct * np.ones(3), "Diffuse Color": colour}
+    return {name: values.astype(np.float32) for name, values in channels.items()} | {
         name: passes[name] for name in ("Depth", "Object Index")
     }
 
@@ -156,7 +156,10 @@ def test_the_tolerance_s_shares_are_of_the_floor_too(paper_scene):
 
 def test_a_light_without_a_diffuse_pass_is_compared_without_a_warning(paper_scene, recwarn):
     image = replace(rendered(paper_scene), attributes={"Software": "Blender 5.2.3 LTS"})
-    bare = [replace(one, passes={name: one[name] for name in ("Combined", "Depth")}) for one in (picture(paper_scene), image)]
+    bare = [
+        replace(picture_, passes={name: picture_[name] for name in ("Combined", "Depth")})
+        for picture_ in (picture(paper_scene), image)
+    ]
     radiance = compare(bare[0], [bare[1]], paper_scene.pinhole)
     assert [row.name for row in radiance.rows] == ["Combined"] and not list(recwarn)
 

@@ -88,7 +88,7 @@ def test_a_shaded_picture_shows_objects_and_sky(paper_scene):
     assert picture.std() > 10
 
 
-def test_a_crop_is_centred_on_its_pixel():
+def test_a_crop_is_centered_on_its_pixel():
     picture = np.zeros((20, 30, 3), np.uint8)
     picture[20 - 1 - 4, 7] = 255
     assert (pictures.crop(picture, (30, 20), 7, 4)[7, 7] == 255).all()

@@ -25,9 +25,9 @@ def picture(rng, samples, truth=TRUTH, attribute="samples", **passes):
     """The mean of so many exponential variates in every pixel, gray noise, and its variance."""
     colour = rng.gamma(samples, 1.0 / samples, (HEIGHT, WIDTH, 1)) * truth
     combined = np.concatenate([colour, np.ones((HEIGHT, WIDTH, 1))], axis=-1)
-    made = {"Combined": combined, "Variance": TRUTH**2 / samples, "Depth": np.full((HEIGHT, WIDTH, 1), 8.0), **passes}
-    made = {name: values.astype(np.float32) for name, values in made.items()}
-    return Image(made, PINHOLE, {attribute: str(samples)}, f"{attribute}.exr")
+    channels = {"Combined": combined, "Variance": TRUTH**2 / samples, "Depth": np.full((HEIGHT, WIDTH, 1), 8.0), **passes}
+    channels = {name: values.astype(np.float32) for name, values in channels.items()}
+    return Image(channels, PINHOLE, {attribute: str(samples)}, f"{attribute}.exr")
 
 
 def both(truth=TRUTH, seed=0):
@@ -182,10 +182,10 @@ def test_a_softer_picture_is_said_to_be_softer():
 
 
 def test_the_json_is_plain_and_says_what_the_sentence_says(same):
-    told = json.loads(json.dumps(same.to_json(), allow_nan=False))
-    assert told["passed"] is True and told["sentence"] == same.sentence
-    assert told["quantities"][0]["name"] == "Combined" and len(told["quantities"][0]["hypothesis_tests"]) == 5
-    assert told["samples"] == {"reference": 256, "test": 256} and told["equal"] == ["Alpha"]
+    record = json.loads(json.dumps(same.to_json(), allow_nan=False))
+    assert record["passed"] is True and record["sentence"] == same.sentence
+    assert record["quantities"][0]["name"] == "Combined" and len(record["quantities"][0]["hypothesis_tests"]) == 5
+    assert record["samples"] == {"reference": 256, "test": 256} and record["equal"] == ["Alpha"]
 
 
 def test_the_maps_are_pictures_of_the_same_size(same):
@@ -202,10 +202,10 @@ def test_without_the_package_flip_is_left_out(monkeypatch):
 
 def test_flip_is_nothing_for_equal_pictures_and_much_for_others(same):
     reference, _ = both()
-    one = replace(reference, attributes={"samples": "1"}, passes={**reference.passes, "Variance": 0 * reference["Variance"]})
-    assert radiance.compare(one, [one], PINHOLE).appearance.flip == 0.0
-    black = replace(one, passes={**one.passes, "Combined": 0 * one["Combined"]})
-    assert radiance.compare(one, [black], PINHOLE).appearance.flip > 0.4
+    single = replace(reference, attributes={"samples": "1"}, passes={**reference.passes, "Variance": 0 * reference["Variance"]})
+    assert radiance.compare(single, [single], PINHOLE).appearance.flip == 0.0
+    black = replace(single, passes={**single.passes, "Combined": 0 * single["Combined"]})
+    assert radiance.compare(single, [black], PINHOLE).appearance.flip > 0.4
     assert radiance.compare(black, [black], PINHOLE).passed
     assert 0.0 < same.appearance.flip < 0.3
 
@@ -230,4 +230,4 @@ def test_samples_that_the_file_tells_wrongly_can_be_given():
 
 def test_the_references_variance_is_told_from_as_many_batches_as_it_is_judged_by():
     header = Path(__file__).parents[2] / "viewcam_addon" / "tracer" / "core" / "film" / "film.h"
-    assert re.findall(r"BATCHES = (\d+);", header.read_text(encoding="utf-8")) == [str(radiance.VARIANCE_BATCHES)]
+    assert re.findall(r"BATCHES = (\d+)\b", header.read_text(encoding="utf-8")) == [str(radiance.VARIANCE_BATCHES)]

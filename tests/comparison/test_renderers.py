@@ -33,9 +33,9 @@ ENOUGH = [("Depth",), ("Distance",), ("Position",), ("Position", "Depth", "Objec
 def test_each_of_depth_distance_and_position_is_enough_and_only_what_is_there_is_judged(names, paper_scene):
     comparison = judged(paper_scene, only(paper_scene.rendered(), *names))
     assert comparison.passed, "\n".join(comparison.lines())
-    given = {"Depth" if name == "Distance" else name for name in names}
-    assert {row.name for row in comparison.rows} - {"Position depth"} == given - {"Object Index"}
-    assert given | set(comparison.lacking) == {"Depth", "Position", "Normal", "UV", "Object Index", "Material Index"}
+    present = {"Depth" if name == "Distance" else name for name in names}
+    assert {row.name for row in comparison.rows} - {"Position depth"} == present - {"Object Index"}
+    assert present | set(comparison.lacking) == {"Depth", "Position", "Normal", "UV", "Object Index", "Material Index"}
 
 
 @pytest.mark.parametrize("names", ENOUGH)
@@ -62,8 +62,8 @@ def test_nothing_is_nothing_however_a_renderer_writes_it(nothing, paper_scene):
     missed = reference["Depth"] >= BACKGROUND_DEPTH
     assert missed.any()
     depth = np.where(missed, np.float32(nothing), reference["Depth"])
-    found = renderers.completed(Image({"Depth": depth}), paper_scene.pinhole)
-    assert (found["Depth"] == reference["Depth"]).all() and (found["Position"][missed[..., 0]] == 0).all()
+    actual = renderers.completed(Image({"Depth": depth}), paper_scene.pinhole)
+    assert (actual["Depth"] == reference["Depth"]).all() and (actual["Position"][missed[..., 0]] == 0).all()
 
 
 @pytest.mark.parametrize("nothing", [0.0, np.inf, 1e10, 3e38])
@@ -104,19 +104,19 @@ def test_the_scene_is_not_asked_for_where_it_is_given(paper_scene):
 @given(values=st.lists(st.floats(-60000, 60000, width=32), min_size=3, max_size=3), index=st.integers(0, 32767))
 def test_halves_add_up_to_what_was_written(values, index):
     """As the shader parts them: the nearest whole steps first, each part kept as half a float."""
-    given = {"Position": np.array(values), "Normal": np.array(values) / 60000, "Object Index": np.full(3, float(index))}
+    written = {"Position": np.array(values), "Normal": np.array(values) / 60000, "Object Index": np.full(3, float(index))}
     passes = {"Combined": np.ones((1, 1, 4), np.float32)}
-    for name, rest in given.items():
+    for name, rest in written.items():
         rest = rest.astype(np.float32)
         for part, step in zip(renderers.part_names(name), (*renderers.PARTS[name], None), strict=True):
             kept = rest if step is None else np.floor((rest + np.float32(step / 2)) / np.float32(step)) * np.float32(step)
             rest = rest - kept
             passes[part] = kept.astype(np.float16).astype(np.float32).reshape(1, 1, 3)
-    found = renderers._decoded(Image(passes), "EEVEE")
-    assert found["Object Index"] == index
+    actual = renderers._decoded(Image(passes), "EEVEE")
+    assert actual["Object Index"] == index
     step = 2.0**-24  # half floats have no finer one
-    assert np.abs(found["Position"] - given["Position"]).max() <= step + 2.0**-24 * np.abs(given["Position"]).max()
-    assert np.abs(found["Normal"] - given["Normal"]).max() <= 2.0**-21
+    assert np.abs(actual["Position"] - written["Position"]).max() <= step + 2.0**-24 * np.abs(written["Position"]).max()
+    assert np.abs(actual["Normal"] - written["Normal"]).max() <= 2.0**-21
 
 
 @given(index=st.integers(0, 32767))

@@ -164,6 +164,6 @@ def test_the_report_tells_what_mends_it_and_where_its_origin_is(compared, tmp_pa
     path = write_report(replace(comparison, far_from_origin=far), reference, test, tmp_path / "far")
     page = Page(path.read_text(encoding="utf-8"))
     assert "Cycles is 1.2 px off here, because the camera stands 6.4·10⁶ from the origin: check with --recenter." in page.text
-    path = write_report(replace(comparison, origin=(4600000.25, 0.0, -1.0)), reference, test, tmp_path / "recentred")
+    path = write_report(replace(comparison, origin=(4600000.25, 0.0, -1.0)), reference, test, tmp_path / "recentered")
     page = Page(path.read_text(encoding="utf-8"))
     assert "origin 4600000.25 0 -1" in page.text and "--recenter" not in page.text

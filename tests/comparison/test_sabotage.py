@@ -71,7 +71,7 @@ CAMERA_FAULTS = {
     "sensor fitted to the other side": lambda s: s.seen_by(replace(s.pinhole, distance=300 * 320 / 200)).picture(),
     "pixel aspect ignored": lambda s: s.seen_by(replace(s.pinhole, distance=(300, 300 / 1.001))).picture(),
     "rolled by a milliradian": lambda s: s.seen_by(rolled(s.pinhole, 1e-3)).picture(),
-    "eye moved by a millimetre": lambda s: s.seen_by(replace(s.pinhole, eye=(5.001, -7.0, 4.0))).picture(),
+    "eye moved by a millimeter": lambda s: s.seen_by(replace(s.pinhole, eye=(5.001, -7.0, 4.0))).picture(),
     "shift of the principal point": lambda s: s.seen_by(replace(s.pinhole, principal_point=(160.02, 100))).picture(),
     "mirrored by the camera": lambda s: s.seen_by(replace(s.pinhole, mirrored=True)).picture(),
     "one object moved across the view": lambda s: moved_sphere(s, (0.002, 0.001, 0.0)).rendered(),

@@ -16,7 +16,7 @@ from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Area, Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, Material, Picture
+from viewcam_addon.tracer.scene.materials import Colour, Material, Picture, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 pytestmark = pytest.mark.slow
@@ -32,7 +32,7 @@ def quads(*corners, normals=None):
     return Mesh(corners.reshape(-1, 3), triangles, np.zeros(len(triangles), np.int32), normals)
 
 
-def ball(centre, radius, rings=16):
+def ball(center, radius, rings=16):
     """A smooth ball of triangles."""
     theta, phi = np.meshgrid(np.linspace(0, np.pi, rings + 1), np.linspace(0, 2 * np.pi, 2 * rings + 1), indexing="ij")
     points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1).reshape(-1, 3)
@@ -40,11 +40,11 @@ def ball(centre, radius, rings=16):
     first = (np.arange(rings)[:, None] * row + np.arange(2 * rings)).ravel()[:, None]
     triangles = np.concatenate([first + np.array(three) for three in ((0, row, 1), (1, row, row + 1))]).astype(np.int32)
     normals = points[triangles].astype(np.float32)
-    return Mesh(points * radius + centre, triangles, np.zeros(len(triangles), np.int32), normals)
+    return Mesh(points * radius + center, triangles, np.zeros(len(triangles), np.int32), normals)
 
 
 def lambert(*colour):
-    return Material(diffuse=Colour(colour))
+    return sum_of(diffuse=Colour(colour))
 
 
 def build():
@@ -86,12 +86,12 @@ def compared(reference, scene, level, samples):
 @pytest.fixture(scope="module")
 def reference():
     """reference(level, samples) → the right picture, rendered once."""
-    scene, made = build(), {}
+    scene, pictures_by_name = build(), {}
 
     def rendered(level, samples):
-        if (level, samples) not in made:
-            made[level, samples] = picture(scene, level, samples, 0)
-        return made[level, samples]
+        if (level, samples) not in pictures_by_name:
+            pictures_by_name[level, samples] = picture(scene, level, samples, 0)
+        return pictures_by_name[level, samples]
 
     return rendered
 
@@ -104,7 +104,7 @@ def test_the_right_picture_is_the_same_within_noise(reference, level, samples):
 
 
 def recoloured(scene, name, factor):
-    colour = tuple(factor * value for value in scene.materials[name].diffuse.rgb)
+    colour = tuple(factor * value for value in scene.materials[name].surface["color"].rgb)
     return replace(scene, materials={**scene.materials, name: lambert(*colour)})
 
 
@@ -148,7 +148,7 @@ def with_a_bulb(strength=3.0, tint=1.0):
     """A ball of some nine pixels before the walls that shines, and gives next to no light to them."""
     scene = build()
     count, bulb = len(scene.objects), Object("bulb", "bulb", np.eye(4), 9, materials=("bulb",))
-    glow = Material(emission=Colour((strength, strength, tint * strength)))
+    glow = sum_of(emission=Colour((strength, strength, tint * strength)))
     return replace(
         scene,
         geometries={**scene.geometries, "bulb": ball((1.9, -0.4, 1.2), 0.17)},

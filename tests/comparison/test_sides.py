@@ -21,15 +21,15 @@ def picture(combined=None, **passes):
 
 
 def sides(reference, tests, name):
-    return next(found for found in all_sides(reference, tests) if found.name == name)
+    return next(actual for actual in all_sides(reference, tests) if actual.name == name)
 
 
 def test_the_test_is_the_mean_of_its_pictures_and_its_spread_the_variance_of_that():
     tests = [picture() for _ in range(6)]
-    found = sides(picture(Variance=drawn(3)), tests, "Combined")
+    widgets = sides(picture(Variance=drawn(3)), tests, "Combined")
     stack = np.stack([image["Combined"][..., :3] for image in tests]).astype(np.float64)
-    assert found.test == pytest.approx(stack.mean(axis=0), rel=1e-12)
-    assert found.spread == pytest.approx(stack.var(axis=0, ddof=1) / 6, rel=1e-9)
+    assert widgets.test == pytest.approx(stack.mean(axis=0), rel=1e-12)
+    assert widgets.spread == pytest.approx(stack.var(axis=0, ddof=1) / 6, rel=1e-9)
 
 
 def test_one_picture_tells_nothing_of_its_noise():
@@ -50,15 +50,15 @@ def test_a_reference_of_one_sample_that_tells_no_variance_has_none():
 
 def test_diffuse_light_is_compared_as_light_and_not_as_a_quotient():
     """Two pictures whose light is 1 and 3 by other colors: the mean is 2 in either order."""
-    half, one = np.full((*SHAPE, 3), 0.5, np.float32), np.ones((*SHAPE, 3), np.float32)
-    tests = [picture(Diffuse_Direct=2 * one, Diffuse_Color=half), picture(Diffuse_Direct=3 * one, Diffuse_Color=one)]
-    found = sides(picture(Diffuse_Direct=one, Diffuse_Color=one), tests, "Diffuse Direct")
-    assert (found.test == 2.0).all() and (found.reference == 1.0).all()
+    half, ones = np.full((*SHAPE, 3), 0.5, np.float32), np.ones((*SHAPE, 3), np.float32)
+    tests = [picture(Diffuse_Direct=2 * ones, Diffuse_Color=half), picture(Diffuse_Direct=3 * ones, Diffuse_Color=ones)]
+    actual = sides(picture(Diffuse_Direct=ones, Diffuse_Color=ones), tests, "Diffuse Direct")
+    assert (actual.test == 2.0).all() and (actual.reference == 1.0).all()
 
 
 def test_only_what_all_pictures_have_is_compared():
     three = drawn(3)
-    names = [found.name for found in all_sides(picture(Emission=three, Diffuse_Direct=three), [picture(Emission=three)])]
+    names = [result.name for result in all_sides(picture(Emission=three, Diffuse_Direct=three), [picture(Emission=three)])]
     assert names == ["Combined", "Alpha", "Emission"]
 
 
@@ -69,9 +69,9 @@ def test_a_quantity_has_no_noise_where_it_is_all_of_a_picture_that_has_none_ther
     glowing = {"combined": combined, "Emission": combined[..., :3] * np.float32(1 + 2**-22)}
     for name in ("Emission", "Environment"):
         black = {"Environment": np.zeros((*SHAPE, 3), np.float32)}
-        found = sides(picture(Variance=variance, **glowing, **black), [picture(**glowing, **black)], name)
-        assert np.isinf(found.variance[:2, :2]).all()
-        assert (found.variance[2:] == 0).all() and (found.variance[:, 2:] == 0).all()
+        actual = sides(picture(Variance=variance, **glowing, **black), [picture(**glowing, **black)], name)
+        assert np.isinf(actual.variance[:2, :2]).all()
+        assert (actual.variance[2:] == 0).all() and (actual.variance[:, 2:] == 0).all()
 
 
 @pytest.mark.parametrize("side", [0, 1])
@@ -87,8 +87,8 @@ def test_passes_that_may_trade_their_light_have_noise_though_their_sum_has_none(
     traded = np.zeros(SHAPE, bool)
     traded[2, 2] = True
     for name in ("Diffuse Direct", "Diffuse Indirect"):
-        found = sides(reference, [test, test], name)
-        assert np.isinf(found.variance[traded]).all() and not found.variance[~traded].any()
+        actual = sides(reference, [test, test], name)
+        assert np.isinf(actual.variance[traded]).all() and not actual.variance[~traded].any()
 
 
 def test_roundings_are_no_noise_and_more_is():
@@ -102,9 +102,9 @@ def test_what_is_no_number_is_marked_and_spoils_nothing_else():
     broken[1, 2, 1] = np.nan
     broken[3, 3, 0] = np.inf
     for reference, tests in ((picture(broken), [picture(), picture()]), (picture(), [picture(broken), picture()])):
-        found = sides(reference, tests, "Combined")
-        assert np.argwhere(found.broken).tolist() == [[1, 2], [3, 3]]
-        assert np.isfinite(found.difference).all() and np.isfinite(found.spread).all()
+        actual = sides(reference, tests, "Combined")
+        assert np.argwhere(actual.broken).tolist() == [[1, 2], [3, 3]]
+        assert np.isfinite(actual.difference).all() and np.isfinite(actual.spread).all()
 
 
 @pytest.mark.parametrize(
@@ -135,7 +135,7 @@ def test_light_may_be_shared_where_samples_are_counted_and_nowhere_else():
     passes = {"Variance": variance, "Diffuse_Direct": drawn(3), "Diffuse_Color": drawn(3)}
     for counted in ({}, {"Sample_Count": drawn(1)}):
         reference = picture(**passes, **counted)
-        found = {each.name: each.shared for each in all_sides(reference, [picture(**passes)])}
+        result = {each.name: each.shared for each in all_sides(reference, [picture(**passes)])}
         expected = np.where(np.isfinite(variance), variance, 0.0) if counted else 0.0
-        assert np.all(found["Combined"] == expected) and np.all(found["Diffuse Direct"] == expected)
-        assert not np.any(found["Diffuse Color"])
+        assert np.all(result["Combined"] == expected) and np.all(result["Diffuse Direct"] == expected)
+        assert not np.any(result["Diffuse Color"])

@@ -109,14 +109,14 @@ def compared(reference, test, tracer):
 
 def test_any_of_several_surfaces_in_one_place_is_right_and_the_objects_are_named(tracer, reference):
     test = rendered(tracer)
-    found = compared(reference, test, tracer)
-    assert found.passed, "\n".join(found.lines())
-    pairs = found.in_one_place.pairs()
+    comparison = compared(reference, test, tracer)
+    assert comparison.passed, "\n".join(comparison.lines())
+    pairs = comparison.in_one_place.pairs()
     assert set(pairs) == {("Carpet", "Floor"), ("Carpet", "Tiles"), ("Floor", "Tiles"), ("Leaves", "Leaves")}
     another = reference["Material Index"] != test["Material Index"]
     assert sum(pairs.values()) == pytest.approx(another.sum(), abs=0.02 * another.sum())
-    assert "pixels show another of several surfaces in one place: " in found.sentence
-    assert found.to_json()["in_one_place"]["pixels"] == len(found.in_one_place.columns)
+    assert "pixels show another of several surfaces in one place: " in comparison.sentence
+    assert comparison.to_json()["in_one_place"]["pixels"] == len(comparison.in_one_place.columns)
 
 
 def test_a_twin_whose_normals_are_a_little_off_is_told_from_the_one_that_is_seen():
@@ -131,9 +131,9 @@ def test_a_twin_whose_normals_are_a_little_off_is_told_from_the_one_that_is_seen
     objects = tuple(Object(name, name.lower(), tilted(np.eye(4)), 1) for name in ("Floor", "Twin"))
     tracer = Tracer(replace(scene, geometries=geometries, objects=objects), 1)
     reference = Image(tracer.render())
-    found = compared(reference, rendered(tracer), tracer)
-    assert found.passed, "\n".join(found.lines())
-    assert {*found.in_one_place.pairs()} == {("Floor", "Twin")}
+    comparison = compared(reference, rendered(tracer), tracer)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert {*comparison.in_one_place.pairs()} == {("Floor", "Twin")}
     assert not len(compared(reference, reference, tracer).in_one_place.columns)
     turned = replace(reference, passes={**reference.passes, "Normal": reference["Normal"] + np.float32([2 * turn, 0, 0])})
     assert not compared(reference, turned, tracer).passed
@@ -141,9 +141,9 @@ def test_a_twin_whose_normals_are_a_little_off_is_told_from_the_one_that_is_seen
 
 def test_leaves_of_a_pixel_are_seen(reference):
     """Else the other tests prove nothing of them."""
-    shown = reference["Object Index"][..., 0] == 4
-    alone = tolerances.at_borders(np.where(shown, 4, -1))
-    assert alone.sum() > 0.5 * shown.sum() > 60
+    on_leaves = reference["Object Index"][..., 0] == 4
+    alone = tolerances.at_borders(np.where(on_leaves, 4, -1))
+    assert alone.sum() > 0.5 * on_leaves.sum() > 60
 
 
 def test_nothing_is_explained_without_the_scene(tracer, reference):
@@ -199,8 +199,8 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_sabotage_is_found_amid_surfaces_in_one_place(tracer, reference, fault):
     test = FAULTS[fault](tracer, rendered(tracer))
-    found = compared(reference, test, tracer)
-    assert not found.passed, f"{fault} was not found:\n" + "\n".join(found.lines())
+    comparison = compared(reference, test, tracer)
+    assert not comparison.passed, f"{fault} was not found:\n" + "\n".join(comparison.lines())
 
 
 WRONG_NORMALS = {

@@ -25,20 +25,24 @@ def read_transforms(text):
         for place in (meta, frame):
             assert ("cx" in place) == ("w" in place) and ("cy" in place) == ("h" in place), "instant-ngp divides cx by w"
         assert not (meta.keys() & frame.keys() - {"frames"}), "a key at the top hides the frame's from nerfstudio"
-        said = {**frame, **meta}
-        matrix = np.array(said["transform_matrix"])
+        values = {**frame, **meta}
+        matrix = np.array(values["transform_matrix"])
         assert matrix.shape == (4, 4) and matrix[3].tolist() == [0, 0, 0, 1]
-        assert isinstance(said["w"], int) and isinstance(said["h"], int)
+        assert isinstance(values["w"], int) and isinstance(values["h"], int)
         for side, axis in (("w", "x"), ("h", "y")):  # what readers without fl_x make of the angle
-            focal = said[side] / 2 / np.tan(said[f"camera_angle_{axis}"] / 2)
-            assert abs(focal / said[f"fl_{axis}"] - 1) < 1e-9, f"camera_angle_{axis} is for {focal}, not {said[f'fl_{axis}']}"
+            focal = values[side] / 2 / np.tan(values[f"camera_angle_{axis}"] / 2)
+            assert abs(focal / values[f"fl_{axis}"] - 1) < 1e-9, (
+                f"camera_angle_{axis} is for {focal}, not {values[f'fl_{axis}']}"
+            )
 
-        def projection(points, said=said, matrix=matrix):
+        def projection(points, intrinsics=values, matrix=matrix):
             x, y, z = np.moveaxis((points - matrix[:3, 3]) @ matrix[:3, :3], -1, 0)  # the inverse of a rotation: its transpose
-            return np.stack([said["cx"] + said["fl_x"] * (x / -z), said["cy"] - said["fl_y"] * (y / -z)], axis=-1)
+            return np.stack(
+                [intrinsics["cx"] + intrinsics["fl_x"] * (x / -z), intrinsics["cy"] - intrinsics["fl_y"] * (y / -z)], axis=-1
+            )
 
         check_rotation(matrix[:3, :3])
-        projections[said["file_path"]] = projection
+        projections[values["file_path"]] = projection
     return projections
 
 

@@ -90,11 +90,11 @@ def test_the_numbers_have_the_digits_of_float64():
 def test_the_three_files_are_written_and_nothing_else_with_the_same_bytes_each_time(tmp_path):
     for folder in ("one", "two"):
         cameras.save(THREE, tmp_path / folder / "sparse" / "0", "colmap")
-    one, two = (
+    first, two = (
         {path.name: path.read_bytes() for path in (tmp_path / folder / "sparse" / "0").iterdir()} for folder in ("one", "two")
     )
-    assert one == two == {name: text.encode() for name, text in colmap.texts(THREE).items()}
-    assert one.keys() == {"cameras.txt", "images.txt", "points3D.txt"} and b"\r" not in b"".join(one.values())
+    assert first == two == {name: text.encode() for name, text in colmap.texts(THREE).items()}
+    assert first.keys() == {"cameras.txt", "images.txt", "points3D.txt"} and b"\r" not in b"".join(first.values())
 
 
 @pytest.mark.parametrize("failing", ["images.txt", "cameras.txt", "points3D.txt"])

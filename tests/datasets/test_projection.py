@@ -144,8 +144,8 @@ BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.S)
 @pytest.fixture(scope="module")
 def blocks():
     """Language → what stands in each block of it."""
-    found = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
-    return {language: [text for other, text in found if other == language] for language, _ in found}
+    actual = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
+    return {language: [text for other, text in actual if other == language] for language, _ in actual}
 
 
 @pytest.fixture(scope="module")
@@ -154,7 +154,7 @@ def batch(blocks, tmp_path_factory):
     folder = tmp_path_factory.mktemp("batch")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        program, _ = blocks["python"]  # the other one is Blender's
+        (program,) = blocks["python"]
         exec(compile(program, str(PAGE), "exec"), {})
     return folder
 
@@ -169,10 +169,10 @@ def test_the_program_writes_what_the_page_shows(blocks, batch):
     transforms, sidecar = blocks["json"]
     assert transforms == files["transforms.json"]
     assert blocks["text"] == [files["sparse/0/cameras.txt"], files["sparse/0/images.txt"]]
-    shown = json.loads(sidecar)
-    pinhole = Pinhole(**shown["camera"])
-    assert shown | {"convention": record.CONVENTION} == json.loads(json.dumps(record.record(pinhole)))
-    assert pinhole.eye == (0, -5, 0) and shown["worldToCamera"] == axes.world_to_camera(pinhole)
+    sidecar_values = json.loads(sidecar)
+    pinhole = Pinhole(**sidecar_values["camera"])
+    assert sidecar_values | {"convention": record.CONVENTION} == json.loads(json.dumps(record.record(pinhole)))
+    assert pinhole.eye == (0, -5, 0) and sidecar_values["worldToCamera"] == axes.world_to_camera(pinhole)
 
 
 def test_what_the_page_shows_the_readers_read(readers, batch):

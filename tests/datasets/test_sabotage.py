@@ -25,13 +25,13 @@ def in_columns(matrix, change):
 
 # What may be wrong with a picture's numbers, under the names of transforms.json.
 PICTURE = {
-    "half a pixel to the right": lambda said: said | {"cx": said["cx"] + 0.5},
-    "half a pixel upwards": lambda said: said | {"cy": said["cy"] - 0.5},
-    "rows from the bottom": lambda said: said | {"cy": said["h"] - said["cy"]},
-    "the middle for the principal point": lambda said: said | {"cx": said["w"] / 2, "cy": said["h"] / 2},
-    "the two distances exchanged": lambda said: said | {"fl_x": said["fl_y"], "fl_y": said["fl_x"]},
-    "width and height exchanged": lambda said: said | {"cx": said["cy"], "cy": said["cx"]},
-    "a millionth more distance": lambda said: said | {"fl_x": said["fl_x"] * (1 + 1e-6)},
+    "half a pixel to the right": lambda values: values | {"cx": values["cx"] + 0.5},
+    "half a pixel upwards": lambda values: values | {"cy": values["cy"] - 0.5},
+    "rows from the bottom": lambda values: values | {"cy": values["h"] - values["cy"]},
+    "the middle for the principal point": lambda values: values | {"cx": values["w"] / 2, "cy": values["h"] / 2},
+    "the two distances exchanged": lambda values: values | {"fl_x": values["fl_y"], "fl_y": values["fl_x"]},
+    "width and height exchanged": lambda values: values | {"cx": values["cy"], "cy": values["cx"]},
+    "a millionth more distance": lambda values: values | {"fl_x": values["fl_x"] * (1 + 1e-6)},
 }
 # And with a camera-to-world matrix.
 POSE = {
@@ -67,10 +67,10 @@ def picture_and_frame():
     return document, frame
 
 
-def with_angles(said):
+def with_angles(values):
     """The angles go with the lens: a fault of theirs alone is another one."""
     sides = (("x", "w"), ("y", "h"))
-    return said | {f"camera_angle_{axis}": 2 * np.arctan(said[side] / 2 / said[f"fl_{axis}"]) for axis, side in sides}
+    return values | {f"camera_angle_{axis}": 2 * np.arctan(values[side] / 2 / values[f"fl_{axis}"]) for axis, side in sides}
 
 
 def test_without_a_fault_all_of_them_hold(held):

@@ -85,13 +85,13 @@ def examples() -> list[Example]:
 
 def of_page(page: str, text: str) -> list[Example]:
     blocks = [(match[1].strip(), match[2]) for match in BLOCK.finditer(text)]
-    found = []
+    result = []
     for (language, block), (next_language, next_block) in zip(blocks, [*blocks[1:], ("", "")][: len(blocks)], strict=True):
         if language == "sh":
-            found += [Example(page, language, command) for command in _commands(block)]
+            result += [Example(page, language, command) for command in _commands(block)]
         elif language not in SHOWN:
-            found.append(Example(page, language, block, next_block if next_language in SHOWN else ""))
-    return found
+            result.append(Example(page, language, block, next_block if next_language in SHOWN else ""))
+    return result
 
 
 def is_run(example: Example, real: bool) -> bool:
@@ -199,7 +199,7 @@ class Reader:
 
     def _compare_events(self, example: Example, folder: Path) -> None:
         """The keys of each event that is shown, with those of a batch in which one shot fails and of one in which none does."""
-        shown = {event["event"]: [*event] for event in map(json.loads, example.text.splitlines())}
+        keys_by_event = {event["event"]: [*event] for event in map(json.loads, example.text.splitlines())}
         right = folder / "events" / "right.png"
         right.parent.mkdir()
         right.symlink_to(folder / "shots.csv" / "right.png")  # which is no folder
@@ -207,9 +207,9 @@ class Reader:
         failed = self._run(words, folder)
         right.unlink()
         lines = (failed.stdout + self._must(words, folder)).splitlines()
-        told = {event["event"]: [*event] for event in (json.loads(line) for line in lines if line.startswith("{"))}
+        record = {event["event"]: [*event] for event in (json.loads(line) for line in lines if line.startswith("{"))}
         rare = {"stopping": ["event", "time", "signal"], "shot_elsewhere": ["event", "time", "shot"]}
-        assert shown == told | rare, failed.stderr
+        assert keys_by_event == record | rare, failed.stderr
 
     def _must(self, command: list[str], folder: Path) -> str:
         done = self._run(command, folder)

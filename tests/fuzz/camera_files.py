@@ -26,8 +26,8 @@ plotter.camera_position = [(1, 2, 3), (0, 0, 0), (0, 0, 1)]
 
 
 def _several(form: str, *pinholes, axes: str = "as_is") -> str | dict[str, str | bytes]:
-    given = [Camera(f"c{number}", pinhole, image=f"c{number}.png") for number, pinhole in enumerate(pinholes)]
-    return cameras.write(given, form, Options(axes=axes))
+    written_cameras = [Camera(f"c{number}", pinhole, image=f"c{number}.png") for number, pinhole in enumerate(pinholes)]
+    return cameras.write(written_cameras, form, Options(axes=axes))
 
 
 def _npz() -> bytes:

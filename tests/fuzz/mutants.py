@@ -75,8 +75,8 @@ def of_text(text: bytes, other: bytes, chance: random.Random) -> bytes:
     if chance.random() < 0.4:
         return of_bytes(text, other, chance)
     for _ in range(chance.choice((1, 1, 2, 5))):
-        if found := list(_NUMBER.finditer(text)):
-            number = chance.choice(found)
+        if result := list(_NUMBER.finditer(text)):
+            number = chance.choice(result)
             text = text[: number.start()] + chance.choice(EXTREMES).encode() + text[number.end() :]
     return text
 
@@ -144,15 +144,15 @@ def of_zip(data: bytes, other: bytes, chance: random.Random) -> bytes:
 
 def _places(document: object) -> list[tuple[object, object]]:
     """Each (list or object, index or key) that a value stands at."""
-    found, waiting = [], [document]
+    result, waiting = [], [document]
     while waiting:
         inner = waiting.pop()
         if isinstance(inner, dict | list):
             entries = inner.items() if isinstance(inner, dict) else enumerate(inner)
             for key, value in entries:
-                found.append((inner, key))
+                result.append((inner, key))
                 waiting.append(value)
-    return found
+    return result
 
 
 def _keys(document: object) -> list[str]:

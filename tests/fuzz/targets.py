@@ -118,11 +118,11 @@ def viewcam(*words: object) -> None:
     """Run a command in this process, and raise Said unless all is well or told in a sentence."""
     from viewcam_addon import cli
 
-    said = io.StringIO()
+    message = io.StringIO()
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
-        status = _with_events(cli, [str(word) for word in words], said)
-    sentence = said.getvalue().strip()
+        status = _with_events(cli, [str(word) for word in words], message)
+    sentence = message.getvalue().strip()
     if status not in (0, 1, 2, 3) or (status > 1) != bool(sentence):
         raise Said(f"status {status}: {sentence!r}")
     judge(sentence)
@@ -130,13 +130,13 @@ def viewcam(*words: object) -> None:
         raise Said(f"warned: {warned[0].message} at {warned[0].filename}:{warned[0].lineno}")
 
 
-def _with_events(cli: object, words: list[str], said: io.StringIO) -> int:
-    """Run the command with what it says of errors sent to `said` in place of standard error."""
+def _with_events(cli: object, words: list[str], output: io.StringIO) -> int:
+    """Run the command with what it says of errors sent to `output` in place of standard error."""
     from viewcam_addon import events
 
     @contextlib.contextmanager
     def opened(_: bool) -> Iterator[object]:
-        yield events.Sentences(said)
+        yield events.Sentences(output)
 
     cli.events = type("Events", (), {"opened": staticmethod(opened)})
     return cli.main(words)
@@ -186,24 +186,24 @@ def exr() -> Feed:
     import OpenEXR
 
     with tempfile.TemporaryDirectory() as temporary:
-        made = Path(temporary)
-        (made / "scene.json").write_text(json.dumps(SCENE))
-        (made / "scene.npz").write_bytes(packed(**arrays()))
+        scratch = Path(temporary)
+        (scratch / "scene.json").write_text(json.dumps(SCENE))
+        (scratch / "scene.npz").write_bytes(packed(**arrays()))
         pictures = {}
         for level, seed in (("geometry", 0), ("direct", 0), ("path", 1)):
             words = ["--size", "16x12", "--level", level, "--samples", "4", "--seed", seed]
-            viewcam("render", made / "scene.json", made / "out.exr", *words)
-            pictures[level] = (made / "out.exr").read_bytes()
-        channels = OpenEXR.File(str(made / "out.exr"), separate_channels=True).channels()
+            viewcam("render", scratch / "scene.json", scratch / "out.exr", *words)
+            pictures[level] = (scratch / "out.exr").read_bytes()
+        channels = OpenEXR.File(str(scratch / "out.exr"), separate_channels=True).channels()
         kinds = {"zip": OpenEXR.ZIP_COMPRESSION, "piz": OpenEXR.PIZ_COMPRESSION, "dwa": OpenEXR.DWAA_COMPRESSION}
         for name, compression in kinds.items():
             header = {"compression": compression, "type": OpenEXR.scanlineimage}
             pixels = {each: channel.pixels for each, channel in channels.items()}
-            OpenEXR.File(header, pixels).write(str(made / "out.exr"))
-            pictures[name] = (made / "out.exr").read_bytes()
+            OpenEXR.File(header, pixels).write(str(scratch / "out.exr"))
+            pictures[name] = (scratch / "out.exr").read_bytes()
         parts = [OpenEXR.Part({}, {each: pixels[each]}, each) for each in pixels]
-        OpenEXR.File(parts).write(str(made / "out.exr"))
-        pictures["parts"] = (made / "out.exr").read_bytes()
+        OpenEXR.File(parts).write(str(scratch / "out.exr"))
+        pictures["parts"] = (scratch / "out.exr").read_bytes()
     beginning = 1200  # bytes, in which the header stands
 
     def feed(chance: random.Random, folder: Path) -> None:
@@ -285,7 +285,7 @@ def sidecar() -> Feed:
     import painting
 
     from viewcam_addon.cameras.sidecar import record
-    from viewcam_addon.errors import InputError, told
+    from viewcam_addon.errors import InputError, message_of
     from viewcam_addon.jobs import dataset, one, run
     from viewcam_addon.jobs.folder import Folder, Outputs
     from viewcam_addon.jobs.job import Job
@@ -293,12 +293,12 @@ def sidecar() -> Feed:
     from viewcam_addon.pinhole import Pinhole
 
     class Painter(painting.Painter):
-        def render(self, *given: object) -> dict:
-            return {**super().render(*given), **record(Pinhole(**CAMERA))}
+        def render(self, *arguments: object) -> dict:
+            return {**super().render(*arguments), **record(Pinhole(**CAMERA))}
 
     wanted = [Job("one", camera="Camera"), Job("two", camera="Camera")]
     settings = {shot.name: settings_hash(shot, {}) for shot in wanted}
-    made: dict[str, bytes] = {}
+    result: dict[str, bytes] = {}
 
     def batch(folder: Path) -> Folder:
         place = Folder(folder)
@@ -310,19 +310,19 @@ def sidecar() -> Feed:
         return place
 
     def feed(chance: random.Random, folder: Path) -> None:
-        if not made:
-            made.update({path.name: path.read_bytes() for path in batch(folder / "whole").path.iterdir() if path.is_file()})
+        if not result:
+            result.update({path.name: path.read_bytes() for path in batch(folder / "whole").path.iterdir() if path.is_file()})
         changed = folder / "changed"
         changed.mkdir()
-        for name, data in made.items():
+        for name, data in result.items():
             (changed / name).write_bytes(data)
         name = chance.choice(("one.json", "two.json", "summary.json"))
-        document = json.loads(made[name])
+        document = json.loads(result[name])
         (changed / name).write_bytes(mutants.of_json(document, SCENE | document, chance))
         try:
             dataset.write(batch(changed), wanted, settings, "png")
         except InputError as error:
-            judge(told(error))
+            judge(message_of(error))
 
     return feed
 
@@ -331,13 +331,13 @@ def labels() -> Feed:
     """A folder of two pictures' labels, of which one file is changed, as every dataset."""
     kinds = "depth,normals,position,masks,amodal,flow"
     with tempfile.TemporaryDirectory() as temporary:
-        made = Path(temporary)
-        (made / "scene.json").write_text(json.dumps(SCENE))
-        (made / "scene.npz").write_bytes(packed(**arrays()))
+        scratch = Path(temporary)
+        (scratch / "scene.json").write_text(json.dumps(SCENE))
+        (scratch / "scene.npz").write_bytes(packed(**arrays()))
         for name in ("a", "b"):
-            words = ["--size", "16x12", "--labels", kinds, "--next", made / "scene.json", "--threads", 1]
-            viewcam("render", made / "scene.json", made / f"{name}.exr", *words)
-        whole = {path.name: path.read_bytes() for path in made.iterdir() if path.name.startswith(("a.", "b."))}
+            words = ["--size", "16x12", "--labels", kinds, "--next", scratch / "scene.json", "--threads", 1]
+            viewcam("render", scratch / "scene.json", scratch / f"{name}.exr", *words)
+        whole = {path.name: path.read_bytes() for path in scratch.iterdir() if path.name.startswith(("a.", "b."))}
     whole["b.png"] = whole["b.instances.png"]  # a picture that stands beside its labels
     documents = [json.loads(whole[f"{name}.labels.json"]) for name in ("a", "b")]
     ways = (("coco",), ("coco", "--amodal"), ("panoptic",), ("bop",), ("colmap",), ("colmap", "--points", 5), ("kitti",))
@@ -395,18 +395,20 @@ def cameras_of(name: str) -> Feed:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
-                found = cameras.read(path, options=options)
+                cameras_read = cameras.read(path, options=options)
         except InputError as error:
             _judge_caused(error)
             return
-        for camera in found:
+        for camera in cameras_read:
             for line in (camera.name, *camera.notes):
                 if len(line) > LONGEST or not all(map(str.isprintable, line.split(" "))):
                     raise Said(f"a name or note is no line of a few characters that show: {line[:200]!r}")
             if camera.lens is not None:
                 camera.lens.folds(camera.lens.undistort(CORNERS))
         try:
-            cameras.write([Camera(f"{i}", each.pinhole) for i, each in enumerate(found[:3])], chance.choice(cameras.writable()))
+            cameras.write(
+                [Camera(f"{i}", each.pinhole) for i, each in enumerate(cameras_read[:3])], chance.choice(cameras.writable())
+            )
         except InputError as error:
             _judge_caused(error)
 
@@ -518,15 +520,15 @@ KINDS |= {f"cameras-{name}": partial(cameras_of, name) for name in CAMERAS} | {"
 KINDS |= {kind: partial(broken, kind) for kind in ("bug", "crash", "hang", "greedy")}
 
 
-def tell(stream: int, number: int, said: str) -> None:
-    os.write(stream, json.dumps({"mutant": number, "said": said[:LONGEST]}).encode() + b"\n")
+def tell(stream: int, number: int, message: str) -> None:
+    os.write(stream, json.dumps({"mutant": number, "said": message[:LONGEST]}).encode() + b"\n")
 
 
 def main(kind: str, first: str, count: str, place: str) -> None:
     import resource
 
     is_small = kind.startswith(("cameras-", "labels", "scene"))
-    told = os.dup(1)  # Blender prints past Python
+    descriptor = os.dup(1)  # Blender prints past Python
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     folder = Path(place)
     feed = KINDS[kind]()
@@ -546,10 +548,10 @@ def main(kind: str, first: str, count: str, place: str) -> None:
             if is_small and _spent() - spent > SMALL_SECONDS:
                 raise Said(f"took {_spent() - spent:.1f} s")
         except Said as error:
-            tell(told, number, str(error))
+            tell(descriptor, number, str(error))
         except Exception as error:
             place = traceback.extract_tb(error.__traceback__)[-1]
-            tell(told, number, f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {error}")
+            tell(descriptor, number, f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {error}")
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
         if len(sys.argv) < 6:

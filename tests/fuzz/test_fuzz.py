@@ -26,25 +26,25 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="address space i
 
 def failures(kind: str, count: int, folder: Path) -> list[str]:
     """Feed mutants 0 to count − 1; what is wrong with each. Where one ends the process, another goes on after it."""
-    found: list[str] = []
+    result: list[str] = []
     first = 0
     while first < count:
         words = [sys.executable, TARGETS, kind, str(first), str(count - first), folder]
         ran = subprocess.run(words, capture_output=True, text=True)
-        found += (f"{kind} {told['mutant']}: {told['said']}" for told in map(json.loads, ran.stdout.splitlines()))
+        result += (f"{kind} {output['mutant']}: {output['said']}" for output in map(json.loads, ran.stdout.splitlines()))
         current = folder / "current"
         reached = current.read_text() if current.exists() else "nothing"
         if ran.returncode == 0:
             break
         if kind == "blend" and reached.isdecimal() and -ran.returncode in CRASHES:
-            found += as_a_user_sees(folder / f"blend-{reached}")
+            result += as_a_user_sees(folder / f"blend-{reached}")
         else:
-            found.append(f"{kind} {reached}: ended with status {ran.returncode}: {ran.stderr[-1000:]}")
+            result.append(f"{kind} {reached}: ended with status {ran.returncode}: {ran.stderr[-1000:]}")
         if not reached.isdecimal():
             break
         first = int(reached) + 1
         current.unlink()
-    return found
+    return result
 
 
 def as_a_user_sees(mutant: Path) -> list[str]:
@@ -57,8 +57,8 @@ def as_a_user_sees(mutant: Path) -> list[str]:
 
 
 def assert_met(kind: str, count: int, folder: Path) -> None:
-    found = failures(kind, count, folder)
-    assert not found, f"{len(found)} of {count} mutants:\n" + "\n".join(found[:20])
+    actual = failures(kind, count, folder)
+    assert not actual, f"{len(actual)} of {count} mutants:\n" + "\n".join(actual[:20])
 
 
 SAMPLE = {"scene": 60, "exr": 40, "shots": 200, "sidecar": 40, "labels": 60, "cameras-all": 225}
@@ -102,5 +102,5 @@ def test_every_hostile_file_of_cameras_is_read_or_refused_in_a_sentence(name, tm
     ],
 )
 def test_what_a_mutant_can_do_is_seen(kind, words, tmp_path):
-    found = failures(kind, 4, tmp_path)
-    assert [each[: len(words)] for each in found] == [words], found
+    actual = failures(kind, 4, tmp_path)
+    assert [each[: len(words)] for each in actual] == [words], actual

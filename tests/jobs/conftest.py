@@ -136,9 +136,9 @@ def runs(process: int | str) -> bool:
 def until(is_so, seconds: float = 30.0):
     """The value of `is_so`, as soon as it is true or so many seconds have passed: many times as many as it takes."""
     ends = time.monotonic() + seconds
-    while not (found := is_so()) and time.monotonic() < ends:
+    while not (outcome := is_so()) and time.monotonic() < ends:
         time.sleep(0.02)
-    return found
+    return outcome
 
 
 @pytest.fixture

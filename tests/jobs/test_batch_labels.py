@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from viewcam_addon.commands.carry_out import _refuse_names_of_labels
+from viewcam_addon.commands._carry_out import _refuse_names_of_labels
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs.folder import Folder, Outputs
 from viewcam_addon.jobs.job import Job
@@ -93,7 +93,7 @@ def test_a_sidecar_that_tells_of_files_elsewhere_is_somebody_elses(folder, paint
     record = json.loads(folder.sidecar("left").read_text())
     record["labels"]["files"] = [file]
     folder.sidecar("left").write_text(json.dumps(record))
-    assert folder.told("left") is None
+    assert folder.record("left") is None
 
 
 def test_steps_of_depth_are_another_label(folder, painting):

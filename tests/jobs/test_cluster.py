@@ -34,13 +34,13 @@ class Ear:
     """A listener that keeps each event that it is told."""
 
     def __init__(self):
-        self.told = []
+        self.events = []
 
     def tell(self, event, **fields):
-        self.told.append((event, fields))
+        self.events.append((event, fields))
 
     def all(self, event):
-        return [fields for name, fields in self.told if name == event]
+        return [fields for name, fields in self.events if name == event]
 
 
 def shots(*names):
@@ -120,7 +120,7 @@ def test_what_is_killed_in_the_midst_of_a_shot_loses_nothing(stand_in, machines,
     worker = int(Path(f"/proc/{blender}/stat").read_text().rpartition(")")[2].split()[1])
     os.kill(worker if victim == "worker" else blender, signal.SIGKILL)
     batch.join(60)
-    assert outcome and outcome[0].exit_status == 0, ear.told
+    assert outcome and outcome[0].exit_status == 0, ear.events
     assert outcome[0].counts["done"] == 6 and not ear.all("shot_failed")
     assert processes.until(lambda: not processes.run(blender)), "the killed worker's Blender goes on"
     assert len([words for words in stand_in.diary("render") if words[1] == "slow_one"]) == 2
@@ -145,7 +145,7 @@ def test_a_worker_that_is_stopped_holds_no_batch_up_with_a_time_limit_or_without
         batch.join(60)
         with contextlib.suppress(ProcessLookupError):  # Dask has ended it
             os.kill(worker, signal.SIGKILL)
-    assert outcome and outcome[0].counts["done"] == 4 and not ear.all("shot_failed"), ear.told
+    assert outcome and outcome[0].counts["done"] == 4 and not ear.all("shot_failed"), ear.events
     assert len({words[-1] for words in stand_in.diary("render") if words[1] == "slow_one"}) == 2
 
 
@@ -269,13 +269,13 @@ def farm(tmp_path, processes):
 
     def start(*words, until, **variables):
         """A process that has said that it is ready, and the address that it said."""
-        said = scratch / f"{len(family)}.txt"
+        message = scratch / f"{len(family)}.txt"
         family.append(
-            child_process.ProcessGroup([sys.executable, "-m", "dask", *words], said, child_process.environment(**variables))
+            child_process.ProcessGroup([sys.executable, "-m", "dask", *words], message, child_process.environment(**variables))
         )
         ready = re.compile(rf"{until}:\s+(tcp://\S+)")
-        assert processes.until(lambda: ready.search(said.read_text())), said.read_text()
-        return family[-1], ready.search(said.read_text())[1]
+        assert processes.until(lambda: ready.search(message.read_text())), message.read_text()
+        return family[-1], ready.search(message.read_text())[1]
 
     _, address = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", until="Scheduler at")
 
@@ -339,9 +339,9 @@ def test_a_scheduler_that_dies_ends_the_batch_with_what_is_left(farm, stand_in, 
     def outcome_of(flight, future, shot):
         if hears == "too late":
             killer.join()
-        said = outcome(flight, future, shot)
+        message = outcome(flight, future, shot)
         heard.set()
-        return said
+        return message
 
     def kill():
         assert processes.until(lambda: stand_in.diary("waits"))
@@ -402,27 +402,27 @@ def test_a_farm_by_tls_as_the_page_says(stand_in, blend, tmp_path, processes):
     import distributed
     import yaml
 
-    made = distributed.Security.temporary()
-    for name, text in (("ca", made.tls_ca_file), ("farm", made.tls_worker_cert), ("farm-key", made.tls_worker_key)):
+    security = distributed.Security.temporary()
+    for name, text in (("ca", security.tls_ca_file), ("farm", security.tls_worker_cert), ("farm-key", security.tls_worker_key)):
         (tmp_path / f"{name}.pem").write_text(text)
     page = (ROOT / "docs" / "farm.md").read_text(encoding="utf-8")
     settings = re.search(r"(?ms)^```yaml\n(.*?)^```$", page)[1].replace("/shared/tls", str(tmp_path))
     (tmp_path / "tls.yaml").write_text(settings)
     family = []
 
-    def start(said, *words):
+    def start(address, *words):
         variables = child_process.environment(
             DASK_CONFIG=str(tmp_path / "tls.yaml"), DASK_TEMPORARY_DIRECTORY=str(tmp_path / "dask")
         )
-        family.append(child_process.ProcessGroup([sys.executable, "-m", "dask", *words], tmp_path / said, variables))
-        return tmp_path / said
+        family.append(child_process.ProcessGroup([sys.executable, "-m", "dask", *words], tmp_path / address, variables))
+        return tmp_path / address
 
     try:
-        said = start(
+        message = start(
             "scheduler.txt", *["scheduler", "--protocol", "tls", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
         )
-        assert processes.until(lambda: re.search(r"Scheduler at:\s+(tls://\S+)", said.read_text())), said.read_text()
-        address = re.search(r"Scheduler at:\s+(tls://\S+)", said.read_text())[1]
+        assert processes.until(lambda: re.search(r"Scheduler at:\s+(tls://\S+)", message.read_text())), message.read_text()
+        address = re.search(r"Scheduler at:\s+(tls://\S+)", message.read_text())[1]
         worker = start("worker.txt", "worker", address, "--nthreads", "1", "--no-dashboard")
         assert processes.until(lambda: "Registered to:" in worker.read_text()), worker.read_text()
         own = dask.config.merge(dask.config.config, yaml.safe_load(settings))

@@ -39,11 +39,11 @@ def offspring(process):
             parents[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
         except OSError:
             continue
-    found, frontier = set(), {process}
+    result, frontier = set(), {process}
     while frontier:
-        frontier = {child for child, parent in parents.items() if parent in frontier} - found
-        found |= frontier
-    return found
+        frontier = {child for child, parent in parents.items() if parent in frontier} - result
+        result |= frontier
+    return result
 
 
 @pytest.mark.exhaustive
@@ -82,7 +82,7 @@ def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, 
             else:
                 os.killpg(batch.pid, how)
                 os.kill(int(stand_in.diary("waits")[0][-1]), signal.SIGKILL)  # the slow shot shall not take a minute
-        said, _ = batch.communicate(timeout=60)
+        output, _ = batch.communicate(timeout=60)
         status = batch.returncode
     finally:
         batch.kill()
@@ -92,6 +92,6 @@ def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, 
         return [process for process in family | blenders if processes.run(process)]
 
     assert processes.until(lambda: not left()), f"still running: {left()}"
-    assert status == {"finished": 0, signal.SIGKILL: -9, signal.SIGINT: 130, signal.SIGTERM: 143}[how], said
-    assert said == b""
+    assert status == {"finished": 0, signal.SIGKILL: -9, signal.SIGINT: 130, signal.SIGTERM: 143}[how], output
+    assert output == b""
     assert set(os.listdir(os.getcwd())) == before, "something was left in the user's folder"

@@ -43,9 +43,9 @@ def finish(folder):
         folder.image(name).write_bytes(b"picture")
         folder.preview(name).write_bytes(b"preview!")
         stated = record.record(STATED)["camera"]
-        told = {"rendered": {"width": 320, "height": 180}, "warnings": [], "timing": {"seconds": 0.5}}
+        entries = {"rendered": {"width": 320, "height": 180}, "warnings": [], "timing": {"seconds": 0.5}}
         made_from = {"settings": settings, "image": f"{name}.exr", "bytes": {"image": 7, "preview": 8}}
-        write_json(folder.sidecar(name), {**made_from, **told, **record.record(camera), "stated": stated})
+        write_json(folder.sidecar(name), {**made_from, **entries, **record.record(camera), "stated": stated})
 
     return put
 

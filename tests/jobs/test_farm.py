@@ -55,20 +55,22 @@ def test_scheduler_worker_and_batch_as_the_page_starts_them(here, stand_in, tmp_
     family = []
 
     def start(words):
-        said = tmp_path / f"said-{len(family)}.txt"
+        message = tmp_path / f"said-{len(family)}.txt"
         words = ["sh", "-c", f"exec env {here(words)}"]
         family.append(
-            child_process.ProcessGroup(words, said, child_process.environment(DASK_TEMPORARY_DIRECTORY=str(tmp_path / "dask")))
+            child_process.ProcessGroup(
+                words, message, child_process.environment(DASK_TEMPORARY_DIRECTORY=str(tmp_path / "dask"))
+            )
         )
-        return said
+        return message
 
     try:
         # With a port and a place of their own: others may test on this machine.
-        said = start(the_one("dask scheduler").replace("8786", "0") + " --host 127.0.0.1 --no-dashboard")
-        assert processes.until(lambda: re.search(r"Scheduler at:\s+(tcp://\S+)", said.read_text())), said.read_text()
-        address = re.search(r"Scheduler at:\s+(tcp://\S+)", said.read_text())[1]
-        said = start(the_one("dask worker").replace("tcp://farm:8786", address) + " --no-dashboard")
-        assert processes.until(lambda: "Registered to" in said.read_text()), said.read_text()
+        message = start(the_one("dask scheduler").replace("8786", "0") + " --host 127.0.0.1 --no-dashboard")
+        assert processes.until(lambda: re.search(r"Scheduler at:\s+(tcp://\S+)", message.read_text())), message.read_text()
+        address = re.search(r"Scheduler at:\s+(tcp://\S+)", message.read_text())[1]
+        message = start(the_one("dask worker").replace("tcp://farm:8786", address) + " --no-dashboard")
+        assert processes.until(lambda: "Registered to" in message.read_text()), message.read_text()
         words = ["sh", "-c", here(the_one("viewcam batch /shared/shot.blend").replace("tcp://farm:8786", address))]
         batch = subprocess.run(words, env=child_process.environment(), capture_output=True, text=True)
     finally:
@@ -105,7 +107,7 @@ def test_the_parts_of_a_manager_are_the_whole_and_a_repeated_part_renders_nothin
 
     for part in (3, 7, 3):
         run(command.replace(placeholder, str(part)))
-    assert done_in(tmp_path / "renders") == {"shot_2", "shot_10", "shot_6", "shot_14"}, "neighbours are in different parts"
+    assert done_in(tmp_path / "renders") == {"shot_2", "shot_10", "shot_6", "shot_14"}, "neighbors are in different parts"
     assert len(stand_in.diary("render")) == 4
 
 

@@ -105,9 +105,9 @@ def test_a_name_that_only_looks_like_a_device_or_is_merely_odd_is_taken(name):
     assert Job(name, **FOUR).name == name
 
 
-@pytest.mark.parametrize(("one", "other"), [("Left", "lEFT"), ("é", "e\u0301"), ("É", "e\u0301"), ("straße", "STRASSE")])
-def test_names_that_are_one_file_somewhere_are_known(one, other):
-    assert names.one_file(one) == names.one_file(other)
+@pytest.mark.parametrize(("first", "second"), [("Left", "lEFT"), ("é", "e\u0301"), ("É", "e\u0301"), ("straße", "STRASSE")])
+def test_names_that_are_one_file_somewhere_are_known(first, second):
+    assert names.one_file(first) == names.one_file(second)
 
 
 def test_every_field_has_a_check():
@@ -198,9 +198,9 @@ def test_the_hash_is_the_same_in_another_process_with_other_hashes_of_texts():
 
 
 @given(st.dictionaries(st.text(max_size=5), plain, max_size=4), st.dictionaries(st.text(max_size=5), plain, max_size=4))
-def test_hashes_are_equal_if_and_only_if_the_settings_are(one, other):
-    assert (settings_hash(SHOT, one) == settings_hash(SHOT, other)) == (exactly(one) == exactly(other))
-    assert settings_hash(SHOT, one) == settings_hash(SHOT, dict(reversed(one.items())))
+def test_hashes_are_equal_if_and_only_if_the_settings_are(first, second):
+    assert (settings_hash(SHOT, first) == settings_hash(SHOT, second)) == (exactly(first) == exactly(second))
+    assert settings_hash(SHOT, first) == settings_hash(SHOT, dict(reversed(first.items())))
 
 
 @pytest.mark.parametrize(
@@ -239,9 +239,9 @@ def test_what_does_not_decide_the_picture_changes_nothing(change):
 
 
 def test_every_field_of_a_job_decides_or_does_not():
-    told = {"eye", "look_at", "up", "d", "camera", "width", "height", "frame", "engine", "samples", "level", "trust", "seed"}
-    told |= {"error", "find", "device", "clay", "recenter", "strict", "scene", "name", "blend", "threads"}
-    assert told | {"principal_point", "pixel_aspect", "mirrored"} == {field.name for field in dataclasses.fields(SHOT)}
+    fields = {"eye", "look_at", "up", "d", "camera", "width", "height", "frame", "engine", "samples", "level", "trust", "seed"}
+    fields |= {"error", "find", "device", "clay", "recenter", "strict", "scene", "name", "blend", "threads"}
+    assert fields | {"principal_point", "pixel_aspect", "mirrored"} == {field.name for field in dataclasses.fields(SHOT)}
 
 
 @pytest.mark.parametrize("value", [b"bytes", {1: 2}, {1, 2}, Path("a"), pytest.param(object(), id="object")], ids=repr)

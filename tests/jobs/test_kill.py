@@ -19,10 +19,10 @@ STEPS = 40
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory, painting):
     """The shots as two settings leave them."""
-    made = [tmp_path_factory.mktemp("old"), tmp_path_factory.mktemp("new")]
-    for seed, folder in enumerate(made):
+    folders_made = [tmp_path_factory.mktemp("old"), tmp_path_factory.mktemp("new")]
+    for seed, folder in enumerate(folders_made):
         painting.paint(folder, 2, painter=painting.Painter(seed))
-    return made
+    return folders_made
 
 
 def pictures(folder, name):
@@ -44,9 +44,9 @@ def test_a_batch_that_dies_before_any_step_is_continued_to_the_same_bytes(tmp_pa
         assert outcome.returncode == painting.DIED, outcome
         died += 1
         for name in hashes[0]:
-            for seed, made in enumerate(folders):
+            for seed, target in enumerate(folders):
                 if folder.finished(name, hashes[seed][name]):
-                    assert pictures(folder, name) == pictures(Folder(made), name), f"step {step}: {name} is not what it says"
+                    assert pictures(folder, name) == pictures(Folder(target), name), f"step {step}: {name} is not what it says"
                     done.add((name, seed))
         assert painting.paint(folder.path, 2, painter=painting.Painter(seed=1), resume=True).exit_status == 0
         painting.assert_same(folder.path, folders[1])

@@ -24,11 +24,11 @@ def test_an_orbit_begins_at_the_camera_and_goes_evenly_around_up(eye, look_at, u
     assume(reach > 1 and math.hypot(*up) > 1e-3)
     pinhole = Pinhole(eye, look_at, up, distance, 320, 180)
     assume(pinhole.sine_to_up > 1e-2)
-    made = makers.orbit(pinhole, count)
-    assert made[0] == Job("orbit_000", eye, look_at, up, distance, width=320, height=180)
-    assert [shot.name for shot in made] == [f"orbit_{i:03d}" for i in range(count)]
+    shots = makers.orbit(pinhole, count)
+    assert shots[0] == Job("orbit_000", eye, look_at, up, distance, width=320, height=180)
+    assert [shot.name for shot in shots] == [f"orbit_{i:03d}" for i in range(count)]
     axis = np.array(up) / math.hypot(*up)
-    away = np.array([shot.eye for shot in made]) - look_at
+    away = np.array([shot.eye for shot in shots]) - look_at
     # Rounding: a few operations on coordinates of up to 4e3, of 2⁻⁵³ each.
     allowed = 64 * 2.0**-53 * 4e3
     assert np.abs(np.linalg.norm(away, axis=1) - reach).max() <= allowed
@@ -43,9 +43,9 @@ def test_an_orbit_begins_at_the_camera_and_goes_evenly_around_up(eye, look_at, u
 
 
 def test_an_orbit_about_the_point_straight_below_turns_the_picture():
-    made = makers.orbit(Pinhole((0, 0, 5), (0, 0, 0), (0, 0, 1), 400, 320, 180), 8)
-    assert {shot.eye for shot in made} == {(0.0, 0.0, 5.0)}
-    for i, shot in enumerate(made):
+    shots = makers.orbit(Pinhole((0, 0, 5), (0, 0, 0), (0, 0, 1), 400, 320, 180), 8)
+    assert {shot.eye for shot in shots} == {(0.0, 0.0, 5.0)}
+    for i, shot in enumerate(shots):
         right = Pinhole(shot.eye, shot.look_at, shot.up, shot.d, 320, 180).basis()[0]
         angle = math.tau * i / 8  # from u = (0, −1, 0) on, as the canonical axes have it
         assert np.abs(right - (math.sin(angle), -math.cos(angle), 0)).max() <= 1e-15, f"shot {i} has u = {right}"
@@ -60,12 +60,12 @@ def test_an_orbit_of_no_such_number_is_refused(count):
 @given(st.integers(-1048574, 1048574), st.integers(0, 50))
 def test_frames_are_a_shot_each_both_ends_included(first, more):
     last = min(first + more, 1048574)
-    made = makers.frames(f" {first}..{last} ", "Camera")
-    assert [shot.frame for shot in made] == list(range(first, last + 1))
-    assert {shot.camera for shot in made} == {"Camera"} and made[0].eye is None
-    assert len({shot.name for shot in made}) == len(made)
+    shots = makers.frames(f" {first}..{last} ", "Camera")
+    assert [shot.frame for shot in shots] == list(range(first, last + 1))
+    assert {shot.camera for shot in shots} == {"Camera"} and shots[0].eye is None
+    assert len({shot.name for shot in shots}) == len(shots)
     if first >= 0:
-        assert sorted(made, key=lambda shot: shot.name) == list(made), "the files do not sort as the frames do"
+        assert sorted(shots, key=lambda shot: shot.name) == list(shots), "the files do not sort as the frames do"
 
 
 @pytest.mark.parametrize(
@@ -100,8 +100,8 @@ def test_cameras_that_can_not_name_their_files_are_all_told():
 
 def test_names_without_spaces_are_made_of_those_with_some_and_the_camera_is_still_the_same():
     names = ["Virtual Pinhole", "Left\u3000eye", "Right"]
-    made = makers.from_cameras("*", names, spaces=False)
-    assert [(shot.name, shot.camera) for shot in made] == [
+    shots = makers.from_cameras("*", names, spaces=False)
+    assert [(shot.name, shot.camera) for shot in shots] == [
         ("Left_eye", "Left\u3000eye"),
         ("Right", "Right"),
         ("Virtual_Pinhole", "Virtual Pinhole"),

@@ -91,9 +91,9 @@ def test_there_is_a_sidecar_only_while_both_files_are_those_it_was_written_for(f
 
     def look():
         if folder.sidecar(SHOT.name).exists():
-            said = json.loads(folder.sidecar(SHOT.name).read_text(encoding="utf-8"))["settings"]
-            assert _pictures(folder) == pictures[said], f"the sidecar of {said} settings stands beside other files"
-            seen.append(said)
+            record = json.loads(folder.sidecar(SHOT.name).read_text(encoding="utf-8"))["settings"]
+            assert _pictures(folder) == pictures[record], f"the sidecar of {record} settings stands beside other files"
+            seen.append(record)
         else:
             seen.append(None)
 

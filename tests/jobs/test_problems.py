@@ -132,24 +132,24 @@ def test_a_thousand_rows_with_every_kind_of_bad_one_name_each_by_line_and_column
     assert len(KINDS) >= 40
     lines = [HEADER, *(line_of({}, line) for line in range(2, 1002))]
     expected = []
-    for number, (changes, told) in enumerate(KINDS):
+    for number, (changes, problem) in enumerate(KINDS):
         line = 7 + 13 * number
         lines[line - 1] = line_of(changes, line)
-        if told is None:
+        if problem is None:
             expected.append((f"line {line} ", ""))
-        for columns, sentence in told or ():
+        for columns, sentence in problem or ():
             expected.append((f"line {line}, column{'s' * (', ' in columns)} {columns}", sentence))
     path = tmp_path / "thousand.csv"
     path.write_bytes("\r\n".join(lines).encode("utf-8", "surrogateescape"))
     problems = list(problems_of(path, ["Camera"]))
     for place, sentence in expected:
-        found = [
-            told
-            for told in problems
-            if told.startswith((place + " ", place + ":")) or (not sentence and told.startswith(place))
+        result = [
+            problem
+            for problem in problems
+            if problem.startswith((place + " ", place + ":")) or (not sentence and problem.startswith(place))
         ]
-        assert len(found) == 1 and sentence in found[0], f"{place} … {sentence}: told was {found}"
-        problems.remove(found[0])
+        assert len(result) == 1 and sentence in result[0], f"{place} … {sentence}: told was {result}"
+        problems.remove(result[0])
     assert not problems, f"more was told than is wrong: {problems}"
 
 
@@ -158,10 +158,10 @@ def test_each_problem_is_one_printable_line_in_the_order_of_the_file(tmp_path):
     (tmp_path / "bad.csv").write_bytes("\n".join(lines).encode("utf-8", "surrogateescape"))
     problems = problems_of(tmp_path / "bad.csv", ["Camera"])
     assert all(problem.isprintable() and len(problem) < 300 for problem in problems)
-    shapeless = {number for number, (_, told) in enumerate(KINDS, start=2) if told is None}
-    told = [int(problem.split()[1].rstrip(",")) for problem in problems]
-    assert [line for line in told if line not in shapeless] == sorted(line for line in told if line not in shapeless)
-    assert {*told} == {*range(2, len(KINDS) + 2)} - {line_of_first_good()}
+    shapeless = {number for number, (_, entries) in enumerate(KINDS, start=2) if entries is None}
+    entries = [int(problem.split()[1].rstrip(",")) for problem in problems]
+    assert [line for line in entries if line not in shapeless] == sorted(line for line in entries if line not in shapeless)
+    assert {*entries} == {*range(2, len(KINDS) + 2)} - {line_of_first_good()}
 
 
 def line_of_first_good():
@@ -187,16 +187,16 @@ def test_more_than_a_hundred_problems_are_counted(tmp_path):
     (tmp_path / "bad.csv").write_text("\n".join(lines), encoding="utf-8")
     with pytest.raises(ShotsError) as raised:
         lists.read(tmp_path / "bad.csv")
-    told = str(raised.value).splitlines()
+    sentences = str(raised.value).splitlines()
     assert len(raised.value.problems) == 250
-    assert "250 problems" in told[0] and len(told) == MOST_SHOWN + 2
-    assert told[-1] == f"  … and {250 - MOST_SHOWN} more"
+    assert "250 problems" in sentences[0] and len(sentences) == MOST_SHOWN + 2
+    assert sentences[-1] == f"  … and {250 - MOST_SHOWN} more"
 
 
 @pytest.mark.parametrize(
-    ("header", "told"),
+    ("header", "sentence"),
     [
-        ("name,camera,colour", ["line 1, column 'colour' is unknown: take it out"]),
+        ("name,camera,color", ["line 1, column 'color' is unknown: take it out"]),
         ("name,camera,Frame", ["line 1, column 'Frame' is unknown: write frame"]),
         ("name,camera,EYE X", ["line 1, column 'EYE X' is unknown: write eye_x"]),
         ("name,camera,,frame", ["line 1, column '' is unknown: take it out"]),
@@ -215,18 +215,18 @@ def test_more_than_a_hundred_problems_are_counted(tmp_path):
         ),
     ],
 )
-def test_what_is_wrong_with_the_header_is_told_once_and_not_in_each_row(tmp_path, header, told):
+def test_what_is_wrong_with_the_header_is_told_once_and_not_in_each_row(tmp_path, header, sentence):
     values = {"name": "a{}", "camera": "Camera", "frame": "1", "eye": "1 2 3", "eye_x": "1", "eye_z": "3", "look_at": "0 0 1"}
     values |= {"up": "0 0 1", "d": "5"}
     rows = [",".join(values.get(column, "") for column in header.split(",")).replace("{}", str(i)) for i in range(3)]
     if "up_x" in header or "colour" in header:
         rows = [row.replace("0 0 1", "") for row in rows]
-    assert list(problems_in(tmp_path, "list.csv", "\n".join([header, *rows]))) == told
+    assert list(problems_in(tmp_path, "list.csv", "\n".join([header, *rows]))) == sentence
 
 
 def test_with_a_wrong_header_the_rows_are_looked_at_all_the_same(tmp_path):
     problems = problems_in(tmp_path, "list.csv", "name,camera,colour,frame\na,Camera,red,1\nb,Camera,red,x\n")
-    assert [problem.split(" is ")[0] for problem in problems] == ["line 1, column 'colour'", "line 3, column frame"]
+    assert [problem.split(" is ")[0] for problem in problems] == ["line 1, column 'color'", "line 3, column frame"]
 
 
 def test_a_row_of_too_few_or_too_many_cells_is_told_and_rows_and_columns_of_nothing_are_not(tmp_path):
@@ -244,7 +244,7 @@ DEEP = "[" * 100_000 + "]" * 100_000
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "sentence"),
     [
         ("7", ["no list of shots"]),
         ('"a"', ["no list of shots"]),
@@ -255,7 +255,7 @@ DEEP = "[" * 100_000 + "]" * 100_000
         ('{"shots": [], "shots": []}', ["key shots is there twice"]),
         ('{"shots": [], "defaults": []}', ["defaults is []: give an object"]),
         ('{"shots": [], "defaults": {"name": "a"}}', ["defaults, key name: take it out"]),
-        ('{"shots": [], "defaults": {"colour": 1}}', ["defaults, key 'colour' is unknown"]),
+        ('{"shots": [], "defaults": {"color": 1}}', ["defaults, key 'color' is unknown"]),
         (
             '{"shots": [{"name": "a"}, {"name": "b"}], "defaults": {"camera": "C", "frame": 0.5}}',
             ["defaults, key frame is 0.5: give a whole number"],
@@ -266,7 +266,7 @@ DEEP = "[" * 100_000 + "]" * 100_000
         ),
         ("[1, [2], null]", ["shot 1 is 1: give an object", "shot 2 is [2]: give", "shot 3 is None: give"]),
         ('[{"name": "a", "camera": "D", "camera": "C"}]', ["shot 1 ('a'), key 'camera' is there twice"]),
-        ('[{"name": "a", "camera": "C", "colour": {}}]', ["shot 1 ('a'), key 'colour' is unknown"]),
+        ('[{"name": "a", "camera": "C", "color": {}}]', ["shot 1 ('a'), key 'color' is unknown"]),
         ('[{"name": 7, "camera": "C"}]', ["shot 1, key name is 7: give a text"]),
         ('[{"name": "", "camera": ""}]', ["shot 1 (''), key name is ''", "shot 1 (''), key camera is ''"]),
         ('[{"name": "a", "camera": ["C"]}]', ["shot 1 ('a'), key camera is ['C']: give a text"]),
@@ -287,10 +287,10 @@ DEEP = "[" * 100_000 + "]" * 100_000
     ],
     ids=lambda value: value[:30] if isinstance(value, str) else "",
 )
-def test_what_is_wrong_with_a_document_is_told(tmp_path, text, told):
+def test_what_is_wrong_with_a_document_is_told(tmp_path, text, sentence):
     problems = problems_in(tmp_path, "list.json", text, ["C"])
-    assert len(problems) == len(told), problems
-    for problem, part in zip(problems, told, strict=True):
+    assert len(problems) == len(sentence), problems
+    for problem, part in zip(problems, sentence, strict=True):
         assert part in problem and problem.isprintable() and len(problem) < 300, problem
 
 

@@ -151,11 +151,11 @@ def test_each_list_of_the_page_is_the_same_two_shots(folder):
 
 def test_the_page_shows_the_problems_as_they_are_told(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    ((_, table), (_, told)) = re.findall(r"```(csv|text)\n(.*?)```", PAGE.split("## What is wrong")[1], re.DOTALL)
+    ((_, table), (_, report)) = re.findall(r"```(csv|text)\n(.*?)```", PAGE.split("## What is wrong")[1], re.DOTALL)
     Path("shots.csv").write_text(table, encoding="utf-8")
     with pytest.raises(ShotsError) as raised:
         lists.read("shots.csv")
-    assert f"{raised.value}\n" == told
+    assert f"{raised.value}\n" == report
 
 
 def test_the_page_has_every_key_and_every_choice():

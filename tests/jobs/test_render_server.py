@@ -29,8 +29,8 @@ def renderer(stand_in, blend):
 
 
 def test_what_a_renderer_says_is_said_here(renderer, stand_in, blend, tmp_path):
-    said = renderer.render(shot("a"), tmp_path / "a.exr", tmp_path / "a.png")
-    assert said == {
+    record = renderer.render(shot("a"), tmp_path / "a.exr", tmp_path / "a.png")
+    assert record == {
         "camera": {"eye": [0.1, -6.0, 1e-300], "d": 400.0},
         "rendered": {"width": 64, "height": 36},
         "warnings": ["a warning"],
@@ -149,9 +149,9 @@ def test_a_blender_that_is_stopped_in_a_shot_is_ended_and_the_shot_rendered_by_a
 
 def waits(stand_in):
     """The process that waits in a slow shot."""
-    while not (found := stand_in.diary("waits")):
+    while not (outcome := stand_in.diary("waits")):
         time.sleep(0.02)
-    return found[0][-1]
+    return outcome[0][-1]
 
 
 def test_a_shot_that_takes_long_is_left_alone_while_its_blender_gives_signs_of_life(stand_in, blend, tmp_path, monkeypatch):

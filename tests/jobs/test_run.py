@@ -44,18 +44,18 @@ def test_events_tell_what_happens(tmp_path, painting):
 
 
 @pytest.mark.parametrize(
-    ("error", "told"),
+    ("error", "sentence"),
     [
         (InputError("no light: add some"), "no light: add some"),
         (KeyError("light"), "this is a bug, please report it (KeyError"),
     ],
 )
-def test_a_shot_that_fails_is_reported_and_the_rest_go_on(tmp_path, painting, error, told):
+def test_a_shot_that_fails_is_reported_and_the_rest_go_on(tmp_path, painting, error, sentence):
     painter = painting.Painter(broken={"shot_001": error})
     summary = painting.paint(tmp_path, 4, painter=painter)
     assert painter.painted == ["shot_000", "shot_001", "shot_002", "shot_003"]
     assert summary.exit_status == 4 and summary.counts["done"] == 3 and summary.counts["failed"] == 1
-    assert summary.shots[1]["state"] == "failed" and summary.shots[1]["error"].startswith(told)
+    assert summary.shots[1]["state"] == "failed" and summary.shots[1]["error"].startswith(sentence)
     painter = painting.Painter()
     assert painting.paint(tmp_path, 4, painter=painter, resume=True).exit_status == 0
     assert painter.painted == ["shot_001"]

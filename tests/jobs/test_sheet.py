@@ -39,13 +39,13 @@ def page(folder):
 
 def test_each_shot_is_a_thumbnail_that_leads_to_its_files(tmp_path, painting):
     painting.paint(tmp_path, 3)
-    found = page(tmp_path)
+    actual = page(tmp_path)
     names = [f"shot_00{number}" for number in range(3)]
-    assert [image["alt"] for image in found.images] == names
-    assert all(image["loading"] == "lazy" and (image["width"], image["height"]) == ("4", "3") for image in found.images)
-    assert found.links == [f"{name}.{suffix}" for name in names for suffix in ("png", "exr", "json")]
-    assert all((tmp_path / link).exists() for link in found.links)
-    assert "3 shots" in found.text and "All are there." in found.text and "Only what went wrong" not in found.text
+    assert [image["alt"] for image in actual.images] == names
+    assert all(image["loading"] == "lazy" and (image["width"], image["height"]) == ("4", "3") for image in actual.images)
+    assert actual.links == [f"{name}.{suffix}" for name in names for suffix in ("png", "exr", "json")]
+    assert all((tmp_path / link).exists() for link in actual.links)
+    assert "3 shots" in actual.text and "All are there." in actual.text and "Only what went wrong" not in actual.text
 
 
 def test_pictures_that_were_not_checked_have_no_tick_on_the_page(tmp_path, painting):
@@ -60,16 +60,16 @@ def test_a_picture_of_which_not_all_is_modelled_makes_the_page_amber(tmp_path):
     counts = {"shots": 2, "done": 2, "failed": 0, "left": 0, "checked": 2, "checks_failed": 0, "not_all_modelled": 1}
     sheet.write(tmp_path / "sheet.html", [], counts)
     text = (tmp_path / "sheet.html").read_text()
-    assert 'class="same_but"' in text and "1 the same but for objects that are not modelled" in text
+    assert 'class="same_but"' in text and "1 the same but for objects that are not modeled" in text
 
 
 def test_what_went_wrong_is_told_by_name(tmp_path, painting):
     broken = {"shot_001": InputError("the lamp <Key & Fill> is broken: mend it")}
     painting.paint(tmp_path, 4, painter=painting.Painter(broken=broken, unlike=["shot_002"]), check=True)
-    found = page(tmp_path)
-    assert "3 are there, 1 failed, 1 not what the reference tracer sees." in found.text
-    assert "the lamp <Key & Fill> is broken: mend it" in found.text and "the left half is < the right half" in found.text
-    assert "Only what went wrong" in found.text and 'class="different"' in (tmp_path / "contact-sheet.html").read_text()
+    actual = page(tmp_path)
+    assert "3 are there, 1 failed, 1 not what the reference tracer sees." in actual.text
+    assert "the lamp <Key & Fill> is broken: mend it" in actual.text and "the left half is < the right half" in actual.text
+    assert "Only what went wrong" in actual.text and 'class="different"' in (tmp_path / "contact-sheet.html").read_text()
 
 
 def test_the_same_batch_gives_the_same_page(tmp_path, painting):
@@ -93,11 +93,11 @@ def test_names_and_sentences_of_any_letters_are_shown_and_led_to_as_they_are(nam
     files = {"image": f"{name}.exr", "preview": f"{name}.png"}
     check = {"passed": False, "verdict": words}
     record = files | {"rendered": {"width": 4, "height": 3}, "warnings": [words], "check": check}
-    found = Page(sheet.picture(Result(name, record)))
-    assert found.links == [f"{name}.png", f"{name}.exr", f"{name}.json"]
-    assert unquote(found.images[0]["src"]) == f"{name}.png" and found.images[0]["alt"] == name
-    assert found.texts[0] == name
-    assert set(found.tags) <= {"figure", "a", "img", "figcaption", "b", "p", "span"}
+    actual = Page(sheet.picture(Result(name, record)))
+    assert actual.links == [f"{name}.png", f"{name}.exr", f"{name}.json"]
+    assert unquote(actual.images[0]["src"]) == f"{name}.png" and actual.images[0]["alt"] == name
+    assert actual.texts[0] == name
+    assert set(actual.tags) <= {"figure", "a", "img", "figcaption", "b", "p", "span"}
     failed = Page(sheet.picture(Result(name, None, words or "it failed")))
     assert failed.texts[0] == name and set(failed.tags) <= {"figure", "figcaption", "b", "p", "span"}
 
@@ -142,7 +142,7 @@ def test_each_picture_has_its_verdict_or_says_that_it_was_not_checked():
     assert "identical" in said({**passed, "figures": {"position": {}}})
     assert "differs Another picture." in said({"passed": False, "verdict": "Another picture."})
     but = {**passed, "answer": "same_but", "not_modelled": {"count": 2, "names": ["Hair", "Fog"], "share": 0.25}}
-    assert "identical to 0.0003 px, but for 2 objects that are not modelled" in said(but)
+    assert "identical to 0.0003 px, but for 2 objects that are not modeled" in said(but)
     assert "class=but" in sheet.picture(Result("a", {**record, "check": but}))
     without_picture = {key: value for key, value in record.items() if key != "image"}
     assert "not checked" not in Page(sheet.picture(Result("a", without_picture))).text, "labels alone are no picture"
@@ -179,9 +179,11 @@ def test_whatever_a_sidecar_says_it_is_text_in_the_page(tmp_path, painting):
     records = list(attacked(whole))
     assert len(records) > 3 * 10, "the sidecar has lost its keys"
     for record in records:
-        found = Page(sheet.picture(Result("shot_000", record)))
-        assert found.attributes == safe.attributes and found.links == safe.links, record
-        assert [tag for tag in found.tags if tag not in ("p", "span")] == [tag for tag in safe.tags if tag not in ("p", "span")]
+        actual = Page(sheet.picture(Result("shot_000", record)))
+        assert actual.attributes == safe.attributes and actual.links == safe.links, record
+        assert [tag for tag in actual.tags if tag not in ("p", "span")] == [
+            tag for tag in safe.tags if tag not in ("p", "span")
+        ]
 
 
 def test_counts_are_what_the_exit_status_goes_by():

@@ -84,8 +84,8 @@ class Comparer(Tracing):
     """The process, asked for pictures of geometry alone."""
 
     def verdict(self, scene, image, camera, clip, stated=None):
-        found = self.compare(scene, [image], Job(level="geometry"), camera, clip, stated, may_be_empty=True)
-        return {"passed": found["passed"], "verdict": found["sentence"], "figures": found["figures"]}
+        comparison = self.compare(scene, [image], Job(level="geometry"), camera, clip, stated, may_be_empty=True)
+        return {"passed": comparison["passed"], "verdict": comparison["sentence"], "figures": comparison["figures"]}
 
 
 @pytest.fixture(scope="module")
@@ -95,13 +95,13 @@ def comparer():
 
 
 def test_a_right_picture_passes_with_figures_that_a_sidecar_keeps(comparer, scene_path, picture):
-    said = comparer.verdict(scene_path, picture(CAMERA), CAMERA, CLIP)
-    assert said["passed"] and said["verdict"].startswith("The same picture: over ")
-    figures = said["figures"]
+    result = comparer.verdict(scene_path, picture(CAMERA), CAMERA, CLIP)
+    assert result["passed"] and result["verdict"].startswith("The same picture: over ")
+    figures = result["figures"]
     assert figures["pixels"] > 3000 and figures["conversion"] is None and figures["mismatches"]["unexplained"] == 0
     # What one side holds in float32 is all that the two differ by: 2⁻²⁴ · d · |P|/z at 8 units, ten times as much at most.
     assert figures["position"]["max"] < 10 * 2.0**-24 * 110 * 8 and max(figures["share_of_tolerance"].values()) <= 1
-    assert len(json.dumps(said, allow_nan=False)) < 1500, "it stands in every sidecar"
+    assert len(json.dumps(result, allow_nan=False)) < 1500, "it stands in every sidecar"
 
 
 @st.composite
@@ -138,14 +138,14 @@ def test_any_camera_passes_as_itself_and_fails_half_a_pixel_off_in_any_direction
 
 @pytest.mark.parametrize("fault", WRONG)
 def test_a_picture_of_a_wrong_camera_fails(comparer, scene_path, picture, fault):
-    said = comparer.verdict(scene_path, picture(WRONG[fault]), CAMERA, CLIP)
-    assert not said["passed"] and said["verdict"].startswith("Not the same picture: "), said
+    result = comparer.verdict(scene_path, picture(WRONG[fault]), CAMERA, CLIP)
+    assert not result["passed"] and result["verdict"].startswith("Not the same picture: "), result
 
 
 @pytest.mark.parametrize("flip", FLIPS)
 def test_a_picture_that_is_flipped_or_moved_in_its_file_fails(comparer, scene_path, picture, flip):
-    said = comparer.verdict(scene_path, picture(CAMERA, FLIPS[flip]), CAMERA, CLIP)
-    assert not said["passed"], said
+    result = comparer.verdict(scene_path, picture(CAMERA, FLIPS[flip]), CAMERA, CLIP)
+    assert not result["passed"], result
 
 
 def test_a_wrong_conversion_fails_even_where_the_picture_is_right(comparer, scene_path, picture):
@@ -184,9 +184,9 @@ def test_another_scene_is_another_file(comparer, scene_path, picture, tmp_path):
 
 def test_a_picture_without_a_single_hit_is_no_proof(comparer, scene_path, picture):
     upwards = replace(CAMERA, look_at=(3, -6, 9))
-    said = comparer.verdict(scene_path, picture(upwards), upwards, CLIP, stated=upwards)
-    assert not said["passed"] and "Nothing to compare" in said["verdict"]
-    assert json.dumps(said, allow_nan=False)
+    result = comparer.verdict(scene_path, picture(upwards), upwards, CLIP, stated=upwards)
+    assert not result["passed"] and "Nothing to compare" in result["verdict"]
+    assert json.dumps(result, allow_nan=False)
 
 
 @pytest.mark.parametrize(
@@ -201,10 +201,10 @@ def test_a_picture_without_a_single_hit_is_no_proof(comparer, scene_path, pictur
 def test_what_can_not_be_checked_is_one_sentence_and_the_next_is_checked(
     comparer, scene_path, picture, tmp_path, change, sentence
 ):
-    given = {"scene": scene_path, "image": picture(CAMERA), "camera": CAMERA, "clip": CLIP}
+    request = {"scene": scene_path, "image": picture(CAMERA), "camera": CAMERA, "clip": CLIP}
     with pytest.raises(InputError, match=sentence):
-        comparer.verdict(**given | change(tmp_path))
-    assert comparer.verdict(**given)["passed"]
+        comparer.verdict(**request | change(tmp_path))
+    assert comparer.verdict(**request)["passed"]
 
 
 def test_a_comparer_that_was_lost_is_started_again(scene_path, picture):

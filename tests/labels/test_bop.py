@@ -28,9 +28,9 @@ def scene(i):
     is hidden as a whole."""
     small = np.array([moved(-2, 0, 0.4, 0.2 + i, 0.4)])
     askew = np.array([moved(-1, -2, 0.5, 0.5) @ np.array([[-0.5, 0.2, 0, 0], [0, 0.3, 0, 0], [0, 0.1, 0.4, 0], [0, 0, 0, 1]])])
-    found = room(replace(CAMERA, eye=(1 + 0.2 * i, -7, 3)), ball=moved(0.1, 2, 0.8, scale=0.3) if i == 2 else None)
+    actual = room(replace(CAMERA, eye=(1 + 0.2 * i, -7, 3)), ball=moved(0.1, 2, 0.8, scale=0.3) if i == 2 else None)
     more = Object("Cube.001", "cube", small), Object("Askew", "cube", askew)
-    return replace(found, objects=(*found.objects, *more))
+    return replace(actual, objects=(*actual.objects, *more))
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def turn_of(values):
     return turn
 
 
-def test_each_pixels_point_projects_to_the_pixels_centre_from_the_world_and_from_its_model(written):
+def test_each_pixels_point_projects_to_the_pixels_center_from_the_world_and_from_its_model(written):
     worst = 0.0
     for i, labels in enumerate(written.labels):
         camera = written.scene_camera[str(i)]
@@ -76,17 +76,17 @@ def test_each_pixels_point_projects_to_the_pixels_centre_from_the_world_and_from
             for points in (of_world, of_model):
                 x, y, w = k @ points.T
                 worst = max([worst, *np.abs(x / w - columns), *np.abs(y / w - rows)])
-                shown = depth[rows, columns]
-                off = np.abs(points[:, 2] - shown)[shown > 0].max(initial=0.0)
+                depths = depth[rows, columns]
+                off = np.abs(points[:, 2] - depths)[depths > 0].max(initial=0.0)
                 # Half a step of the PNG, and in millimeters the rounding that PIXELS is of.
                 assert off <= camera["depth_scale"] / 2 + 0.01, f"depth is off by {off:.3g} mm"
-    assert 0 < worst <= PIXELS, f"a point projects {worst:.3g} pixels beside its pixel's centre"
+    assert 0 < worst <= PIXELS, f"a point projects {worst:.3g} pixels beside its pixel's center"
 
 
 def test_our_reader_of_bop_finds_the_cameras_again(written):
-    found = cameras.read(written.out / "scene_camera.json", options=cameras.Options(scale=0.001, size=(64, 48)))
+    cameras_read = cameras.read(written.out / "scene_camera.json", options=cameras.Options(scale=0.001, size=(64, 48)))
     points = np.array([(0.3, 0.1, 0.2), (-3.0, 4, 1), (2.0, -1, 0.5)])
-    for labels, camera in zip(written.labels, found, strict=True):
+    for labels, camera in zip(written.labels, cameras_read, strict=True):
         expected, got = (np.array(each.project(points)) for each in (labels.image.camera, camera.pinhole))
         assert np.abs(got - expected).max() <= 1e-11
 
@@ -94,19 +94,19 @@ def test_our_reader_of_bop_finds_the_cameras_again(written):
 def test_masks_are_the_labels_to_the_pixel_and_their_figures_are_the_toolkits(written):
     hidden = invalid = 0
     for i, labels in enumerate(written.labels):
-        given = {each["id"]: each for each in labels.instances if each["amodal"]}
-        told = written.scene_gt[str(i)]
-        assert [each["instance_id"] for each in told] == list(given)
+        amodal = {each["id"]: each for each in labels.instances if each["amodal"]}
+        entry = written.scene_gt[str(i)]
+        assert [each["instance_id"] for each in entry] == list(amodal)
         depth = written.png(f"depth/{i:06d}")
         farthest = 65535.5 * written.scene_camera[str(i)]["depth_scale"] / 1000
         assert depth.dtype == np.uint16 and (farthest < 14) == (i == 1)
         np.testing.assert_array_equal(depth > 0, labels.image["Depth"][::-1, :, 0] < farthest)
-        for place, (each, info) in enumerate(zip(told, written.scene_gt_info[str(i)], strict=True)):
+        for place, (each, info) in enumerate(zip(entry, written.scene_gt_info[str(i)], strict=True)):
             whole, visible = (written.png(f"{kind}/{i:06d}_{place:06d}") for kind in ("mask", "mask_visib"))
             for mask in (whole, visible):
                 assert mask.dtype == np.uint8 and mask.shape == (48, 64) and set(np.unique(mask)) <= {0, 255}
             np.testing.assert_array_equal(visible > 0, labels.image["Instance"][::-1, :, 0] == each["instance_id"])
-            assert (whole[visible > 0] > 0).all() and (whole > 0).sum() == given[each["instance_id"]]["amodal"]["area"]
+            assert (whole[visible > 0] > 0).all() and (whole > 0).sum() == amodal[each["instance_id"]]["amodal"]["area"]
             assert info == {
                 "bbox_obj": box(whole) if visible.any() else [-1] * 4,
                 "bbox_visib": box(visible),
@@ -129,12 +129,12 @@ def box(mask):
 def test_what_has_one_name_box_and_scale_is_one_object_in_all_pictures(written):
     assert [each["name"] for each in written.objects.values()] == ["Askew", "Ball", "Ball", "Cube", "Cube", "Floor"]
     names = [{each["id"]: each["name"] for each in labels.instances} for labels in written.labels]
-    found = {}
+    result = {}
     for i, poses in written.scene_gt.items():
         for each in poses:
             key = (names[int(i)][each["instance_id"]], each["instance_id"])
-            found.setdefault(key, set()).add(each["obj_id"])
-    numbers = {key: sorted(each) for key, each in found.items()}
+            result.setdefault(key, set()).add(each["obj_id"])
+    numbers = {key: sorted(each) for key, each in result.items()}
     assert [each for (name, _), each in numbers.items() if name == "Ball"] == [[2, 3]], "the ball is smaller in one picture"
     assert sorted(each for (name, _), each in numbers.items() if name == "Cube") == [[4], [5]]
     assert [each for (name, _), each in numbers.items() if name == "Cube.001"] == [[4]]
@@ -165,10 +165,10 @@ def test_what_is_lacking_is_one_sentence_and_leaves_no_folder(tmp_path, capfd, l
     camera = replace(CAMERA, mirrored=labels == "mirrored")
     path = files.write(tmp_path / "a.exr", vp.label(room(camera), LABELS if isinstance(labels, str) else labels))[-1]
     if labels == "spoilt":
-        told = json.loads(path.read_text())
-        told["instances"][0]["amodal"]["segmentation"]["counts"].append(5)
+        record = json.loads(path.read_text())
+        record["instances"][0]["amodal"]["segmentation"]["counts"].append(5)
         with written_whole(path) as temporary:
-            temporary.write_text(json.dumps(told))
+            temporary.write_text(json.dumps(record))
     before = sorted(path.name for path in tmp_path.iterdir())
     assert main(["labels", str(tmp_path), str(tmp_path / "out"), "--to", "bop"]) == 2
     (line,) = capfd.readouterr().err.strip().splitlines()

@@ -41,10 +41,10 @@ def written(tmp_path_factory):
 def points_of(model):
     """By hand: positions, colors, and which image shows which point, (points, images)."""
     lines = [line.split() for line in (model / "points3D.txt").read_text().splitlines() if not line.startswith("#")]
-    shown = np.zeros((len(lines), len(list(model.parent.glob("shots/*.json")))), bool)
+    visible = np.zeros((len(lines), len(list(model.parent.glob("shots/*.json")))), bool)
     for i, line in enumerate(lines):
-        shown[i, np.array(line[8::2], int) - 1] = True
-    return np.array([line[1:4] for line in lines], float), np.array([line[4:7] for line in lines], int), shown
+        visible[i, np.array(line[8::2], int) - 1] = True
+    return np.array([line[1:4] for line in lines], float), np.array([line[4:7] for line in lines], int), visible
 
 
 def really_seen(scene, positions):
@@ -72,10 +72,10 @@ def test_pycolmap_reads_it_and_each_track_projects_to_its_places(written):
 
 
 def test_what_a_track_names_rays_see_and_few_pictures_that_see_a_point_are_not_named(written):
-    positions, _, shown = points_of(written.model)
+    positions, _, visible = points_of(written.model)
     seen = np.stack([really_seen(scene, positions) for scene in written.scenes], axis=1)
-    assert not (shown & ~seen).any(), f"{(shown & ~seen).sum()} of {shown.sum()} places are hidden"
-    assert (shown & seen).sum() >= 0.85 * seen.sum(), f"{shown.sum()} of {seen.sum()} places are found"
+    assert not (visible & ~seen).any(), f"{(visible & ~seen).sum()} of {visible.sum()} places are hidden"
+    assert (visible & seen).sum() >= 0.85 * seen.sum(), f"{visible.sum()} of {seen.sum()} places are found"
     assert not seen.all(), "the test wants hidden points"
 
 
@@ -83,9 +83,9 @@ def test_that_test_finds_a_test_of_depth_that_lets_all_pass(written, symlink, tm
     monkeypatch.setattr(colmap, "_ROUNDING", 1.0)
     colmap.write(written.shots, tmp_path / "model", 600)
     symlink(tmp_path / "shots", written.shots)
-    positions, _, shown = points_of(tmp_path / "model")
+    positions, _, visible = points_of(tmp_path / "model")
     seen = np.stack([really_seen(scene, positions) for scene in written.scenes], axis=1)
-    assert (shown & ~seen).any()
+    assert (visible & ~seen).any()
 
 
 @pytest.mark.parametrize("disturbed", [False, True])
@@ -121,19 +121,19 @@ def test_what_moves_from_picture_to_picture_has_no_track_from_one_to_the_other(t
     scenes = [room(replace(CAMERA, eye=eye), cubes=there if i > 1 else None) for i, eye in enumerate(EYES)]
     shots = labelled(tmp_path / "shots", scenes)
     colmap.write(shots, tmp_path / "model")
-    _, colours, shown = points_of(tmp_path / "model")
+    _, colours, visible = points_of(tmp_path / "model")
     ids = colours @ [1, 256, 65536]
     labels = vp.label(scenes[0], ("masks",)).instances
     still, moving = (next(each["id"] for each in labels if (each["name"], each["number"]) == ("Cube", i)) for i in range(2))
-    crosses = shown[:, :2].any(axis=1) & shown[:, 2:].any(axis=1)
+    crosses = visible[:, :2].any(axis=1) & visible[:, 2:].any(axis=1)
     assert (ids == moving).sum() > 10 and not crosses[ids == moving].any()
     assert crosses[ids == still].any() and crosses[ids == next(each["id"] for each in labels if each["name"] == "Floor")].any()
 
 
 def test_points_lie_evenly_over_what_is_shown():
     state = np.zeros((48, 64), int)
-    found = colmap._sampled(0, CAMERA, np.full((48, 64), 5.0), state, np.zeros((48, 64, 3), np.uint8), 192)
-    column, row, _ = CAMERA.project(found.positions)
+    actual = colmap._sampled(0, CAMERA, np.full((48, 64), 5.0), state, np.zeros((48, 64, 3), np.uint8), 192)
+    column, row, _ = CAMERA.project(actual.positions)
     counts = np.histogram2d(row, column, bins=(6, 8), range=((0, 48), (0, 64)))[0]
     assert counts.sum() == 192 and counts.min() > 0
     assert counts.std() <= 1.2, f"4 are wanted in each 8 × 8 pixels; they spread by {counts.std():.3g}, and thrown dice's by 2"
@@ -141,8 +141,10 @@ def test_points_lie_evenly_over_what_is_shown():
 
 def test_the_same_labels_give_the_same_bytes(written, tmp_path):
     colmap.write(written.shots, tmp_path / "again", 600)
-    one, two = ({path.name: path.read_bytes() for path in folder.iterdir()} for folder in (written.model, tmp_path / "again"))
-    assert one == two and set(one) == {"cameras.txt", "images.txt", "points3D.txt", "points3D.ply"}
+    first, second = (
+        {path.name: path.read_bytes() for path in folder.iterdir()} for folder in (written.model, tmp_path / "again")
+    )
+    assert first == second and set(first) == {"cameras.txt", "images.txt", "points3D.txt", "points3D.ply"}
 
 
 def test_points_come_into_the_model_of_cameras_alone_that_a_batch_has_written_and_into_no_other(written, tmp_path, capfd):

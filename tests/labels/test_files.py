@@ -43,17 +43,17 @@ def written(tmp_path_factory):
 
 def test_the_exr_has_every_pass_to_the_last_bit(written):
     labels, folder = written
-    found = image.read(folder / "shot.labels.exr")
-    assert set(found.passes) == set(labels.image.passes) and found.camera == labels.image.camera
+    read_image = image.read(folder / "shot.labels.exr")
+    assert set(read_image.passes) == set(labels.image.passes) and read_image.camera == labels.image.camera
     for name, values in labels.image.passes.items():
-        np.testing.assert_array_equal(found[name], values)
+        np.testing.assert_array_equal(read_image[name], values)
 
 
 def test_the_passes_of_each_label_are_those_that_are_told_beforehand(written):
     labels, _ = written
-    told = [name for names in PASSES.values() for name in names]
-    assert list(labels.image.passes)[: len(told)] == told
-    assert all(name.startswith("Crypto") for name in list(labels.image.passes)[len(told) :])
+    entries = [name for names in PASSES.values() for name in names]
+    assert list(labels.image.passes)[: len(entries)] == entries
+    assert all(name.startswith("Crypto") for name in list(labels.image.passes)[len(entries) :])
 
 
 def test_no_json_of_an_older_frame_stands_beside_files_of_a_newer(written, tmp_path, monkeypatch):
@@ -106,10 +106,10 @@ def test_depth_that_sixteen_bits_can_not_hold_is_none_and_never_another_depth():
 def test_pycocotools_finds_the_same_masks_areas_and_boxes(written):
     coco = pytest.importorskip("pycocotools.mask")
     labels, folder = written
-    told = json.loads((folder / "shot.labels.json").read_text())
+    record = json.loads((folder / "shot.labels.json").read_text())
     ids = labels.image["Instance"][::-1, :, 0]
-    assert told["instances"] == labels.instances and len(told["instances"]) == 4
-    for each in told["instances"]:
+    assert record["instances"] == labels.instances and len(record["instances"]) == 4
+    for each in record["instances"]:
         for kind in ("visible", "amodal"):
             packed = coco.frPyObjects(each[kind]["segmentation"], *each[kind]["segmentation"]["size"])
             assert coco.area(packed) == each[kind]["area"]
@@ -125,8 +125,8 @@ def test_the_command_writes_what_the_function_finds(written, tmp_path, capfd):
         scene_file.write(frame, tmp_path / f"{i}.json")
     words = ["render", "1.json", "shot.exr", "--labels", ",".join(KINDS)]
     words += ["--previous", "0.json", "--next", "2.json", "--json", "result.json"]
-    given = [str(tmp_path / word) if word.endswith((".json", ".exr")) else word for word in words]
-    assert main(given) == 0
+    arguments = [str(tmp_path / word) if word.endswith((".json", ".exr")) else word for word in words]
+    assert main(arguments) == 0
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["labels"] == [str(tmp_path / f"shot.{ending}") for ending in ENDINGS]
     for ending in ENDINGS:
@@ -136,7 +136,7 @@ def test_the_command_writes_what_the_function_finds(written, tmp_path, capfd):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--labels", "colour"], "there is no label 'colour'"),
+        (["--labels", "color"], "there is no label 'color'"),
         (["--labels", "flow"], "flow goes to another frame"),
         (["--labels", "depth", "--next", "SCENE"], "--next is for flow"),
         (["--depth-steps", "0"], "'0' is no number above 0"),
@@ -144,9 +144,9 @@ def test_the_command_writes_what_the_function_finds(written, tmp_path, capfd):
 )
 def test_what_is_wrong_is_one_sentence_before_anything_is_written(tmp_path, capfd, words, sentence):
     scene_file.write(room(), tmp_path / "scene.json")
-    given = [str(tmp_path / "scene.json") if word == "SCENE" else word for word in words]
+    arguments = [str(tmp_path / "scene.json") if word == "SCENE" else word for word in words]
     before = sorted(tmp_path.iterdir())
-    assert main(["render", str(tmp_path / "scene.json"), str(tmp_path / "out.exr"), *given]) == 2
+    assert main(["render", str(tmp_path / "scene.json"), str(tmp_path / "out.exr"), *arguments]) == 2
     (line,) = capfd.readouterr().err.strip().splitlines()
     assert sentence in line and sorted(tmp_path.iterdir()) == before
 
@@ -158,13 +158,13 @@ def test_what_is_wrong_is_one_sentence_before_anything_is_written(tmp_path, capf
 def pictures(tmp_path_factory):
     """The labels of three pictures by name, and their folder. In the last one the ball hides behind a cube."""
     folder = tmp_path_factory.mktemp("shots")
-    found = {}
+    result = {}
     for name, ball in (("a", moved(z=0.7)), ("b", moved(1, 0.4, 0.7)), ("c", moved(0.1, 2, 0.8, scale=0.3))):
         scene = room(ball=ball)
         cube = replace(scene.objects[2], name="Cube.001", matrix=np.array([moved(-2, 0, 0.4, 0.2, 0.4)]))
-        found[name] = vp.label(replace(scene, objects=(*scene.objects, cube)), ("masks", "amodal"))
-        files.write(folder / f"{name}.exr", found[name])
-    return found, folder
+        result[name] = vp.label(replace(scene, objects=(*scene.objects, cube)), ("masks", "amodal"))
+        files.write(folder / f"{name}.exr", result[name])
+    return result, folder
 
 
 def run(*words):
@@ -174,33 +174,33 @@ def run(*words):
 @pytest.mark.parametrize("kind", ["visible", "amodal"])
 def test_pycocotools_loads_it_and_finds_every_mask(pictures, tmp_path, kind):
     loader = pytest.importorskip("pycocotools.coco").COCO
-    found, folder = pictures
+    actual, folder = pictures
     assert run(folder, tmp_path / "all.json", *(["--amodal"] if kind == "amodal" else [])) == 0
     dataset = loader(tmp_path / "all.json")
     assert [each["name"] for each in dataset.loadCats(dataset.getCatIds())] == ["Ball", "Cube", "Floor"]
     images = {each["file_name"]: each for each in dataset.loadImgs(dataset.getImgIds())}
     assert list(images) == ["a.exr", "b.exr", "c.exr"]
-    for name, labels in found.items():
+    for name, labels in actual.items():
         image = images[f"{name}.exr"]
         assert (image["width"], image["height"]) == (64, 48)
-        given = {each["id"]: each for each in labels.instances if each[kind] is not None}
+        encoded = {each["id"]: each for each in labels.instances if each[kind] is not None}
         annotations = dataset.loadAnns(dataset.getAnnIds(image["id"]))
-        assert {each["instance_id"] for each in annotations} == set(given)
+        assert {each["instance_id"] for each in annotations} == set(encoded)
         for each in annotations:
-            mask, expected = dataset.annToMask(each), given[each["instance_id"]]
+            mask, expected = dataset.annToMask(each), encoded[each["instance_id"]]
             assert mask.sum() == each["area"] == expected[kind]["area"] and each["bbox"] == expected[kind]["bbox"]
             assert dataset.loadCats(each["category_id"])[0]["name"] == coco.category(expected["name"])
             if kind == "visible":
                 np.testing.assert_array_equal(mask, labels.image["Instance"][::-1, :, 0] == each["instance_id"])
     coco_masks = pytest.importorskip("pycocotools.mask")
     runs = [each["segmentation"] for each in dataset.loadAnns(dataset.getAnnIds())]
-    told = [(each["area"], each["bbox"]) for each in dataset.loadAnns(dataset.getAnnIds())]
-    assert [*zip(coco_masks.area(runs).tolist(), coco_masks.toBbox(runs).tolist(), strict=True)] == told
+    stated = [(each["area"], each["bbox"]) for each in dataset.loadAnns(dataset.getAnnIds())]
+    assert [*zip(coco_masks.area(runs).tolist(), coco_masks.toBbox(runs).tolist(), strict=True)] == stated
     results = json.loads((tmp_path / "all.json").read_text())["annotations"]
     kept = ("image_id", "category_id", "segmentation")  # of results that are masks: with a box it would be of boxes
     again = dataset.loadRes([{name: each[name] for name in kept} | {"score": 1.0} for each in results])
-    assert [(each["area"], [*each["bbox"]]) for each in again.loadAnns(again.getAnnIds())] == told
-    hidden = [each for each in found["c"].instances if each["name"] == "Ball"]
+    assert [(each["area"], [*each["bbox"]]) for each in again.loadAnns(again.getAnnIds())] == stated
+    hidden = [each for each in actual["c"].instances if each["name"] == "Ball"]
     assert [each["visible"] for each in hidden] == [None], "the test wants an object that is hidden as a whole"
     ids = dataset.getAnnIds()
     assert sorted(ids) == list(range(1, len(ids) + 1))
@@ -219,15 +219,15 @@ def test_segments_are_those_of_the_colours_of_the_pictures(pictures, tmp_path):
     cv2 = pytest.importorskip("cv2")
     _, folder = pictures
     assert run(folder, tmp_path / "panoptic.json", "--to", "panoptic") == 0
-    told = json.loads((tmp_path / "panoptic.json").read_text())
-    assert [each["image_id"] for each in told["annotations"]] == [each["id"] for each in told["images"]] == [1, 2, 3]
-    for annotation in told["annotations"]:
+    record = json.loads((tmp_path / "panoptic.json").read_text())
+    assert [each["image_id"] for each in record["annotations"]] == [each["id"] for each in record["images"]] == [1, 2, 3]
+    for annotation in record["annotations"]:
         blue_green_red = cv2.imread(str(folder / annotation["file_name"])).astype(int)
         numbers, areas = np.unique(blue_green_red @ [256**2, 256, 1], return_counts=True)
         segments = {each["id"]: each["area"] for each in annotation["segments_info"]}
         assert segments == {n: area for n, area in zip(numbers.tolist(), areas.tolist(), strict=True) if n}
-    colours = [tuple(each["color"]) for each in told["categories"]]
-    assert len(set(colours)) == len(colours) and all(each["isthing"] == 1 for each in told["categories"])
+    colours = [tuple(each["color"]) for each in record["categories"]]
+    assert len(set(colours)) == len(colours) and all(each["isthing"] == 1 for each in record["categories"])
 
 
 @pytest.mark.parametrize("kind", ["coco", "panoptic"])
@@ -236,8 +236,8 @@ def test_a_picture_beside_its_labels_is_the_one_that_is_named(tmp_path, kind):
         files.write(tmp_path / f"{name}.exr", vp.label(room(), ("masks",)))
     (tmp_path / "b.png").write_bytes(encoded(np.zeros((48, 64, 3), np.uint8)))
     assert run(tmp_path, tmp_path / "all.json", "--to", kind) == 0
-    told = json.loads((tmp_path / "all.json").read_text())
-    assert [each["file_name"] for each in told["images"]] == ["a.exr", "b.png"]
+    record = json.loads((tmp_path / "all.json").read_text())
+    assert [each["file_name"] for each in record["images"]] == ["a.exr", "b.png"]
 
 
 def test_an_instance_has_one_id_in_all_pictures(pictures, tmp_path):
@@ -293,12 +293,12 @@ def test_what_can_not_be_gathered_is_one_sentence_and_nothing_is_written(tmp_pat
         files.write(folder / "a.exr", vp.label(room(CAMERA), ("masks",)))
     elif isinstance(content, dict):
         told_in = files.write(folder / "a.exr", vp.label(room(CAMERA), ("depth", "masks", "amodal")))[-1]
-        told = json.loads(told_in.read_text())
-        instance = next(each for each in told["instances"] if each["visible"])
+        record = json.loads(told_in.read_text())
+        instance = next(each for each in record["instances"] if each["visible"])
         for key, value in content.items():
-            owners = (told, instance, instance["visible"], instance["visible"]["segmentation"])
+            owners = (record, instance, instance["visible"], instance["visible"]["segmentation"])
             next(owner for owner in owners if key in owner)[key] = value
-        told_in.write_text(json.dumps(told))
+        told_in.write_text(json.dumps(record))
     elif content:
         (folder / "a.labels.json").write_text(content)
     assert run(folder, tmp_path / "out.json", *words) == 2

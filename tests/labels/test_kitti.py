@@ -31,11 +31,11 @@ def test_opencv_reads_depth_in_256ths_of_a_metre_and_none_where_nothing_is(writt
     for name, each in labels.items():
         levels = cv2.imread(str(folder / "depth" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
         depth = each.image["Depth"][::-1, :, 0].astype(float)
-        shown = depth < BACKGROUND_DEPTH
-        assert levels.dtype == np.uint16 and shown.any() and not shown.all()
-        off = np.abs(levels[shown] / 256 - depth[shown]).max()
+        visible = depth < BACKGROUND_DEPTH
+        assert levels.dtype == np.uint16 and visible.any() and not visible.all()
+        off = np.abs(levels[visible] / 256 - depth[visible]).max()
         assert off <= 0.5 / 256, f"depth is off by {off * 256:.3g} steps, and rounds by half a step"
-        assert (levels[~shown] == 0).all()
+        assert (levels[~visible] == 0).all()
 
 
 def test_opencv_reads_the_flow_and_what_is_hidden_there_is_valid_in_one_folder_only(written):

@@ -22,18 +22,18 @@ DATASETS = {"coco": "coco.json", "panoptic": "panoptic.json", "bop": "bop", "col
 """The format of a dataset of labels → the file or folder that it is written to."""
 
 
-def is_same(name: str, ours: bytes | None, theirs: bytes | None) -> bool:
+def is_same(name: str, ours: bytes | None, windows_bytes: bytes | None) -> bool:
     """True if a file's bytes are the same; of angles and rotations, all but what each system's libraries round otherwise."""
     rounded = re.search(r"(bop/(objects|scene_gt)|transforms)\.json$", name)
-    if ours == theirs or ours is None or theirs is None or not rounded:
-        return ours == theirs
+    if ours == windows_bytes or ours is None or windows_bytes is None or not rounded:
+        return ours == windows_bytes
     number = rb"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
-    text, its_text = (re.sub(number, b"", each) for each in (ours, theirs))
-    figures, its_figures = (np.array(re.findall(number, each), float) for each in (ours, theirs))
+    text, its_text = (re.sub(number, b"", each) for each in (ours, windows_bytes))
+    figures, its_figures = (np.array(re.findall(number, each), float) for each in (ours, windows_bytes))
     return text == its_text and np.allclose(figures, its_figures, rtol=1e-12, atol=1e-11)
 
 
-def different_files(ours: Path, theirs: Path) -> list[str]:
+def different_files(ours: Path, windows_folder: Path) -> list[str]:
     """Names of files that one of two folders lacks or has with other bytes.
 
     Left out are those that tell times and folders, and pictures to look at, in which Blender's view transform rounds otherwise.
@@ -41,10 +41,10 @@ def different_files(ours: Path, theirs: Path) -> list[str]:
     left_out = re.compile(r"(.*/)?(contact-sheet\.html|summary\.json|\.viewcam\.lock|orbit_\d+\.(json|png)|rgb/\d+\.png)")
     contents = [
         {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-        for folder in (ours, theirs)
+        for folder in (ours, windows_folder)
     ]
     names = {name for name in contents[0].keys() | contents[1].keys() if not left_out.fullmatch(name)}
-    assert names, f"{ours} and {theirs} hold nothing to compare"
+    assert names, f"{ours} and {windows_folder} hold nothing to compare"
     return sorted(name for name in names if not is_same(name, contents[0].get(name), contents[1].get(name)))
 
 

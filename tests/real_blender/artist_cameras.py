@@ -164,9 +164,9 @@ def look_straight_down():
 def draw_on_light_and_dark():
     """The diagram, its letters and its handles; and the sidebar as narrow as it gets before Blender hides it."""
     view, _ = region("VIEW_3D", "WINDOW")
-    shading, shown = view.spaces.active.shading, view.spaces.active.region_3d
+    shading, region_3d = view.spaces.active.shading, view.spaces.active.region_3d
     values().eye, values().look_at, values().up = (4, -6, 3.5), (0.5, 0.5, 0.5), (0, 0, 1)
-    shown.view_location, shown.view_distance = (1.5, -2, 1.5), 16
+    region_3d.view_location, region_3d.view_distance = (1.5, -2, 1.5), 16
     shading.background_type = "VIEWPORT"
     for name, grey in (("light", 0.9), ("middle", 0.2), ("dark", 0.0)):
         shading.background_color = (grey,) * 3

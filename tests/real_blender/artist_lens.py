@@ -67,16 +67,16 @@ def drag_the_fields():
     """Each goes as far as Blender's own field of the same kind."""
     yield from in_properties("DATA")
     ours = yield from pulled("virtual_pinhole.focal_length", SIDEBAR, lambda: values().focal_length)
-    theirs = yield from pulled("lens", PROPERTIES, lambda: camera().data.lens)
-    print(f"{PULL} px: lens {ours:.2f} mm, Blender's {theirs:.2f} mm", flush=True)
-    assert theirs > 50 and abs(ours - theirs) < 1e-3 * theirs
+    expected = yield from pulled("lens", PROPERTIES, lambda: camera().data.lens)
+    print(f"{PULL} px: lens {ours:.2f} mm, Blender's {expected:.2f} mm", flush=True)
+    assert expected > 50 and abs(ours - expected) < 1e-3 * expected
     values().lens_unit = "PIXELS"
     yield
     yield
     before = values().distance
     in_pixels = yield from pulled("virtual_pinhole.distance", SIDEBAR, lambda: values().distance)
     print(f"{PULL} px: d {in_pixels:.1f} px of {before:.1f}", flush=True)
-    assert abs(in_pixels / theirs / (1920 / 36) - 1) < 0.1, "not as far as in millimeters"
+    assert abs(in_pixels / expected / (1920 / 36) - 1) < 0.1, "not as far as in millimeters"
     values().lens_unit = "MILLIMETERS"
     pinhole = [
         (yield from pulled("virtual_pinhole.roll", SIDEBAR, lambda: values().roll)),

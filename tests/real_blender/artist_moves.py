@@ -44,7 +44,7 @@ def orbit_and_walk_in_the_cameras_view():
     """*Lock Camera to View* by a drag of the middle mouse button, and walk navigation by W: the values go along."""
     area, part = region("VIEW_3D", "WINDOW")
     view = area.spaces.active
-    shown = view.region_3d.view_rotation.copy(), view.region_3d.view_location.copy(), view.region_3d.view_distance
+    view_before = view.region_3d.view_rotation.copy(), view.region_3d.view_location.copy(), view.region_3d.view_distance
     view.lock_camera, view.region_3d.view_perspective = True, "CAMERA"
     move(*NOWHERE)
     yield
@@ -78,7 +78,7 @@ def orbit_and_walk_in_the_cameras_view():
     assert np.linalg.norm(walked) > 0.01, "walked, and the eye is where it was"
     is_at_its_values()
     view.region_3d.view_perspective = "PERSP"
-    view.region_3d.view_rotation, view.region_3d.view_location, view.region_3d.view_distance = shown
+    view.region_3d.view_rotation, view.region_3d.view_location, view.region_3d.view_distance = view_before
     yield
 
 

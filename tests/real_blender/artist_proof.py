@@ -63,8 +63,8 @@ def _show_it(images):
     call(bpy.ops.viewcam.show_difference)
     yield from until(lambda: len(bpy.context.window_manager.windows) == 2, "the window of Show")
     (area,) = bpy.context.window_manager.windows[1].screen.areas
-    shown = area.spaces.active.image
-    assert shown and shown.name == "Virtual Pinhole Proof" and _of_all_images().items() >= images.items()
+    image = area.spaces.active.image
+    assert image and image.name == "Virtual Pinhole Proof" and _of_all_images().items() >= images.items()
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[1], area=area, region=area.regions[-1]):
         bpy.ops.image.view_all()
     yield from settle()

@@ -29,12 +29,16 @@ Camera "perspective" "float fov" 30
 def state():
     """The names and numbers that an import or a paste may change, to the bit."""
     scene, data = bpy.context.scene, bpy.data
-    found = {name: sorted(getattr(data, name).keys()) for name in ("objects", "cameras", "collections", "images", "actions")}
-    found["scene"] = (scene.camera.name, scene.render.resolution_x, scene.render.resolution_y, scene.frame_current)
+    result = {name: sorted(getattr(data, name).keys()) for name in ("objects", "cameras", "collections", "images", "actions")}
+    result["scene"] = (scene.camera.name, scene.render.resolution_x, scene.render.resolution_y, scene.frame_current)
     for block in (block for block in scene.objects if block.type == "CAMERA"):
         lens = (block.data.lens, block.data.shift_x, block.data.shift_y, block.data.sensor_width)
-        found[block.name] = (tuple(number for row in block.matrix_basis for number in row), lens, block.virtual_pinhole.enabled)
-    return found
+        result[block.name] = (
+            tuple(number for row in block.matrix_basis for number in row),
+            lens,
+            block.virtual_pinhole.enabled,
+        )
+    return result
 
 
 def once_undone_and_redone(before, what):
@@ -95,14 +99,16 @@ def import_fspy():
         bpy.ops.render.render(write_still=True)
     yield
     matrix, lens = np.array(camera.matrix_world), camera.data.lens
-    shown = {
+    image_names = {
         "principalPoint": {"x": 0, "y": 0},
         "cameraTransform": {"rows": matrix.tolist()},
         "relativeFocalLength": 2 * lens / 36,  # the longer side, of 36 mm, is from −1 to 1
         "imageWidth": 960,
         "imageHeight": 540,
     }
-    document = json.dumps({"cameraParameters": shown, "calibrationSettingsBase": {"referenceDistanceUnit": "No unit"}}).encode()
+    document = json.dumps(
+        {"cameraParameters": image_names, "calibrationSettingsBase": {"referenceDistanceUnit": "No unit"}}
+    ).encode()
     image = (FOLDER / "cube.png").read_bytes()
     (FOLDER / "cube.fspy").write_bytes(b"fspy" + struct.pack("<III", 1, len(document), len(image)) + document + image)
     push_undo("before fSpy")
@@ -113,13 +119,13 @@ def import_fspy():
     yield from until(lambda: len(bpy.data.cameras) == len(before["cameras"]) + 1, "the import")
     yield from settle()
     (name,) = set(bpy.data.objects.keys()) - set(before["objects"])
-    found = bpy.data.objects[name]
-    np.testing.assert_allclose(np.array(found.matrix_world), matrix, atol=17 * 2**-24 * 8)
-    np.testing.assert_allclose(found.data.lens, lens, rtol=4 * 2**-24)
-    (background,) = found.data.background_images
+    camera_object = bpy.data.objects[name]
+    np.testing.assert_allclose(np.array(camera_object.matrix_world), matrix, atol=17 * 2**-24 * 8)
+    np.testing.assert_allclose(camera_object.data.lens, lens, rtol=4 * 2**-24)
+    (background,) = camera_object.data.background_images
     assert tuple(background.image.size) == (960, 540) and background.image.packed_file, "the picture does not come along"
     view, _ = region(*VIEWPORT)
-    scene.camera, background.alpha, background.display_depth = found, 1.0, "FRONT"
+    scene.camera, background.alpha, background.display_depth = camera_object, 1.0, "FRONT"
     view.spaces.active.region_3d.view_perspective = "CAMERA"
     yield from picture("fspy")
     view.spaces.active.region_3d.view_perspective = "PERSP"

@@ -66,11 +66,13 @@ def one_at_a_time():
 
 @pytest.fixture(scope="session")
 def extension_zip(tmp_path_factory) -> Path:
-    """The extension for this machine, built by the real Blender."""
-    folder = tmp_path_factory.mktemp("dist")
+    """The extension for this machine, built by the real Blender, once for all processes that share the tests."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "dist"
     target = PLATFORMS[platform.system(), platform.machine()]
     with one_at_a_time():
-        subprocess.run([sys.executable, ROOT / ".ci" / "extension.py", os.environ["BLENDER"], folder, target], check=True)
+        if not list(folder.glob("*.zip")):
+            subprocess.run([sys.executable, ROOT / ".ci" / "extension.py", os.environ["BLENDER"], folder, target], check=True)
     (built,) = folder.glob("*.zip")
     return built
 

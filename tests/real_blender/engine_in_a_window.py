@@ -4,7 +4,7 @@ blender [--enable-event-simulate] -p 0 0 1600 1000 --addons … --python engine_
 
 PART is `render`, with simulated events: picks the engine in the properties editor, looks into its panels, presses F12 and saves
 the result to OUT. Or it is `cancel`, without them, since Blender then hears no others: makes FILE heavy, presses F12, then
-Escape by xdotool, and writes the seconds until Blender says that the render was cancelled to OUT, for each of some times. Or it
+Escape by xdotool, and writes the seconds until Blender says that the render was canceled to OUT, for each of some times. Or it
 is `view`: turns the viewport in Rendered shading, and writes to OUT how many pictures a second there are.
 Leaves with status 0, or 5 and a traceback.
 """
@@ -25,7 +25,7 @@ from panel_in_a_window import ROW, move, region, start, window
 from tour_hands import SCREEN_HEIGHT
 
 PART, FILE, OUT = sys.argv[sys.argv.index("--") + 1 :]
-TRACED_FOR = 2.0  # seconds that a heavy render goes on before it is cancelled
+TRACED_FOR = 2.0  # seconds that a heavy render goes on before it is canceled
 CANCELLED = 6  # times
 KINDS = ("images", "objects", "scenes", "meshes", "materials", "texts", "cameras", "node_groups")
 TURNS = 20  # of the view
@@ -58,8 +58,8 @@ def pick_the_engine():
         move(x, y)
         yield
         with bpy.context.temp_override(window=window(), area=area, region=where):
-            found = bpy.context.property
-        if found and found[1] == "render.engine":
+            actual = bpy.context.property
+        if actual and actual[1] == "render.engine":
             break
     for _ in range(len(bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items) + 6):
         if bpy.context.scene.render.engine == "VIEWCAM":
@@ -85,7 +85,7 @@ def look_into_the_panels():
 
 def press_f12():
     """The operator that the key is bound to: in a virtual screen without a window manager the key may find no window."""
-    while bpy.app.is_job_running("RENDER"):  # a cancelled one takes a while to go
+    while bpy.app.is_job_running("RENDER"):  # a canceled one takes a while to go
         yield
     ended.clear()
     with bpy.context.temp_override(window=window()):

@@ -46,8 +46,8 @@ def views():
 def pixel_of(point, view=None):
     """Window coordinates of a point in world space, whole pixels as a mouse has them."""
     view = view or views()[-1]
-    found = location_3d_to_region_2d(view, view.data, Vector(point))
-    return round(view.x + found.x), round(view.y + found.y)
+    actual = location_3d_to_region_2d(view, view.data, Vector(point))
+    return round(view.x + actual.x), round(view.y + actual.y)
 
 
 def carried(point, from_pixel, to_pixel):
@@ -183,7 +183,7 @@ def cancel_each_handle():
     moved = everything()
     yield
     yield from undo()
-    assert everything() != moved and everything() != before, "a cancelled drag has pushed a step of undo"
+    assert everything() != moved and everything() != before, "a canceled drag has pushed a step of undo"
     yield from undo(shift=True)
 
 
@@ -203,7 +203,7 @@ def begin(kind):
 
 
 def drag_the_camera():
-    """Orbit, dolly, dolly zoom and truck: with the mouse, by a number, confirmed, cancelled; each is one step of undo."""
+    """Orbit, dolly, dolly zoom and truck: with the mouse, by a number, confirmed, canceled; each is one step of undo."""
     there = (NOWHERE[0] + 40, NOWHERE[1] + 30)
     for kind in ("ORBIT", "DOLLY", "DOLLY_ZOOM", "TRUCK"):
         state_the_values()
@@ -303,20 +303,20 @@ def is_drawn(point):
     """Steps that end with whether the view plane's frame is drawn there: blue, where everything else is gray."""
     import gpu
 
-    found = []
+    result = []
 
     def look():
         at = location_3d_to_region_2d(bpy.context.region, bpy.context.region_data, Vector(point))
         pixels = gpu.state.active_framebuffer_get().read_color(round(at.x) - 1, round(at.y) - 1, 3, 3, 4, 0, "FLOAT")
         pixels.dimensions = 9 * 4
-        found.append(np.array(pixels).reshape(-1, 4))
+        result.append(np.array(pixels).reshape(-1, 4))
 
     handler = bpy.types.SpaceView3D.draw_handler_add(look, (), "WINDOW", "POST_PIXEL")
     region("VIEW_3D", "WINDOW")[0].tag_redraw()
-    while not found:
+    while not result:
         yield
     bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
-    return bool((found[-1][:, 2] - found[-1][:, 0] > 0.25).any())
+    return bool((result[-1][:, 2] - result[-1][:, 0] > 0.25).any())
 
 
 def hide_the_diagram():
@@ -378,9 +378,9 @@ def drag_the_look_at_point_that_is_looked_at():
         yield from let_go(end)
         assert key == "" or everything() == before, f"{key} did not bring back what was before the view was panned"
     is_at_its_values()
-    found = values().numbers()
-    moved = np.subtract(found[1], look_at)
-    assert found[0] == eye and found[2:] == (up, distance) and moved @ u > 0.05 and moved @ v > 0.03, f"panned by {moved}"
+    actual = values().numbers()
+    moved = np.subtract(actual[1], look_at)
+    assert actual[0] == eye and actual[2:] == (up, distance) and moved @ u > 0.05 and moved @ v > 0.03, f"panned by {moved}"
     yield from undo()
     assert everything() == before
 
@@ -419,8 +419,8 @@ def count_what_is_made():
     for _ in range(3):
         region("VIEW_3D", "WINDOW")[0].tag_redraw()
         yield
-    made = batches.cache_info().misses - before
-    assert made == 1, f"the lines were made {made} times for one change"
+    misses = batches.cache_info().misses - before
+    assert misses == 1, f"the lines were made {misses} times for one change"
     bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
 
 

@@ -70,8 +70,8 @@ def find(name, index, area_type="VIEW_3D", region_type="UI", across=0.6):
         move(x, y)
         yield
         with bpy.context.temp_override(window=window(), area=area, region=where):
-            found = bpy.context.property
-        if found and found[0] == camera() and found[1:] == (f"virtual_pinhole.{name}", index):
+            actual = bpy.context.property
+        if actual and actual[0] == camera() and actual[1:] == (f"virtual_pinhole.{name}", index):
             _found_at[key] = y
             return x, y - ROW / 2
     raise AssertionError(f"no button of virtual_pinhole.{name}[{index}] in the {region_type} of the {area_type}")
@@ -105,8 +105,8 @@ def is_at_its_values():
     np.testing.assert_allclose(lens, distance * 36 / 1920, rtol=1e-6)
 
 
-def same(one, other):
-    return one[0] == other[0] and np.array_equal(one[1], other[1]) and one[2] == other[2]
+def same(first, second):
+    return first[0] == second[0] and np.array_equal(first[1], second[1]) and first[2] == second[2]
 
 
 def unfold(panel):
@@ -276,12 +276,12 @@ def take_the_view_of_the_viewport():
     yield
     yield
     is_at_its_values()
-    shown, size = view.spaces.active.region_3d, (1920, 1080)
-    lens = [shown.window_matrix[i][i] * pixels / 2 for i, pixels in enumerate(size)]
+    region_3d, size = view.spaces.active.region_3d, (1920, 1080)
+    lens = [region_3d.window_matrix[i][i] * pixels / 2 for i, pixels in enumerate(size)]
     # float32: the matrix, its lens and sensor, and the property.
     np.testing.assert_allclose(values().distance, min(lens), rtol=8 * 2**-24)
     # A few roundings of float32 on both sides, of coordinates below 20.
-    np.testing.assert_allclose(state()[1], np.array(shown.view_matrix.inverted()), atol=8 * 20 * 2**-24)
+    np.testing.assert_allclose(state()[1], np.array(region_3d.view_matrix.inverted()), atol=8 * 20 * 2**-24)
 
 
 def use_another_up():

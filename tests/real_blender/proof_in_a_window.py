@@ -113,19 +113,19 @@ def compare_to_the_verdict():
     yield
     before = _of_the_session()
     areas = [area.ui_type for area in window().screen.areas]
-    started, told = time.monotonic(), set()
+    started, steps = time.monotonic(), set()
     yield from begin()
     while proof.background.running and time.monotonic() < started + PATIENCE:
         words = proof.background.running.progress()[1]
-        if words == "Tracing" and words not in told:
+        if words == "Tracing" and words not in steps:
             yield
             picture("running.png")
-        told.add(words)
+        steps.add(words)
         yield
     outcome = proof.background.latest
     assert outcome and outcome.answer == "same", outcome or "no verdict"
     print(f"verdict after {time.monotonic() - started:.1f} s: {outcome.verdict}", flush=True)
-    assert "Rendering with Cycles" in told, told
+    assert "Rendering with Cycles" in steps, steps
     assert _of_the_session() == before
     assert [area.ui_type for area in window().screen.areas] == areas, "the artist's layout has changed"
     assert len(bpy.context.window_manager.windows) == 1, "a pass opens a window"

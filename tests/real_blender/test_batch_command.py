@@ -30,15 +30,15 @@ def test_what_stands_in_braces_is_an_event_and_the_last_tells_the_status(real_bl
     (tmp_path / "file").touch()
     (tmp_path / "orbit_001.png").symlink_to(tmp_path / "file" / "picture.png")  # which is no folder
     done = batch(real_blender, *ORBIT, tmp_path, "--log-json")
-    told = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
-    events = [event["event"] for event in told]
+    output = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    events = [event["event"] for event in output]
     assert events[:2] == ["started", "batch_started"] and events[-1] == "finished", done.stdout
     assert events.count("shot_done") == 2 and events.count("shot_failed") == 1
-    assert told[-1]["exit_status"] == done.returncode == 4
+    assert output[-1]["exit_status"] == done.returncode == 4
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["--out", "OUT"], "which shots is not said"),
         (["none.csv", "--out", "OUT"], "none.csv"),
@@ -49,18 +49,18 @@ def test_what_stands_in_braces_is_an_event_and_the_last_tells_the_status(real_bl
         (["--orbit", "3", "--out", CORNELL], "can't be a folder"),
     ],
 )
-def test_each_wrong_word_is_one_sentence(real_blender, tmp_path, words, told):
+def test_each_wrong_word_is_one_sentence(real_blender, tmp_path, words, message):
     done = batch(real_blender, *(tmp_path / "out" if word == "OUT" else word for word in words))
     (sentence,) = [line for line in done.stderr.splitlines() if line.startswith("viewcam")]
-    assert done.returncode == 2 and told in sentence and "bug" not in sentence, done.stderr
+    assert done.returncode == 2 and message in sentence and "bug" not in sentence, done.stderr
     assert "Traceback" not in done.stderr + done.stdout and not (tmp_path / "out").exists()
 
 
 def test_on_a_terminal_a_bar_counts_the_shots(real_blender, tmp_path, on_a_terminal):
     """The extension brings tqdm along."""
     command = [*real_blender.command, "-q", "-b", CORNELL, "--command", "viewcam", "batch", *ORBIT, tmp_path]
-    status, shown = on_a_terminal(command, {**os.environ, "BLENDER_USER_RESOURCES": str(real_blender.user_folder)})
-    assert status == 0 and "| 0/3 [" in shown, shown
+    status, printed = on_a_terminal(command, {**os.environ, "BLENDER_USER_RESOURCES": str(real_blender.user_folder)})
+    assert status == 0 and "| 0/3 [" in printed, printed
 
 
 # --- `blender -b FILE --command viewcam batch --workers 2`: each worker another Blender, the files those of one process
@@ -135,16 +135,16 @@ def test_frames_of_a_batch_are_those_of_f(real_blender, tmp_path, name, engine):
     check(real_blender.run("-b", blend, "-o", tmp_path / "f_###", "-f", "{},{}".format(*frames)))
     shots = tmp_path / "shots.csv"
     camera = "import bpy; print('CAMERA', bpy.context.scene.camera.name)"
-    said = real_blender.run("-b", blend, "--python-expr", camera).stdout
-    (camera,) = [line.removeprefix("CAMERA ") for line in said.splitlines() if line.startswith("CAMERA ")]
+    output = real_blender.run("-b", blend, "--python-expr", camera).stdout
+    (camera,) = [line.removeprefix("CAMERA ") for line in output.splitlines() if line.startswith("CAMERA ")]
     # Backwards and once more: what is kept from one frame is in the way of another, if it is.
     rows = [f"{place}_{frame:03},{camera},{frame}" for place, frame in enumerate((*frames, frames[0]))]
     shots.write_text("\n".join(["name,camera,frame", *rows]))
     check(real_blender.run("-b", blend, "--command", "viewcam", "batch", shots, "--out", tmp_path / "batch"))
     for place, frame in enumerate((*frames, frames[0])):
-        one, other = channels(tmp_path / f"f_{frame:03}.exr"), channels(tmp_path / "batch" / f"{place}_{frame:03}.exr")
-        assert one.keys() == other.keys() and len(one) >= 8
-        others = {key: int((one[key] != other[key]).sum()) for key in one if not np.array_equal(one[key], other[key])}
+        by_f, other = channels(tmp_path / f"f_{frame:03}.exr"), channels(tmp_path / "batch" / f"{place}_{frame:03}.exr")
+        assert by_f.keys() == other.keys() and len(by_f) >= 8
+        others = {key: int((by_f[key] != other[key]).sum()) for key in by_f if not np.array_equal(by_f[key], other[key])}
         assert not others, f"frame {frame}: pixels that differ, by channel: {others}"
     first, second = (channels(tmp_path / f"f_{frame:03}.exr") for frame in frames)
     if name == "flight":

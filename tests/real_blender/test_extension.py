@@ -40,10 +40,10 @@ def python_picture(host, scene_file):
     return image.read(path).passes
 
 
-def differing(one, other):
+def differing(first, second):
     """The names of the passes in which two pictures differ in any bit."""
-    assert one.keys() == other.keys()
-    return [name for name in one if not np.array_equal(one[name], other[name])]
+    assert first.keys() == second.keys()
+    return [name for name in first if not np.array_equal(first[name], second[name])]
 
 
 def test_blender_accepts_the_zip(real_blender, extension_zip):

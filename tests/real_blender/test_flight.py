@@ -27,9 +27,9 @@ WITHOUT_ADDON = (
 def run(blender, *arguments):
     """Run the script, or Blender itself, and fail with what it says."""
     outcome = blender.run("-b", "--factory-startup", "--python-exit-code", "9", *arguments)
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "Traceback" not in said, said
-    return said
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "Traceback" not in output, output
+    return output
 
 
 @pytest.fixture(scope="module")
@@ -57,24 +57,24 @@ def places(pinhole, picture):
     seen = {name: picture.passes[name].reshape(-1, picture.passes[name].shape[-1]) for name in ("Position", "Depth", "Normal")}
     assert tolerances.is_hit(seen).all()
     column, row, _ = pinhole.project(seen["Position"].astype(np.float64))
-    found = np.nan_to_num(np.column_stack([column, row]), nan=-pinhole.width)  # behind the eye: outside of the picture
-    return found, tolerances.position_shift(pinhole, seen)
+    actual = np.nan_to_num(np.column_stack([column, row]), nan=-pinhole.width)  # behind the eye: outside of the picture
+    return actual, tolerances.position_shift(pinhole, seen)
 
 
 def roundings(pinhole, picture):
     """(n,) of how many roundings of float32 each pixel's position is off."""
-    found, one_rounding = places(pinhole, picture)
-    rows, columns = np.divmod(np.arange(len(found)), pinhole.width)
-    return np.linalg.norm(found - np.column_stack([columns, rows]) - 0.5, axis=1) / one_rounding
+    actual, one_rounding = places(pinhole, picture)
+    rows, columns = np.divmod(np.arange(len(actual)), pinhole.width)
+    return np.linalg.norm(actual - np.column_stack([columns, rows]) - 0.5, axis=1) / one_rounding
 
 
 def beyond_the_tolerance(pictures, pinholes):
     """The shares that are not within tolerance over all frames, in words; empty where all are."""
     counts = np.concatenate([roundings(pinholes[frame], pictures[frame]) for frame in pinholes])
-    found = np.percentile(counts, tolerances.PERCENTILES)
+    values = np.percentile(counts, tolerances.PERCENTILES)
     return [
         f"{count:.2f} roundings at the {percentile}th percentile, {most} are allowed"
-        for percentile, count, most in zip(tolerances.PERCENTILES, found, tolerances.ROUNDINGS, strict=True)
+        for percentile, count, most in zip(tolerances.PERCENTILES, values, tolerances.ROUNDINGS, strict=True)
         if count > most
     ]
 
@@ -95,10 +95,10 @@ def test_the_baked_file_and_f12_render_what_is_rendered_live(flight):
         for frame in FRAMES:
             live, other = pictures["live"][frame], pictures[way][frame]
             same += int((live.passes["Position"] == other.passes["Position"]).all(axis=-1).sum())
-            (one, one_rounding), (two, _) = (places(pinholes[frame][1], each) for each in (live, other))
-            apart = (np.linalg.norm(one - two, axis=1) / one_rounding).max()
+            (first, one_rounding), (two, _) = (places(pinholes[frame][1], each) for each in (live, other))
+            apart = (np.linalg.norm(first - two, axis=1) / one_rounding).max()
             assert apart <= 2 * tolerances.ROUNDINGS[-1], f"{way}, frame {frame}: {apart:.2g} roundings apart"
-        print(f"{way}: {same} of {len(FRAMES) * len(one)} pixels have the same position in all bits")
+        print(f"{way}: {same} of {len(FRAMES) * len(first)} pixels have the same position in all bits")
 
 
 def test_the_live_camera_is_the_one_that_is_stated(flight):

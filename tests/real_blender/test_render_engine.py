@@ -42,11 +42,11 @@ def test_a_frame_by_the_engine_has_the_pixels_of_viewcam_render(host, lit_file, 
         assert "Traceback" not in outcome.stdout + outcome.stderr
     else:
         host.run_inside("trace", lit_file, path)
-    found = image.read(path).passes
-    assert {"Combined", "Depth", "Normal", "Position"} <= found.keys()
+    read_image = image.read(path).passes
+    assert {"Combined", "Depth", "Normal", "Position"} <= read_image.keys()
     for name in ("Combined", "Depth"):
-        assert np.array_equal(found[name], reference[name]), name
-    assert found["Combined"][..., :3].std() > 0.01
+        assert np.array_equal(read_image[name], reference[name]), name
+    assert read_image["Combined"][..., :3].std() > 0.01
 
 
 def test_what_can_not_be_rendered_is_status_1_and_a_sentence_and_no_file(real_blender, tmp_path):
@@ -56,8 +56,8 @@ def test_what_can_not_be_rendered_is_status_1_and_a_sentence_and_no_file(real_bl
     outcome = real_blender.run(
         *("-b", file, "--python-expr", orthographic, "-E", "VIEWCAM", "-o", tmp_path / "picture_####", "-f", "1")
     )
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 1 and "is orthographic, no pinhole" in said and "Traceback" not in said, said
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 1 and "is orthographic, no pinhole" in output and "Traceback" not in output, output
     assert not list(tmp_path.glob("picture_*"))
 
 
@@ -74,15 +74,15 @@ def in_a_window(real_blender, *arguments, simulated):
         text=True,
         timeout=180,
     )
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "Traceback" not in said, said
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "Traceback" not in output, output
 
 
 @pytest.mark.parametrize("host", ["real"], indirect=True)
 def test_f12_in_a_window_shows_the_picture_of_viewcam_render(host, lit_file, reference, tmp_path):
     in_a_window(host, "render", lit_file, tmp_path / "shown.exr", simulated=True)
-    shown = image.read(tmp_path / "shown.exr").passes
-    assert np.array_equal(shown["Combined"], reference["Combined"])
+    rendered = image.read(tmp_path / "shown.exr").passes
+    assert np.array_equal(rendered["Combined"], reference["Combined"])
 
 
 @pytest.mark.parametrize("host", ["real"], indirect=True)

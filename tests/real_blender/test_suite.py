@@ -11,7 +11,7 @@ def test_the_tests_of_blender_pass_inside_it(real_blender, packages):
     without = ("--ignore=tests/blender/light", "--ignore=tests/blender/test_light_by_light.py")
     chosen = ("-m", "not exhaustive and not light and not speed")
     few = ("-q", "-p", "no:cacheprovider", "--hypothesis-profile=quick")
-    said = real_blender.run_inside("pytest", packages, *few, *chosen, *without, "tests/blender")
-    summary = said.strip().splitlines()[-1]
+    message = real_blender.run_inside("pytest", packages, *few, *chosen, *without, "tests/blender")
+    summary = message.strip().splitlines()[-1]
     print(summary)
-    assert re.search(r"\d+ passed", summary), said
+    assert re.search(r"\d+ passed", summary), message

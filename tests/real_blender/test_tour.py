@@ -34,9 +34,9 @@ def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_b
         outcome = run_in_a_window(real_blender, SCRIPT, 2000, *folder)
         if outcome.returncode == 0:
             break
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0, said
-    assert "done: the tour" in said and "Traceback" not in said, said  # what fails in a panel's draw() is only printed
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0, output
+    assert "done: the tour" in output and "Traceback" not in output, output  # what fails in a panel's draw() is only printed
     if folder:
         images = ROOT / folder[0] / ".."
         make_the_moving_picture(real_blender, tmp_path, images / "moving.webp")

@@ -60,10 +60,10 @@ def test_the_panel_moves_the_camera_and_undoes_it(real_blender):
         outcome = run_in_a_window(real_blender, SCRIPT)
         if outcome.returncode == 0:
             break
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0, said
-    assert [part for part in PARTS if f"done: {part}" not in said] == []
-    assert "Traceback" not in said, said  # what fails in a panel's draw() is only printed
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0, output
+    assert [part for part in PARTS if f"done: {part}" not in output] == []
+    assert "Traceback" not in output, output  # what fails in a panel's draw() is only printed
 
 
 def test_handles_drag_eye_look_at_and_up_and_the_diagram_is_drawn_where_it_belongs(real_blender):
@@ -71,9 +71,9 @@ def test_handles_drag_eye_look_at_and_up_and_the_diagram_is_drawn_where_it_belon
         outcome = run_in_a_window(real_blender, HANDLES_SCRIPT, size=("1000", "700"))
         if outcome.returncode == 0:
             break
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "done: disable_and_enable" in said, said
-    assert "Traceback" not in said, said  # what fails in a drawing or a handle is only printed
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "done: disable_and_enable" in output, output
+    assert "Traceback" not in output, output  # what fails in a drawing or a handle is only printed
 
 
 def test_what_an_artist_tries_on_the_first_day_goes_as_with_blenders_own_cameras(real_blender, tmp_path):
@@ -85,9 +85,9 @@ def test_what_an_artist_tries_on_the_first_day_goes_as_with_blenders_own_cameras
         outcome = run_in_a_window(real_blender, script, tmp_path / str(attempt), *folder)
         if outcome.returncode == 0:
             break
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "done: the day" in said, said
-    assert "Traceback" not in said, said
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "done: the day" in output, output
+    assert "Traceback" not in output, output
 
 
 def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_a_paste(real_blender, tmp_path):
@@ -108,16 +108,16 @@ def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_
         outcome = run_in_a_window(real_blender, script, tmp_path, *folder)
         if outcome.returncode == 0:
             break
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "done: paste_pbrt" in said, said
-    assert "Traceback" not in said, said
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "done: paste_pbrt" in output, output
+    assert "Traceback" not in output, output
 
 
 def test_ten_rounds_of_enabling_and_disabling_leave_nothing_behind_in_a_window(real_blender):
     outcome = run_in_a_window(real_blender, ROOT / "tests" / "real_blender" / "leftovers_in_a_window.py", size=("1000", "700"))
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "done: leave_nothing_behind" in said, said
-    assert "Traceback" not in said, said
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "done: leave_nothing_behind" in output, output
+    assert "Traceback" not in output, output
 
 
 def test_compare_with_cycles_comes_to_a_verdict_and_ends_in_every_other_way_without_a_trace(real_blender, tmp_path):
@@ -127,9 +127,9 @@ def test_compare_with_cycles_comes_to_a_verdict_and_ends_in_every_other_way_with
         outcome = run_in_a_window(real_blender, PROOF_SCRIPT, tmp_path / "scene.blend", tmp_path)
         if outcome.returncode == 0:
             break
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "done: write_the_labels" in said and "done: quit_while_it_runs" in said, said
-    assert "Traceback" not in said, said
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "done: write_the_labels" in output and "done: quit_while_it_runs" in output, output
+    assert "Traceback" not in output, output
     folder = (tmp_path / "last.txt").read_text()
     assert not Path(folder).exists()
     assert [line for line in _command_lines() if folder in line] == []

@@ -29,9 +29,9 @@ def folder(real_blender, tmp_path_factory):
 
 def run(blender, *arguments):
     outcome = blender.run("-b", "--factory-startup", "--python-exit-code", "9", *arguments)
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "Traceback" not in said, said
-    return said
+    output = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "Traceback" not in output, output
+    return output
 
 
 def render(blender, start, file, *addon, expected):
@@ -45,10 +45,10 @@ def picture(folder, name):
 
 
 def test_a_file_opened_without_the_addon_renders_the_same_still_to_the_last_bit(folder):
-    one, other = picture(folder, "with"), picture(folder, "without")
-    assert one["Depth"].min() < 20 and one["Combined"].std() > 0
-    for name in one:
-        assert np.array_equal(one[name], other[name]), name
+    first, other = picture(folder, "with"), picture(folder, "without")
+    assert first["Depth"].min() < 20 and first["Combined"].std() > 0
+    for name in first:
+        assert np.array_equal(first[name], other[name]), name
 
 
 def test_all_values_come_back_after_a_resave_without_the_addon(folder):

@@ -17,9 +17,9 @@ def stands_at(frame):
     scene, before = bpy.context.scene, bpy.context.scene.frame_current
     scene.frame_set(frame)
     camera_object = camera().evaluated_get(bpy.context.evaluated_depsgraph_get())
-    found = np.array(camera_object.matrix_world)
+    values = np.array(camera_object.matrix_world)
     scene.frame_set(before)
-    return found
+    return values
 
 
 class KeyTheEye(Step):

@@ -47,8 +47,8 @@ def under_the_mouse(where):
     """The use of the button under the mouse: 'virtual_pinhole.eye[2]', 'viewcam.dolly_camera(camera="Camera")' or ''."""
     area, part = region(*where)
     with bpy.context.temp_override(window=window(), area=area, region=part):
-        if found := bpy.context.property:
-            _, path, index = found
+        if actual := bpy.context.property:
+            _, path, index = actual
             return path if index < 0 else f"{path}[{index}]"
         if bpy.ops.ui.copy_python_command_button.poll():
             clipboard = bpy.context.window_manager.clipboard

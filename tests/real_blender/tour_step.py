@@ -87,16 +87,16 @@ def axes():
 
 def state():
     """Everything that undo has to bring back, bit for bit, as a flat dict."""
-    found = {"frame": bpy.context.scene.frame_current, "camera": getattr(bpy.context.scene.camera, "name", None)}
+    result = {"frame": bpy.context.scene.frame_current, "camera": getattr(bpy.context.scene.camera, "name", None)}
     for block in bpy.context.scene.objects:
-        found[block.name] = tuple(number for row in block.matrix_basis for number in row)
+        result[block.name] = tuple(number for row in block.matrix_basis for number in row)
         if block.type == "CAMERA":
-            found |= {f"{block.name} {name}": _plain(block.virtual_pinhole, name) for name in _stored(block.virtual_pinhole)}
+            result |= {f"{block.name} {name}": _plain(block.virtual_pinhole, name) for name in _stored(block.virtual_pinhole)}
             data = block.data
-            found[data.name + "'s lens"] = (data.lens, data.shift_x, data.shift_y, data.sensor_width, data.sensor_height)
+            result[data.name + "'s lens"] = (data.lens, data.shift_x, data.shift_y, data.sensor_width, data.sensor_height)
             action = block.animation_data and block.animation_data.action
-            found[f"{block.name} action"] = action and action.name
-    return found
+            result[f"{block.name} action"] = action and action.name
+    return result
 
 
 def _stored(group):
@@ -111,9 +111,9 @@ def _plain(group, name):
     return value if isinstance(value, (int, float, str)) or value is None else tuple(value)
 
 
-def differing(one, other):
+def differing(first, second):
     """The differences between two states, in words."""
-    return {key: (one.get(key), other.get(key)) for key in one.keys() | other.keys() if one.get(key) != other.get(key)}
+    return {key: (first.get(key), second.get(key)) for key in first.keys() | second.keys() if first.get(key) != second.get(key)}
 
 
 def make_the_scene():

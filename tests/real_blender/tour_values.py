@@ -46,8 +46,8 @@ class TypeTheFourValues(Step):
         values().eye, values().look_at, values().distance = self.eye, self.look_at, self.distance
 
     def check(self):
-        found = (tuple(values().eye), tuple(values().look_at), values().distance)
-        assert found == (self.eye, self.look_at, self.distance), f"the values are {found}"
+        actual = (tuple(values().eye), tuple(values().look_at), values().distance)
+        assert actual == (self.eye, self.look_at, self.distance), f"the values are {actual}"
         is_at_its_values()
 
 

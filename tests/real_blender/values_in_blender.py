@@ -72,17 +72,17 @@ def another(each):
 def read(file, json_file):
     """All that the add-on has in the file's blocks."""
     bpy.ops.wm.open_mainfile(filepath=file)
-    found = {}
+    result = {}
     for block in (bpy.data.objects["Camera"], bpy.data.cameras["Camera"], bpy.context.scene):
         for name in (each.identifier for each in block.bl_rna.properties if each.identifier.startswith("virtual_pinhole")):
             value = getattr(block, name)
             if isinstance(value, bpy.types.PropertyGroup):
                 members = (each.identifier for each in value.bl_rna.properties if each.identifier not in ("rna_type", "name"))
-                found |= {f"{name}.{member}": plain(getattr(value, member)) for member in members}
+                result |= {f"{name}.{member}": plain(getattr(value, member)) for member in members}
             else:
-                found[name] = plain(value)
+                result[name] = plain(value)
     with open(json_file, "w") as stream:
-        json.dump(found, stream)
+        json.dump(result, stream)
 
 
 def plain(value):

@@ -39,9 +39,9 @@ def closed_ball(ball):
     """closed_ball(rings) → Mesh: the same without its seam, vertices at one place being one, and without flat triangles."""
 
     def build(rings: int) -> Mesh:
-        made = ball(rings)
-        vertices, place = np.unique(made.vertices, axis=0, return_inverse=True)
-        triangles = place.reshape(-1)[made.triangles]
+        scene = ball(rings)
+        vertices, place = np.unique(scene.vertices, axis=0, return_inverse=True)
+        triangles = place.reshape(-1)[scene.triangles]
         return mesh(vertices, triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)])
 
     return build
@@ -206,8 +206,8 @@ def off_by():
     The sum of 4096 float64 numbers is off by less than 1e-12 of it.
     """
 
-    def judge(found: tuple[float, float], expected: float, precision: float = 0.02) -> float:
-        mean, error = found
+    def judge(actual: tuple[float, float], expected: float, precision: float = 0.02) -> float:
+        mean, error = actual
         assert error <= precision * abs(expected), f"the standard error {error:.2g} of {expected:.6g} tells nothing"
         return (mean - expected) / max(error, 1e-12 * abs(expected), 1e-300)
 

@@ -37,10 +37,10 @@ class Sampler:
 
 def offsets(film: Film, u):
     """(2, n): pixels from a pixel's lower left corner, of (2, n) numbers."""
-    given = np.ascontiguousarray(np.asarray(u, np.float64).T)
-    out = np.empty_like(given)
+    rows = np.ascontiguousarray(np.asarray(u, np.float64).T)
+    out = np.empty_like(rows)
     shape = FILTERS.index(film.filter)
-    assert not native.core().probe_filter(shape, film.filter_width, len(given), _at(given), _at(out))
+    assert not native.core().probe_filter(shape, film.filter_width, len(rows), _at(rows), _at(out))
     return out.T
 
 
@@ -58,9 +58,9 @@ def fresnel(cosine, ratio):
 
 def specular(direction, normal, shading, ratio: float = 1.0):
     """Bent normals, and where mirrors and clear surfaces with these send rays: (3, n) each."""
-    given = np.ascontiguousarray(np.concatenate(np.broadcast_arrays(direction, normal, shading)).T, np.float64)
-    out = np.empty_like(given)
-    assert not native.core().probe_specular(ratio, len(given), _at(given), _at(out))
+    rows = np.ascontiguousarray(np.concatenate(np.broadcast_arrays(direction, normal, shading)).T, np.float64)
+    out = np.empty_like(rows)
+    assert not native.core().probe_specular(ratio, len(rows), _at(rows), _at(out))
     return out.T.reshape(3, 3, -1)
 
 
@@ -86,9 +86,9 @@ class SampledLight:
     def __init__(self, lamp: Lamp, position, normal, u) -> None:
         u = np.asarray(u, np.float64)
         rows = [np.broadcast_to(np.reshape(values, (3, -1)), (3, u.shape[1])) for values in (position, normal)]
-        given = np.ascontiguousarray(np.concatenate([*rows, u]).T)
-        out = np.empty((len(given), 11))
-        assert not native.core().probe_sample_light(native.described_lamp(lamp), len(given), _at(given), _at(out))
+        packed = np.ascontiguousarray(np.concatenate([*rows, u]).T)
+        out = np.empty((len(packed), 11))
+        assert not native.core().probe_sample_light(native.described_lamp(lamp), len(packed), _at(packed), _at(out))
         self.direction, self.distance, self.light = out[:, :3].T, out[:, 3], out[:, 4:7].T
         self.pdf, self.pdf_of_direction, self.cosine, self.estimate = out[:, 7:].T
 
@@ -98,13 +98,13 @@ def radiance_seen(lamp: Lamp, starts, directions, nearest=0.0, farthest=np.inf):
     starts, directions = np.broadcast_arrays(starts, directions)
     count = directions.shape[1]
     ends = [np.broadcast_to(values, count) for values in (nearest, farthest, np.isinf(farthest))]
-    given = np.ascontiguousarray(np.concatenate([starts, directions, np.stack(ends)]).T, np.float64)
+    rows = np.ascontiguousarray(np.concatenate([starts, directions, np.stack(ends)]).T, np.float64)
     out = np.empty((count, 3))
-    assert not native.core().probe_light_le(native.described_lamp(lamp), count, _at(given), _at(out))
+    assert not native.core().probe_light_le(native.described_lamp(lamp), count, _at(rows), _at(out))
     return out.T
 
 
-def evaluated(shown: Node, images=None, uv=(0.0, 0.0), incoming=(0.0, 0.0, -1.0), behind=False):
+def evaluated(value_node: Node, images=None, uv=(0.0, 0.0), incoming=(0.0, 0.0, -1.0), behind=False):
     """The value of a node on a floor, z up, at (2, n) UV, met along (3, n): (3, n), and as a number (n,)."""
     uv, incoming = np.asarray(uv, np.float64).reshape(2, -1), np.asarray(incoming, np.float64).reshape(3, -1)
     count = max(uv.shape[1], incoming.shape[1])
@@ -113,7 +113,7 @@ def evaluated(shown: Node, images=None, uv=(0.0, 0.0), incoming=(0.0, 0.0, -1.0)
         Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 10, 8, 8),
         {"floor": flat},
         (Object("floor", "floor", np.eye(4), materials=("shown",)),),
-        materials={"shown": Material(surface=node("emission", color=shown))},
+        materials={"shown": Material(surface=node("emission", color=value_node))},
         images=images or {},
     )
     core = native.CoreScene(scene, 1)
@@ -125,8 +125,8 @@ def evaluated(shown: Node, images=None, uv=(0.0, 0.0), incoming=(0.0, 0.0, -1.0)
 
 def looked_up(picture: Picture, uv, closest: bool):
     """(3, n): the linear colors of an image at (2, n) UV."""
-    shown = node("image", image=Colour(WHITE, "shown"), interpolation="closest" if closest else "linear")
-    return evaluated(shown, {"shown": picture}, uv)[0]
+    image_node = node("image", image=Colour(WHITE, "shown"), interpolation="closest" if closest else "linear")
+    return evaluated(image_node, {"shown": picture}, uv)[0]
 
 
 class ScatteredBy:
@@ -138,9 +138,9 @@ class ScatteredBy:
     def __init__(self, shader, incoming, direction, u, behind=False, version=502) -> None:
         columns = np.asarray(u).shape[1]
         parts = [np.broadcast_to(np.reshape(each, (3, -1)), (3, columns)) for each in (incoming, direction)]
-        given = np.ascontiguousarray(np.concatenate([*parts, np.full((1, columns), float(behind)), u]).T, np.float64)
+        rows = np.ascontiguousarray(np.concatenate([*parts, np.full((1, columns), float(behind)), u]).T, np.float64)
         out = np.empty((columns, 12))
         described = native.described_closure(Closure(shader), {}, {})
-        assert not native.core().probe_bsdf(described, version, columns, _at(given), _at(out))
+        assert not native.core().probe_bsdf(described, version, columns, _at(rows), _at(out))
         self.light, self.pdf, self.sampled, self.weight = out[:, :3].T, out[:, 3], out[:, 4:7].T, out[:, 7:10].T
         self.sampled_pdf, self.kind = out[:, 10], out[:, 11].astype(int)

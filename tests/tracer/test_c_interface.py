@@ -6,9 +6,11 @@ test-sanitizers` runs this on a core that stops at whatever is read or written o
 
 import ctypes
 import os
+import re
 import subprocess
 import sys
 from ctypes import byref, c_int, c_void_p
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +21,7 @@ from viewcam_addon.image import GEOMETRY_PASSES
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import native
 from viewcam_addon.tracer.scene import scene_file
+from viewcam_addon.tracer.scene.value_nodes import IES
 from viewcam_addon.tracer.scene.value_nodes import KINDS as VALUES
 
 EXAMPLES = int(os.environ.get("VIEWCAM_FUZZ_CALLS", "60"))
@@ -79,24 +82,27 @@ def add_mesh(draw, calls):
     with np.errstate(over="ignore"):
         floats = [numbers(draw, width * count).astype(np.float32) for width in (9, 6, 9)]
     optional = [calls.at(values, np.float32) if draw(st.booleans()) else None for values in floats]
-    given = calls.at(numbers(draw, 3 * vertices), np.float64), calls.at(triangles, np.int32), calls.at(materials, np.int32)
-    if calls("add_mesh", calls.scene, native._Mesh(vertices, count, *given, *optional)):
+    arrays = calls.at(numbers(draw, 3 * vertices), np.float64), calls.at(triangles, np.int32), calls.at(materials, np.int32)
+    if calls("add_mesh", calls.scene, native._Mesh(vertices, count, *arrays, *optional)):
         calls.counts.append(int(materials.max(initial=0)) + 1)
 
 
 def add_spheres(draw, calls):
     count = draw(st.integers(0, 12))
     radii, materials = np.abs(numbers(draw, count, LENGTH)), np.full(count, draw(mostly(st.just(0), WHOLE)))
-    given = calls.at(numbers(draw, 3 * count), np.float64), calls.at(radii, np.float64), calls.at(materials, np.int32)
-    if calls("add_spheres", calls.scene, native._Spheres(count, *given)):
+    arrays = calls.at(numbers(draw, 3 * count), np.float64), calls.at(radii, np.float64), calls.at(materials, np.int32)
+    if calls("add_spheres", calls.scene, native._Spheres(count, *arrays)):
         calls.counts.append(int(materials.max(initial=0)) + 1)
 
 
 def add_objects(draw, calls):
     geometry, slots, count = draw(mostly(st.integers(0, 3), [2**32 - 1])), draw(st.integers(1, 3)), draw(st.integers(0, 5))
-    given = calls.at(np.zeros(slots), np.float32), calls.at(np.full(slots, draw(mostly(st.just(0), [1, 2**32 - 1]))), np.uint32)
+    arrays = (
+        calls.at(np.zeros(slots), np.float32),
+        calls.at(np.full(slots, draw(mostly(st.just(0), [1, 2**32 - 1]))), np.uint32),
+    )
     info = calls.at(numbers(draw, 5 * max(count, 1)), np.float32) if draw(st.booleans()) else None
-    calls("add_objects", calls.scene, native._Object(geometry, draw(st.integers(0, 63)), slots, count, 1.0, *given, info=info))
+    calls("add_objects", calls.scene, native._Object(geometry, draw(st.integers(0, 63)), slots, count, 1.0, *arrays, info=info))
     return count
 
 
@@ -105,8 +111,8 @@ def commit(draw, calls, objects):
     for _ in range(min(objects, 4)):
         matrices[draw(st.integers(0, 12 * objects - 1))] = draw(NUMBER)
     origin = [draw(NUMBER) for _ in range(3)]
-    given = calls.at(matrices, np.float64), calls.at(origin, np.float64), draw(mostly(st.just(2), WHOLE))
-    return calls("commit", calls.scene, *given)
+    arrays = calls.at(matrices, np.float64), calls.at(origin, np.float64), draw(mostly(st.just(2), WHOLE))
+    return calls("commit", calls.scene, *arrays)
 
 
 def look(draw, calls):
@@ -156,25 +162,58 @@ def make_nodes(draw, calls):
     for _ in range(draw(st.integers(0, 3))):
         kind = draw(mostly(st.sampled_from(sorted(VALUES)), ["principled", ""]))
         inputs = []
-        for name, default in VALUES.get(kind, {}).items():
+        for name, default in (VALUES[kind].inputs if kind in VALUES else {}).items():
             words = default if isinstance(default, tuple) and isinstance(default[0], str) else ("true", "false")
-            given = native._Input(name.encode(), draw(mostly(st.sampled_from(words), ["guess"])).encode())
-            given.color.rgb[:] = [draw(NUMBER) for _ in range(3)]
-            given.color.image, given.color.node = (draw(mostly(st.integers(-1, 1), WHOLE)) for _ in range(2))
-            inputs.append(given)
-        given = native._Node(kind.encode(), (native._Input * len(inputs))(*inputs), draw(mostly(st.just(len(inputs)), [0])))
-        if calls("add_node", calls.scene, given):
+            entry = native._Input(name.encode(), draw(mostly(st.sampled_from(words), ["guess"])).encode())
+            entry.color.rgb[:] = [draw(NUMBER) for _ in range(3)]
+            entry.color.image, entry.color.node = (draw(mostly(st.integers(-1, 1), WHOLE)) for _ in range(2))
+            inputs.append(entry)
+        entry = native._Node(kind.encode(), (native._Input * len(inputs))(*inputs), draw(mostly(st.just(len(inputs)), [0])))
+        if calls("add_node", calls.scene, entry):
             rows, values = calls.at(numbers(draw, 6 * 5), np.float64), np.empty((5, 4))
             calls("probe_nodes", calls.scene, 5, rows, values.ctypes.data)
             calls("constant_node", calls.scene, values.ctypes.data, byref(c_int()))
+
+
+def test_the_core_has_the_nodes_of_the_table_and_asks_for_every_input_of_it():
+    headers = Path(native.__file__).parent.glob("core/nodes/*.h")
+    named = {name for header in headers for name in re.findall(r'NAME = "(\w+)"', header.read_text(encoding="utf-8"))}
+    assert named - {"constant"} == set(VALUES)
+    calls = Calls()
+    assert calls("add_texture", calls.scene, 1, 1, 3, False, 0, calls.at(np.ones(4), np.float32))
+
+    def is_made(kind, names, which=0):
+        words = [word_of(VALUES[kind].inputs[name], which) for name in names]
+        inputs = [native._Input(name.encode(), word, native._Color(node=-1)) for name, word in zip(names, words, strict=True)]
+        return calls("add_node", calls.scene, native._Node(kind.encode(), (native._Input * len(inputs))(*inputs), len(inputs)))
+
+    def word_of(default, which):
+        chosen = default[which] if isinstance(default, tuple) and isinstance(default[0], str) else "true"
+        return b"2 2 0 1 0 1 1 1 1 1" if default == IES else chosen.encode()
+
+    for kind, row in VALUES.items():
+        names = tuple(row.inputs)
+        assert is_made(kind, names), f"the core has no {kind} with the inputs {', '.join(names)}"
+        # By the first words, or by the last, as the direction of rings alone.
+        left = [each for each in names if all(is_made(kind, set(names) - {each}, which) for which in (0, -1))]
+        assert not left, f"the core's {kind} does not ask for {', '.join(left)}"
+    calls.close()
+
+
+def test_curves_without_a_table_are_refused():
+    calls = Calls()
+    inputs = [native._Input(name.encode(), b"true", native._Color(image=-1, node=-1)) for name in VALUES["rgb_curves"].inputs]
+    assert not calls("add_node", calls.scene, native._Node(b"rgb_curves", (native._Input * len(inputs))(*inputs), len(inputs)))
+    assert "table" in calls.core.message().decode()
+    calls.close()
 
 
 def trace(draw, calls):
     rays = calls.at(numbers(draw, 8 * 70), np.float64)
     t, objects, primitives, hidden = np.empty(70), np.empty(70, np.uint32), np.empty(70, np.uint32), np.empty(70, np.uint8)
     for packets in (0, 1):
-        found = t.ctypes.data, objects.ctypes.data, primitives.ctypes.data
-        assert calls("closest", calls.scene, 70, rays, draw(st.integers(0, 63)), packets, *found)
+        actual = t.ctypes.data, objects.ctypes.data, primitives.ctypes.data
+        assert calls("closest", calls.scene, 70, rays, draw(st.integers(0, 63)), packets, *actual)
         assert calls("occluded", calls.scene, 70, rays, packets, hidden.ctypes.data)
     width, height = calls.size
     planes = np.empty((20, max(width * height, 1)), np.float32)
@@ -193,7 +232,7 @@ def trace_light(draw, calls):
         return
     width, height = calls.size
     passes = np.zeros((len(native.LIGHT), 4 * max(width * height, 1)), np.float32)
-    addresses = native._LightPasses(*(values.ctypes.data if draw(st.integers(0, 30)) else None for values in passes))
+    addresses = (c_void_p * len(passes))(*(values.ctypes.data if draw(st.integers(0, 30)) else None for values in passes))
     calls(
         "trace_light",
         light,
@@ -241,8 +280,8 @@ TRIANGLE = [0, 0, -1, 1, 0, -1, 0, 1, -1]
 
 
 def mesh_of(calls, vertices=TRIANGLE, triangles=(0, 1, 2), materials=(0,)):
-    given = calls.at(vertices, np.float64), calls.at(triangles, np.int32), calls.at(materials, np.int32)
-    return native._Mesh(len(vertices) // 3, len(materials), *given, None, None, None)
+    arrays = calls.at(vertices, np.float64), calls.at(triangles, np.int32), calls.at(materials, np.int32)
+    return native._Mesh(len(vertices) // 3, len(materials), *arrays, None, None, None)
 
 
 @pytest.mark.parametrize(
@@ -270,8 +309,8 @@ def test_an_object_that_its_matrix_flattens_does_no_harm(matrix):
     calls("add_objects", calls.scene, native._Object(0, 31, 1, 2, 1.0, indices, materials))
     assert calls("commit", calls.scene, calls.at([matrix, matrix], np.float64), calls.at(np.zeros(3), np.float64), 2)
     rays = calls.at(np.random.default_rng(1).normal(size=(64, 8)), np.float64)
-    found = np.empty(64), np.empty(64, np.uint32), np.empty(64, np.uint32)
-    assert calls("closest", calls.scene, 64, rays, 1, 1, *(values.ctypes.data for values in found))
+    actual = np.empty(64), np.empty(64, np.uint32), np.empty(64, np.uint32)
+    assert calls("closest", calls.scene, 64, rays, 1, 1, *(values.ctypes.data for values in actual))
     calls.close()
 
 

@@ -93,7 +93,7 @@ def test_positions_lie_on_the_ellipsoid_facing_is_its_normals_and_the_normal_sho
     hit = passes["Object Index"][..., 0] == 1
     rays = camera.ray_directions(*np.nonzero(hit)[::-1])
     inverse = np.linalg.inv(matrix)
-    position, shown = passes["Position"][hit].astype(float), passes["Normal"][hit].astype(float)
+    position, normal = passes["Position"][hit].astype(float), passes["Normal"][hit].astype(float)
     unit = position @ inverse[:3, :3].T + inverse[:3, 3]
     stretch = np.linalg.norm(inverse[:3, :3], 2)
     off = np.abs(np.linalg.norm(unit, axis=1) - 1).max()
@@ -111,7 +111,7 @@ def test_positions_lie_on_the_ellipsoid_facing_is_its_normals_and_the_normal_sho
     along = np.einsum("ij,ij->i", outward, rays)
     clear = np.abs(along) > allowed  # at a right angle to the ray, a rounding decides which side is shown
     expected = -outward * np.sign(along)[:, None]
-    worst = np.abs(shown - expected)[clear].max()
+    worst = np.abs(normal - expected)[clear].max()
     assert worst <= allowed, f"the normal shown is off by {worst:.1e}, allowed {allowed:.1e}"
 
 

@@ -87,8 +87,8 @@ def test_packets_and_single_rays_give_the_same_bits(random_scene, seed):
     coherent = core.rays(np.tile(eye, (640, 1)), rng.normal(size=(640, 3)) * 0.05 - eye / np.linalg.norm(eye))
     for rays in (coherent, core.rays(*random_rays(rng, 640)), core.rays(*random_rays(rng, 640), 0.1, 2.0)):
         single, packets = core.closest(rays, packets=False), core.closest(rays)
-        for one, other in zip(single, packets, strict=True):
-            assert np.array_equal(one, other), f"{(one != other).sum()} of {len(rays)} rays differ"
+        for first, other in zip(single, packets, strict=True):
+            assert np.array_equal(first, other), f"{(first != other).sum()} of {len(rays)} rays differ"
         assert np.array_equal(core.occluded(rays, packets=False), core.occluded(rays))
         shadows, _, _ = core.closest(rays, kind="shadow")
         assert np.array_equal(core.occluded(rays), np.isfinite(shadows)), "what hides a light is what a ray would meet"
@@ -154,16 +154,16 @@ def test_an_object_that_stands_in_many_places_is_as_many_objects(ball, make_mesh
     mesh = make_mesh(rng.normal(size=(2700 * 3, 3)) * 0.1, np.arange(2700 * 3))
     for geometry, count in ((ball(6), 20), (mesh, 400)):
         matrices = np.array([random_matrix(rng, 9.0) for _ in range(count)])
-        one = (Object("all", "thing", matrices),)
+        placed = (Object("all", "thing", matrices),)
         each = tuple(Object(f"{number}", "thing", matrix) for number, matrix in enumerate(matrices))
         rays = random_rays(rng, 500, 9.0)
-        found = []
-        for objects in (one, each):
+        result = []
+        for objects in (placed, each):
             core = CoreScene(Scene(CAMERA, {"thing": geometry}, objects), 2)
-            found.append(core.closest(core.rays(*rays)))
-        for first, second in zip(*found, strict=True):
+            result.append(core.closest(core.rays(*rays)))
+        for first, second in zip(*result, strict=True):
             assert np.array_equal(first, second)
-        assert (found[0][1] > 0).any(), "nothing but the first place is met"
+        assert (result[0][1] > 0).any(), "nothing but the first place is met"
 
 
 def test_many_instances_take_no_more_than_three_hundred_bytes_each(make_mesh):
@@ -208,7 +208,7 @@ def test_every_instruction_set_gives_the_same_bits_and_the_one_that_is_asked_for
         "*[fingerprint(scene) for scene in pickle.loads(open(sys.argv[1], 'rb').read())])"
     )
     root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    found = {}
+    result = {}
     for name in ("v2", "v3", "v4", "base"):
         try:
             native.core(name)
@@ -224,9 +224,9 @@ def test_every_instruction_set_gives_the_same_bits_and_the_one_that_is_asked_for
         assert ran.returncode == 0, ran.stderr
         chosen, *bits = ran.stdout.split()
         assert chosen == name
-        found[name] = bits
-    assert found and len({tuple(bits) for bits in found.values()}) == 1, f"pictures differ between {', '.join(found)}"
-    assert len(found) > 1 or "base" in found, f"only {', '.join(found)} ran"
+        result[name] = bits
+    assert result and len({tuple(bits) for bits in result.values()}) == 1, f"pictures differ between {', '.join(result)}"
+    assert len(result) > 1 or "base" in result, f"only {', '.join(result)} ran"
 
 
 def test_spheres_of_an_instance_far_from_its_own_origin_are_met(make_scene, make_spheres):

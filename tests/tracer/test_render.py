@@ -16,7 +16,7 @@ from viewcam_addon.tracer.render import PASSES, Keeper, Tracer, render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Point, Sun
-from viewcam_addon.tracer.scene.materials import Colour, Material
+from viewcam_addon.tracer.scene.materials import Colour, sum_of
 from viewcam_addon.tracer.scene.sameness import same, same_things
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -86,7 +86,7 @@ def test_rows_count_from_the_bottom_and_columns_from_the_left(make_scene, make_s
     camera = Pinhole((0, -10, 0), (0, 0, 0), (0, 0, 1), 100, 60, 40)
     scene = make_scene(camera, make_spheres([[2, 0, 0]], 0.3), make_spheres([[0, 0, 1]], 0.3))
     index = render(scene)["Object Index"][..., 0]
-    assert index[20, 50] == 1 and index[30, 30] == 2, "x = 2 is 20 px right of the centre, z = 1 is 10 px above it"
+    assert index[20, 50] == 1 and index[30, 30] == 2, "x = 2 is 20 px right of the center, z = 1 is 10 px above it"
     mirrored = render(replace(scene, camera=replace(camera, mirrored=True)))["Object Index"][..., 0]
     assert np.array_equal(mirrored, index[:, ::-1])
 
@@ -218,8 +218,8 @@ def test_what_lies_before_the_clip_range_is_looked_through_and_what_lies_behind_
         ((4, 5), 3),
         ((0, 0.9), 0),
     ):
-        shown = found(make_scene(camera, *things, clip=clip))[2, 2]
-        assert shown == seen, f"clip {clip}: object {shown} instead of {seen}"
+        rendered = found(make_scene(camera, *things, clip=clip))[2, 2]
+        assert rendered == seen, f"clip {clip}: object {rendered} instead of {seen}"
 
 
 def test_scenes_and_meshes_that_are_empty_or_degenerate_show_nothing(make_scene, make_mesh, make_spheres):
@@ -244,8 +244,8 @@ def test_an_eye_inside_a_sphere_sees_through_it_and_one_just_outside_sees_it(mak
     camera = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 10, 1, 1)
     around, beyond = [0, 0, -0.5], [0, 0, -4]
     for radius, seen in ((0.5 + 1e-12, 2), (0.5 - 1e-12, 1)):
-        shown = found(make_scene(camera, make_spheres([around], radius), make_spheres([beyond], 1.0)))[0, 0]
-        assert shown == seen, f"radius {radius}: object {shown}"
+        rendered = found(make_scene(camera, make_spheres([around], radius), make_spheres([beyond], 1.0)))[0, 0]
+        assert rendered == seen, f"radius {radius}: object {rendered}"
 
 
 def depths_by_testing_each(scene, spheres, directions):
@@ -285,7 +285,7 @@ def test_spheres_that_touch_one_depth_overlap_or_coincide_are_all_found(make_sce
     nested = np.repeat([[0.0, 0.0, -2.0]], 50, axis=0)
     for name, spheres in {
         "equal spheres side by side at one depth, overlapping": make_spheres(lattice, 0.04),
-        "fifty spheres of one centre, each larger by 1e-9": make_spheres(nested, 0.3 * (1 + 1e-9 * np.arange(50))),
+        "fifty spheres of one center, each larger by 1e-9": make_spheres(nested, 0.3 * (1 + 1e-9 * np.arange(50))),
     }.items():
         scene = make_scene(Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 100, 60, 60), spheres)
         number, traced, directions = first_of(scene, *centres(scene))
@@ -301,7 +301,7 @@ def test_spheres_that_touch_one_depth_overlap_or_coincide_are_all_found(make_sce
 
 
 WIDTH, HEIGHT = 96, 64
-GREEN, RED = Material(diffuse=Colour((0.1, 0.8, 0.2))), Material(diffuse=Colour((0.9, 0.1, 0.1)))
+GREEN, RED = sum_of(diffuse=Colour((0.1, 0.8, 0.2))), sum_of(diffuse=Colour((0.9, 0.1, 0.1)))
 GROUND = np.array([[-300, -300, -1.2], [300, -300, -1.2], [300, 300, -1.2], [-300, 300, -1.2]], float)
 
 
@@ -330,11 +330,11 @@ def pictures(tracer):
 
 def differing(kept, fresh):
     """The number of pixels that differ in each pass of both pictures, where any do."""
-    found = {}
-    for one, other in zip(kept, fresh, strict=True):
-        counts = {name: int((one[name] != other[name]).any(axis=-1).sum()) for name in one}
-        found |= {name: count for name, count in counts.items() if count}
-    return found
+    result = {}
+    for first, other in zip(kept, fresh, strict=True):
+        counts = {name: int((first[name] != other[name]).any(axis=-1).sum()) for name in first}
+        result |= {name: count for name, count in counts.items() if count}
+    return result
 
 
 def copied(scene):
@@ -345,7 +345,7 @@ def copied(scene):
         return replace(geometry, **arrays)
 
     objects = tuple(replace(placed, matrix=placed.matrix.copy()) for placed in scene.objects)
-    return replace(scene, geometries={name: copy(some) for name, some in scene.geometries.items()}, objects=objects)
+    return replace(scene, geometries={name: copy(shape) for name, shape in scene.geometries.items()}, objects=objects)
 
 
 def test_a_flight_with_kept_structures_has_the_pictures_of_fresh_ones(scene):
@@ -353,8 +353,8 @@ def test_a_flight_with_kept_structures_has_the_pictures_of_fresh_ones(scene):
     for turn in np.linspace(0, 2 * np.pi, 9):
         frame = replace(copied(scene), camera=camera(turn))
         kept = Tracer(frame, kept=kept)
-        found = differing(pictures(kept), pictures(Tracer(frame)))
-        assert not found, f"at {turn:.2f} radians: {found} pixels of {WIDTH * HEIGHT} differ"
+        errors = differing(pictures(kept), pictures(Tracer(frame)))
+        assert not errors, f"at {turn:.2f} radians: {errors} pixels of {WIDTH * HEIGHT} differ"
 
 
 def test_moving_the_camera_and_zooming_make_nothing_anew(scene):
@@ -434,9 +434,9 @@ ELSEWHERE = {
 def test_what_else_changes_shows(change, scene):
     now = ELSEWHERE[change](copied(scene))
     before = Tracer(scene)
-    shown, fresh = pictures(before), pictures(Tracer(now))
+    rendered, fresh = pictures(before), pictures(Tracer(now))
     assert not differing(pictures(Tracer(now, kept=before)), fresh)
-    assert change == "an eye moved by its last bit" or differing(shown, fresh) or change == "the order of materials"
+    assert change == "an eye moved by its last bit" or differing(rendered, fresh) or change == "the order of materials"
 
 
 def test_a_tracer_whose_structures_were_taken_over_traces_no_more(scene):
@@ -448,9 +448,9 @@ def test_a_tracer_whose_structures_were_taken_over_traces_no_more(scene):
 
 def test_a_keeper_hands_each_scene_what_the_one_before_had(scene):
     keeper, frames = Keeper(), [replace(scene, camera=camera(turn)) for turn in (0.0, 0.1, 0.2)]
-    shown = [render(frame, "direct", 2, keeper=keeper) for frame in frames]
+    rendered = [render(frame, "direct", 2, keeper=keeper) for frame in frames]
     core = keeper._tracer._core
-    assert not differing(shown, [render(frame, "direct", 2) for frame in frames])
+    assert not differing(rendered, [render(frame, "direct", 2) for frame in frames])
     render(frames[-1], keeper=keeper)
     assert keeper._tracer._core is core
 
@@ -458,6 +458,11 @@ def test_a_keeper_hands_each_scene_what_the_one_before_had(scene):
 def test_scenes_are_the_same_by_content(scene):
     assert same_things(scene, copied(scene))
     assert same((1.0, None, "a"), (1.0, None, "a"))
-    for one, other in (((1,), (1, 2)), (1, True), (np.zeros(3), np.zeros(3, np.float32)), ({"a": 1, "b": 2}, {"b": 2, "a": 1})):
-        assert not same(one, other), f"{one!r} is taken for {other!r}"
+    for first, other in (
+        ((1,), (1, 2)),
+        (1, True),
+        (np.zeros(3), np.zeros(3, np.float32)),
+        ({"a": 1, "b": 2}, {"b": 2, "a": 1}),
+    ):
+        assert not same(first, other), f"{first!r} is taken for {other!r}"
     assert isinstance(scene.geometries["geometry 0"], Mesh)

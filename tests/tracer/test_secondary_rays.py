@@ -76,10 +76,10 @@ def test_no_ray_meets_the_convex_thing_that_it_leaves_outwards(ball, make_mesh, 
     _, normals, _, _, _ = core.leaving(rays, np.array([0.0, 0.0, 1.0]))
     directions = onwards(np.nan_to_num(normals), rng)
     _, _, _, starts, _ = core.leaving(rays, directions)
-    found = np.isfinite(starts).all(axis=1)
-    assert found.sum() > 0.5 * count
-    met, hidden = traced(core, starts[found], directions[found])
-    assert not hidden.any() and (met < 0).all(), f"{hidden.sum()} of {found.sum()} rays meet what they leave"
+    values = np.isfinite(starts).all(axis=1)
+    assert values.sum() > 0.5 * count
+    met, hidden = traced(core, starts[values], directions[values])
+    assert not hidden.any() and (met < 0).all(), f"{hidden.sum()} of {values.sum()} rays meet what they leave"
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -175,9 +175,9 @@ def test_a_room_with_a_hole_is_left_and_a_closed_one_is_not(ball):
     rng = np.random.default_rng(4)
     whole = ball(20)
     kept = whole.vertices[whole.triangles].mean(axis=1)[:, 2] < 0.9
-    some = Mesh(whole.vertices, whole.triangles[kept], whole.materials[kept])
+    half = Mesh(whole.vertices, whole.triangles[kept], whole.materials[kept])
     left = []
-    for mesh in (whole, some):
+    for mesh in (whole, half):
         core = core_of(mesh, np.eye(4))
         rays = core.rays(np.zeros((20_000, 3)), rng.normal(size=(20_000, 3)))
         _, normals, _, _, _ = core.leaving(rays, np.array([0.0, 0.0, 1.0]))

@@ -184,12 +184,12 @@ def test_a_face_whose_corner_normals_cancel_shows_its_own(make_mesh, make_scene)
 
 
 def test_a_triangle_seen_nearly_edge_on_is_met_within_its_own_depths(make_mesh, make_scene):
-    found = []
+    result = []
     for lift in (0.0, 1e-300, 1e-17, 1e-12):
         mesh = make_mesh([[-1, lift, -2], [1, lift, -2], [0, -lift, -9]], [[0, 1, 2]])
         depth = met(mesh, np.array([0, 0, 0.1]), np.array([0, lift / 10, -lift / 20]))
-        found += depth[np.isfinite(depth)].tolist()
-    assert len(found) > 3 and all(2 <= depth <= 9 for depth in found), found
+        result += depth[np.isfinite(depth)].tolist()
+    assert len(result) > 3 and all(2 <= depth <= 9 for depth in result), result
 
 
 @pytest.mark.parametrize("slenderness", [1e2, 1e6, 1e12])

@@ -17,11 +17,11 @@ def spread(low, high, seed=1):
     return np.concatenate([sizes, rng.uniform(-1, 1, COUNT), [0.0, 0.5, -0.5, 0.25, 1.0, -1.0, 1 - UNIT, UNIT - 1, 5e-324]])
 
 
-def off_by(found, exact, *arguments):
+def off_by(actual, exact, *arguments):
     """(n,) float64: errors, each rounded once."""
     with mpmath.workprec(200):
-        given = zip(found.tolist(), *(values.tolist() for values in arguments), strict=True)
-        return np.array([float(mpmath.mpf(got) - exact(*map(mpmath.mpf, row))) for got, *row in given])
+        inputs = zip(actual.tolist(), *(values.tolist() for values in arguments), strict=True)
+        return np.array([float(mpmath.mpf(got) - exact(*map(mpmath.mpf, row))) for got, *row in inputs])
 
 
 @pytest.mark.parametrize("name", ["sin", "cos"])
@@ -35,15 +35,15 @@ def test_sines_of_turns_are_within_two_units_of_the_last_place_of_one(name):
 def test_inverses_are_within_three_units_of_their_own_last_place(name):
     near_one = 1 - np.abs(spread(-16, -1)[:COUNT])
     x = np.clip(np.concatenate([spread(-300, 0), near_one, -near_one]), -1, 1)
-    found = function(name, x)
-    off = np.abs(off_by(found, getattr(mpmath, name), x)) / np.spacing(np.abs(found))
+    results = function(name, x)
+    off = np.abs(off_by(results, getattr(mpmath, name), x)) / np.spacing(np.abs(results))
     assert off.max() <= 3, f"{off.max():.2f} units, at {x[off.argmax()]!r}"
 
 
 def test_the_angle_of_a_vector_is_within_three_units_of_its_own_last_place():
     y, x = spread(-20, 20), np.roll(spread(-20, 20, 2), 7)
-    found = function("atan2", y, x)
-    off = np.abs(off_by(found, mpmath.atan2, y, x)) / np.maximum(np.spacing(np.abs(found)), 5e-324)
+    results = function("atan2", y, x)
+    off = np.abs(off_by(results, mpmath.atan2, y, x)) / np.maximum(np.spacing(np.abs(results)), 5e-324)
     assert off.max() <= 3, f"{off.max():.2f} units, at {y[off.argmax()]!r}, {x[off.argmax()]!r}"
     assert function("atan2", np.zeros(1), np.zeros(1))[0] == 0
 
@@ -51,8 +51,8 @@ def test_the_angle_of_a_vector_is_within_three_units_of_its_own_last_place():
 def test_powers_are_right_to_two_roundings_of_their_logarithm():
     rng = np.random.default_rng(3)
     x, power = 10.0 ** rng.uniform(-30, 30, 2 * COUNT), rng.uniform(-8, 8, 2 * COUNT)
-    found = function("pow", x, power)
-    off = np.abs(off_by(found, mpmath.power, x, power)) / found
+    results = function("pow", x, power)
+    off = np.abs(off_by(results, mpmath.power, x, power)) / results
     allowed = 2 * UNIT * (1 + np.abs(power * np.log2(x)))
     assert (off <= allowed).all(), f"{(off / allowed).max():.2f} of what is allowed, at {x[(off / allowed).argmax()]!r}"
 

@@ -33,14 +33,14 @@ def _rooms() -> list[ModuleType]:
     from .rendering import engine
 
     buttons = [operators, moving, clipboard, baking, converting, presets]
-    shown = [panel, scene_cameras, photo_matching, swipe, proof, render_all, labels, overlay, gizmos]
+    interface = [panel, scene_cameras, photo_matching, swipe, proof, render_all, labels, overlay, gizmos]
     followers = [animation, resolution, own_picture]
     return [
         preferences,
         properties,
         render_settings,
         *buttons,
-        *shown,
+        *interface,
         engine,
         render_panels,
         file_menu,

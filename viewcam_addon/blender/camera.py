@@ -142,10 +142,10 @@ class CameraSync:
         before = storage.load(camera_object)
         if not storage.is_counted_in_earlier(camera_object, before):
             before = replace(before, counted_in=without_border(frame))
-        said = before.stating(eye, look_at, up, distance, frame, camera_object.data.sensor_fit)
-        names = [*storage.EXACT, "counted_in", "enabled", *(["zoom"] if said.zoom != before.zoom else [])]
-        storage.store(camera_object, said, *names)
-        storage.settle(camera_object, said, frame)
+        values = before.stating(eye, look_at, up, distance, frame, camera_object.data.sensor_fit)
+        names = [*storage.EXACT, "counted_in", "enabled", *(["zoom"] if values.zoom != before.zoom else [])]
+        storage.store(camera_object, values, *names)
+        storage.settle(camera_object, values, frame)
 
     def edited(self, scene: bpy.types.Scene, names: frozenset[str] = ALL) -> None:
         """Move an enabled camera to where its values, edited or not, say; a held roll is carried along (hold.py).
@@ -417,9 +417,9 @@ class CameraSync:
             level = since.pinhole(level.plane, frame, camera_object.data.sensor_fit, level.mirrored)
         wanted = rolls.turned(level, hold.roll(evaluated, base, scene))
         is_carried = bool(camera_object.parent or camera_object.constraints)
-        found = read(evaluated, scene)
+        pinhole = read(evaluated, scene)
         bound |= targets.bound(evaluated)
-        moved = _moved(camera_object, wanted, found, depsgraph)
+        moved = _moved(camera_object, wanted, pinhole, depsgraph)
         names = {name for name, _ in bound}
         if "eye" in names and not since and self._state in (None, state):
             moved -= {findings.VIEW}  # it is what the eye follows that has moved
@@ -431,21 +431,21 @@ class CameraSync:
         rests = self._rests_before() if self._state and not since else ()
         canceled = () if bound or is_carried else [rested for where, rested in rests if where == state]
         if canceled:
-            said = canceled[-1]
+            last_canceled = canceled[-1]
         else:
-            said = self._moved_to(base, found, moved, bound, frame)
-            said = values.with_unbound(said, bound)
+            last_canceled = self._moved_to(base, pinhole, moved, bound, frame)
+            last_canceled = values.with_unbound(last_canceled, bound)
         if values.pole == HOLD and findings.VIEW in moved:
-            more = rolls.angle_from(said.up, found) - hold.roll(evaluated, said, scene)
+            more = rolls.angle_from(last_canceled.up, pinhole) - hold.roll(evaluated, last_canceled, scene)
             more = math.remainder(more, 2 * math.pi)
             if abs(more) > findings.LARGEST_TURN:
-                said = replace(said, held_roll=float(np.float32(said.held_roll + more)))
-        if not self._store_changed(values, said):
+                last_canceled = replace(last_canceled, held_roll=float(np.float32(last_canceled.held_roll + more)))
+        if not self._store_changed(values, last_canceled):
             return False
-        storage.settle(camera_object, said.as_set(), frame)
+        storage.settle(camera_object, last_canceled.as_set(), frame)
         if bound:
-            level = said.pinhole(found.plane, frame, camera_object.data.sensor_fit, found.mirrored)
-            turned = rolls.turned(level, hold.roll(evaluated, said, scene))
+            level = last_canceled.pinhole(pinhole.plane, frame, camera_object.data.sensor_fit, pinhole.mirrored)
+            turned = rolls.turned(level, hold.roll(evaluated, last_canceled, scene))
             self._place(turned, scene, depsgraph, causes.decided_by(names) & _free(camera_object))
         self._agree(rests, is_moving=True)
         return True
@@ -460,26 +460,26 @@ class CameraSync:
         depsgraph: bpy.types.Depsgraph,
     ) -> tuple[CameraValues, Pinhole]:
         """Values of a frame, and what they ask for, with all that they do not decide as it is in the camera there."""
-        found, frame = read(evaluated, scene), datablocks.frame_of(scene)
+        pinhole, frame = read(evaluated, scene), datablocks.frame_of(scene)
         wanted = rolls.turned(level, hold.roll(evaluated, values, scene))
-        moved = _moved(self.camera_object, wanted, found, depsgraph) - decided
+        moved = _moved(self.camera_object, wanted, pinhole, depsgraph) - decided
         if values.set_for != without_border(frame):
             moved -= {findings.DISTANCE}
         if not moved:
             return values, level
         bound = {(name, i) for name in datablocks.animated_values(self.camera_object) for i in range(3)}
-        values = self._moved_to(values, found, moved, bound, frame)
+        values = self._moved_to(values, pinhole, moved, bound, frame)
         return values, values.pinhole(level.plane, frame, self.camera_object.data.sensor_fit, level.mirrored)
 
     def _moved_to(
-        self, base: CameraValues, found: Pinhole, moved: set[str], bound: set[tuple[str, int]], frame: intrinsics.Frame
+        self, base: CameraValues, pinhole: Pinhole, moved: set[str], bound: set[tuple[str, int]], frame: intrinsics.Frame
     ) -> CameraValues:
         """The values of a camera as it was moved, but the numbers that something else decides."""
-        said = base.moved_to(found, moved, bound, preferences.up_axis(), findings.LARGEST_TURN)
+        values = base.moved_to(pinhole, moved, bound, preferences.up_axis(), findings.LARGEST_TURN)
         if findings.DISTANCE in moved:
-            at_full_size = found.distance[0] * (frame.resolution_x / frame.size[0])
-            said = base.with_unbound(said.seeing(at_full_size, frame, self.camera_object.data.sensor_fit), bound)
-        return said
+            at_full_size = pinhole.distance[0] * (frame.resolution_x / frame.size[0])
+            values = base.with_unbound(values.seeing(at_full_size, frame, self.camera_object.data.sensor_fit), bound)
+        return values
 
     def _store_changed(self, before: CameraValues, after: CameraValues) -> bool:
         """Store what has changed of the values; whether anything has."""
@@ -541,11 +541,11 @@ def check(camera_object: bpy.types.Object, wanted: Pinhole, scene: bpy.types.Sce
     """A finding for each thing that keeps the camera from being `wanted`, or will; empty where all is well."""
     possible = list(causes.causes(camera_object, scene))
     try:
-        found = read(camera_object, scene)
+        read_back = read(camera_object, scene)
     except InputError as error:
         return [findings.Finding(datablocks.sentence(error)), *findings.explain({}, possible)]
     reach = pose.reach(camera_object, datablocks.depsgraph_of(scene))
-    differing = findings.differences(wanted, found, reach, lambda value: datablocks.length(value, scene, digits=3))
+    differing = findings.differences(wanted, read_back, reach, lambda value: datablocks.length(value, scene, digits=3))
     return findings.explain(differing, possible)
 
 
@@ -584,10 +584,10 @@ def _stood_at(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.
     if values.view_when_set is None:
         return None
     try:
-        before, found = Pinhole(*values.view_when_set, 1.0, 1, 1), read(camera_object, scene)
+        before, pinhole = Pinhole(*values.view_when_set, 1.0, 1, 1), read(camera_object, scene)
     except InputError:
         return None
-    off = np.subtract(rolls.turned(before, values.held_roll).basis(), found.basis())
+    off = np.subtract(rolls.turned(before, values.held_roll).basis(), pinhole.basis())
     return before if np.abs(off).max() <= findings.LARGEST_TURN else None
 
 
@@ -606,11 +606,11 @@ def _free(camera_object: bpy.types.Object) -> frozenset[str]:
     return conversion.PARTS - causes.fed(camera_object) if camera_object.constraints else conversion.PARTS
 
 
-def _moved(camera_object: bpy.types.Object, wanted: Pinhole, found: Pinhole, depsgraph: bpy.types.Depsgraph) -> set[str]:
+def _moved(camera_object: bpy.types.Object, wanted: Pinhole, read_back: Pinhole, depsgraph: bpy.types.Depsgraph) -> set[str]:
     """The parts EYE, VIEW and DISTANCE that Blender has moved by more than a rounding, and nobody holds where they are."""
-    differing = findings.differences(wanted, found, pose.reach(camera_object, depsgraph)).keys()
+    differing = findings.differences(wanted, read_back, pose.reach(camera_object, depsgraph)).keys()
     moved = set(conversion.PARTS & differing)
-    if findings.EYE in moved and np.array_equal(np.float32(wanted.eye), np.float32(found.eye)):
+    if findings.EYE in moved and np.array_equal(np.float32(wanted.eye), np.float32(read_back.eye)):
         moved.remove(findings.EYE)
     return moved - causes.held(camera_object) if moved else moved
 
@@ -618,11 +618,11 @@ def _moved(camera_object: bpy.types.Object, wanted: Pinhole, found: Pinhole, dep
 def _as_followed(camera_object: bpy.types.Object, eye: Triple, look_at: Triple) -> tuple[Triple, Triple]:
     """Eye and look-at, but the place of its target for a point that is there but for rounding, so that it stays followed."""
     rounding = findings.LARGEST_TURN * (math.dist(eye, look_at) + max(map(abs, (*eye, *look_at))))
-    found = []
+    synced = []
     for point, stated in zip(targets.POINTS, (eye, look_at), strict=True):
         at = targets.place(camera_object, point)
-        found.append(at if at is not None and math.dist(at, stated) <= rounding else stated)
-    return tuple(found)
+        synced.append(at if at is not None and math.dist(at, stated) <= rounding else stated)
+    return tuple(synced)
 
 
 def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use: bool) -> Pinhole:
@@ -636,14 +636,14 @@ def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use
     InputError
         as `read` does.
     """
-    found = read(camera_object, scene)
-    _, v, w = found.basis()
+    pinhole = read(camera_object, scene)
+    _, v, w = pinhole.basis()
     values = targets.values(camera_object)
     reach = math.dist(values.eye, values.look_at) if in_use else 0.0
     if not 0 < reach < math.inf:
-        reach = _focus_distance(camera_object, found, datablocks.depsgraph_of(scene))
-    look_at = tuple((np.array(found.eye) - reach * w).tolist())
-    return replace(found, look_at=look_at, up=simplest_up(found.eye, look_at, v))
+        reach = _focus_distance(camera_object, pinhole, datablocks.depsgraph_of(scene))
+    look_at = tuple((np.array(pinhole.eye) - reach * w).tolist())
+    return replace(pinhole, look_at=look_at, up=simplest_up(pinhole.eye, look_at, v))
 
 
 def simplest_up(eye: tuple, look_at: tuple, v: Array) -> Triple:
@@ -687,8 +687,8 @@ def roll(camera_object: bpy.types.Object) -> float:
         if "roll" in asked:
             return asked["roll"]
         values = targets.values(camera_object)
-        found = values.roll_from(preferences.up_axis(), _held_roll(camera_object, values))
-        return found if abs(found) > _UNSEEN else 0.0
+        angle = values.roll_from(preferences.up_axis(), _held_roll(camera_object, values))
+        return angle if abs(angle) > _UNSEEN else 0.0
     return 0.0
 
 

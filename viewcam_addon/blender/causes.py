@@ -7,7 +7,7 @@ import bpy
 
 from ..errors import listed
 from . import datablocks, pose, storage, versions
-from .findings import APPLY_OR_ADOPT, CENTRE, DISTANCE, EYE, LENS, POSE, VIEW, Button, Cause
+from .findings import APPLY_OR_ADOPT, CENTER, DISTANCE, EYE, LENS, POSE, VIEW, Button, Cause
 
 
 def causes(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[Cause]:
@@ -43,7 +43,7 @@ def decided_by_values(camera_object: bpy.types.Object) -> frozenset[str]:
 
 
 def held(camera_object: bpy.types.Object) -> set[str]:
-    """The parts of EYE, VIEW, DISTANCE and CENTRE that the values can't follow as the camera is moved.
+    """The parts of EYE, VIEW, DISTANCE and CENTER that the values can't follow as the camera is moved.
 
     A library's, which would not be saved, and what the animation of the values decides and something else as well.
     """
@@ -66,7 +66,7 @@ def followed(camera_object: bpy.types.Object) -> dict[str, str]:
         if _places(constraint, camera_object):
             placing.append(("Constraint", _CONSTRAINTS.get(constraint.type, POSE)))
     placing += [("Driver", cause.acts_on) for cause in _drivers(camera_object)]
-    decided = decided_by_values(camera_object) | {CENTRE}
+    decided = decided_by_values(camera_object) | {CENTER}
     return {name: word for word, acts_on in placing for name in acts_on if name not in decided}
 
 
@@ -132,7 +132,7 @@ _CHANNELS = {
     "delta_scale": (VIEW, "delta scale"),
     "lens": (DISTANCE, "focal length"),
     "sensor_": (DISTANCE, "sensor"),
-    "shift_": (CENTRE, "shift"),
+    "shift_": (CENTER, "shift"),
 }
 
 
@@ -159,7 +159,7 @@ def keyed(
 ) -> list[tuple[bpy.types.ID, str]]:
     """The camera's own channels that keyframes set: (object or data, data path). curves : of a datablock."""
     blocks = camera_object, camera_object.data
-    return [(block, path) for block in blocks for path in _paths(curves(block)) if _channel(path)[0] not in (None, CENTRE)]
+    return [(block, path) for block in blocks for path in _paths(curves(block)) if _channel(path)[0] not in (None, CENTER)]
 
 
 def _animation(camera_object: bpy.types.Object) -> Iterator[Cause]:

@@ -138,13 +138,13 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
         if the object is no perspective camera, or takes no part in the scene, is sheared or scaled to zero.
     """
     datablocks.check_perspective(camera_object)
-    found = evaluated(camera_object, scene)
-    if not found.is_evaluated:
+    camera = evaluated(camera_object, scene)
+    if not camera.is_evaluated:
         raise InputError(
             f"camera {camera_object.name!r} takes no part in scene {scene.name!r}: "
             "enable it and its collection in the viewport, or make it the scene's camera"
         )
-    matrix = rotation.float64(found.matrix_world)
+    matrix = rotation.float64(camera.matrix_world)
     sizes = np.linalg.norm(matrix[:3, :3], axis=0)
     if not np.isfinite(matrix).all() or not sizes.all():
         raise pose.no_size(camera_object)
@@ -158,7 +158,7 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     eye = matrix[:3, 3]
     # As far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.
     reach = 2.0 ** math.ceil(math.log2(max(1.0, np.abs(eye).max())))
-    plane = datablocks.view_plane(datablocks.camera_data_of(found), datablocks.frame_of(scene))
+    plane = datablocks.view_plane(datablocks.camera_data_of(camera), datablocks.frame_of(scene))
     return Pinhole(
         tuple(eye.tolist()),
         tuple((eye - reach * w).tolist()),

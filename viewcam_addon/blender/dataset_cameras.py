@@ -39,15 +39,15 @@ def of_file(
         scene = bpy.context.scene
         objects = {each.name: each for each in scene.objects if each.type == "CAMERA"}
         if not objects or (name is not None and name not in objects):
-            wrong = f"no camera {checks.shown(name)}" if objects else "no camera"
+            wrong = f"no camera {checks.quoted(name)}" if objects else "no camera"
             raise InputError(f"scene {scene.name!r} of {blend} has {wrong}: name one of {', '.join(objects) or 'another file'}")
         if shots is not None:
             return [camera.noted(*notes) for camera in of_frames(scene, shots, objects.get(name or ""))]
-        left_out, found = LeftOut(InputError), []
+        left_out, result = LeftOut(InputError), []
         for called, camera_object in sorted(objects.items()):
             with left_out.unless_pinhole(called):
-                found.append(Camera(called, cameras.read(camera_object, scene), notes=notes, image=f"{called}.png"))
-        return left_out.told(found)
+                result.append(Camera(called, cameras.read(camera_object, scene), notes=notes, image=f"{called}.png"))
+        return left_out.with_notes(result)
 
 
 def of_frames(
@@ -62,17 +62,17 @@ def of_frames(
     InputError
         if there is none at one of the frames; as `read` does.
     """
-    before, found = (scene.frame_current, scene.frame_subframe), []
+    before, result = (scene.frame_current, scene.frame_subframe), []
     try:
         for name, frame in shots:
             scene.frame_set(frame)
             if (taken := camera_object or datablocks.render_camera(scene)) is None:
                 raise InputError(f"scene {scene.name!r} has no camera at frame {frame}: set one")
             time = frame * scene.render.fps_base / scene.render.fps
-            found.append(Camera(name, cameras.read(taken, scene), image=f"{name}.png", time=time))
+            result.append(Camera(name, cameras.read(taken, scene), image=f"{name}.png", time=time))
     finally:
         scene.frame_set(before[0], subframe=before[1])
-    return found
+    return result
 
 
 def of_pictures(names: Iterable[str], blend: str | os.PathLike[str], trust: bool = False) -> list[Camera]:
@@ -91,16 +91,18 @@ def of_pictures(names: Iterable[str], blend: str | os.PathLike[str], trust: bool
         objects = {each.name: each for each in scene.objects if each.type == "CAMERA"}
         if called := [name for name in names if name in objects]:
             return [Camera(name, cameras.read(objects[name], scene), notes=notes) for name in called]
-        found = []
+        result = []
         for name in names:
             if number := _NUMBER.search(name):
                 scene.frame_set(int(number[1]))
                 camera_object = datablocks.render_camera(scene)
                 if camera_object is None:
                     raise InputError(f"scene {scene.name!r} of {blend} has no camera: give the .blend that was rendered")
-                found.append(Camera(name, cameras.read(camera_object, scene), notes=notes))
-        if not found or (len(found) > 1 and len({camera.pinhole for camera in found}) == 1):
-            why = "its camera stands still" if found else "its cameras are called otherwise, and no name ends with a frame"
-            shown = ", ".join(checks.shown(name) for name in names[:3])
-            raise InputError(f"{blend} does not tell which camera took {shown}: {why}; give the true cameras with --against")
-        return found
+                result.append(Camera(name, cameras.read(camera_object, scene), notes=notes))
+        if not result or (len(result) > 1 and len({camera.pinhole for camera in result}) == 1):
+            why = "its camera stands still" if result else "its cameras are called otherwise, and no name ends with a frame"
+            first_names = ", ".join(checks.quoted(name) for name in names[:3])
+            raise InputError(
+                f"{blend} does not tell which camera took {first_names}: {why}; give the true cameras with --against"
+            )
+        return result

@@ -27,8 +27,8 @@ _LENS_ROUNDINGS = 3
 # The shift, and its product with the size.
 _SHIFT_ROUNDINGS = 2
 
-EYE, VIEW, DISTANCE, CENTRE = "eye", "view", "distance", "centre"
-POSE, LENS = frozenset({EYE, VIEW}), frozenset({DISTANCE, CENTRE})
+EYE, VIEW, DISTANCE, CENTER = "eye", "view", "distance", "center"
+POSE, LENS = frozenset({EYE, VIEW}), frozenset({DISTANCE, CENTER})
 APPLY_OR_ADOPT = "apply the values again, or adopt the camera as it stands"
 
 
@@ -43,7 +43,7 @@ class Button(enum.Enum):
 class Cause:
     """Something that may keep a camera from being what its four values say.
 
-    clause : who does what, in words. acts_on : some of EYE, VIEW, DISTANCE, CENTRE.
+    clause : who does what, in words. acts_on : some of EYE, VIEW, DISTANCE, CENTER.
     remedy : what to do. always : told even where nothing differs yet. mended_by : the button that does it, if there is one.
     """
 
@@ -76,32 +76,32 @@ _MOVED = Cause("The camera or its parent was moved since", POSE, APPLY_OR_ADOPT,
 _LENS = Cause(
     "The lens, sensor or pixel aspect was changed since", frozenset({DISTANCE}), APPLY_OR_ADOPT, mended_by=Button.APPLY_AGAIN
 )
-_SHIFT = Cause("The shift was changed since", frozenset({CENTRE}), APPLY_OR_ADOPT, mended_by=Button.APPLY_AGAIN)
+_SHIFT = Cause("The shift was changed since", frozenset({CENTER}), APPLY_OR_ADOPT, mended_by=Button.APPLY_AGAIN)
 
 
 def differences(
-    wanted: Pinhole, found: Pinhole, reach: float, length: Callable[[float], str] = "{:.3g}".format
+    wanted: Pinhole, read_back: Pinhole, reach: float, length: Callable[[float], str] = "{:.3g}".format
 ) -> dict[str, str]:
     """The differences beyond what Blender's float32 storage explains: its name → the figures, in words. Pure.
 
     reach : the largest coordinate that went into the camera's location, world units. length : a length in words, with its unit.
     """
     result = {}
-    apart = math.dist(wanted.eye, found.eye)
+    apart = math.dist(wanted.eye, read_back.eye)
     if apart > _LOCATION_ROUNDINGS * _FLOAT32 * reach:
         result[EYE] = f"the eye is {length(apart)} away"
-    turn = np.column_stack(wanted.basis()) - np.column_stack(found.basis())
-    if wanted.mirrored != found.mirrored:
+    turn = np.column_stack(wanted.basis()) - np.column_stack(read_back.basis())
+    if wanted.mirrored != read_back.mirrored:
         result[VIEW] = "the picture is mirrored"
     elif np.abs(turn).max() > LARGEST_TURN:
         angle = 2 * math.asin(min(1.0, float(np.linalg.norm(turn)) / math.sqrt(8)))
         result[VIEW] = f"the view is turned by {math.degrees(angle):.3g}°"
-    if any(abs(a - b) > _LENS_ROUNDINGS * _FLOAT32 * a for a, b in zip(wanted.distance, found.distance, strict=True)):
-        result[DISTANCE] = f"the view plane is {found.distance[0]:.6g} px away and not {wanted.distance[0]:.6g}"
+    if any(abs(a - b) > _LENS_ROUNDINGS * _FLOAT32 * a for a, b in zip(wanted.distance, read_back.distance, strict=True)):
+        result[DISTANCE] = f"the view plane is {read_back.distance[0]:.6g} px away and not {wanted.distance[0]:.6g}"
     allowed = _SHIFT_ROUNDINGS * _FLOAT32 * (max(wanted.width, wanted.height) + max(map(abs, wanted.principal_point)))
-    off_centre = math.dist(wanted.principal_point, found.principal_point)
-    if off_centre > allowed:
-        result[CENTRE] = f"the principal point is {off_centre:.3g} px away"
+    off_center = math.dist(wanted.principal_point, read_back.principal_point)
+    if off_center > allowed:
+        result[CENTER] = f"the principal point is {off_center:.3g} px away"
     return result
 
 
@@ -115,7 +115,7 @@ def explain(differing: dict[str, str], causes: Iterable[Cause]) -> list[Finding]
         for name in explained:
             unexplained.pop(name, None)
     for cause in (_MOVED, _LENS, _SHIFT):
-        left = [name for name in (EYE, VIEW, DISTANCE, CENTRE) if name in cause.acts_on & unexplained.keys()]
+        left = [name for name in (EYE, VIEW, DISTANCE, CENTER) if name in cause.acts_on & unexplained.keys()]
         if left:
             result.append(Finding(cause=cause, differing=tuple(unexplained[name] for name in left)))
     return result

@@ -62,8 +62,8 @@ def obstacle(camera_object: bpy.types.Object) -> str | None:
                 "held: clear the target, or choose Canonical Axes"
             )
     for what, curves in (("A driver", versions.drivers(camera_object)), ("An NLA strip", versions.strip_curves(camera_object))):
-        if found := _view_curves(curves):
-            name = found[0].data_path.removeprefix("virtual_pinhole.").replace("_", "-")
+        if view_curves := _view_curves(curves):
+            name = view_curves[0].data_path.removeprefix("virtual_pinhole.").replace("_", "-")
             return (
                 f"{what} sets the {name}, which can't be known at other frames, so that the roll is not held: "
                 "give the value keyframes, or choose Canonical Axes"

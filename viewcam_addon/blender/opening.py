@@ -160,12 +160,12 @@ def _check_files() -> None:
 def size_of(path: Path) -> int:
     """Bytes of a file that the open one reads, 0 where there is none. InputError for a pipe or a device: they may never end."""
     try:
-        found = path.stat()
+        status = path.stat()
     except (OSError, ValueError):  # it is told as missing
         return 0
-    if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
         raise InputError(f"the .blend reads {path}, which is no file: give a file, or take out what names it")
-    return found.st_size
+    return status.st_size
 
 
 def _disarmed(put: _Put) -> Iterator[str]:

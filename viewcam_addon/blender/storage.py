@@ -11,7 +11,7 @@ import contextlib
 import functools
 import json
 from collections.abc import Collection, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import bpy
 import numpy as np
@@ -24,6 +24,9 @@ from . import datablocks, versions
 
 EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
 _VECTORS = ("eye", "look_at", "up")
+# What is no property of its own, or not as it is; a property with the name of each other value holds it.
+_NOT_PLAIN = EXACT | {"counted_in", "set_for", "view_when_set", "precision", "follows", "asked"}
+_PLAIN = tuple(each.name for each in fields(CameraValues) if each.name not in _NOT_PLAIN)
 _ASKED = "asked"  # where Blender keeps what `ask` has noted
 # What is noted of a camera once it has been set.
 _NOTED = ("distance", "counted_in", "set_for", "view_when_set", "held_roll")
@@ -72,18 +75,13 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
         look_at=numbers[3:6],
         up=numbers[6:9],
         distance=numbers[9],
-        zoom=group.zoom,
-        enabled=group.enabled,
-        keeps=group.keeps,
         counted_in=_frame(tuple(group.counted_in)),
         set_for=_frame(tuple(group.picture)),
-        pole=group.pole,
-        hold_within=group.hold_within,
-        held_roll=group.held_roll,
         view_when_set=(when_set[0][0:3], when_set[0][3:6], when_set[0][6:9]) if when_set else None,
         precision=2.0**-53 if is_exact and not follows else 2.0**-24,
         follows=follows,
         asked=tuple(asked.items()),
+        **{name: getattr(group, name) for name in _PLAIN},
     )
 
 
@@ -102,10 +100,10 @@ def animated(camera_object: bpy.types.Object, before: CameraValues) -> CameraVal
 
 def _numbers(group: bpy.types.PropertyGroup) -> tuple[tuple[float, ...], bool]:
     """Eye, look-at, up and distance, ten numbers, and whether all of them are known in float64."""
-    exact, shown = _parsed(group.exact, 10), (*group.eye, *group.look_at, *group.up, group.distance)
+    exact, rounded = _parsed(group.exact, 10), (*group.eye, *group.look_at, *group.up, group.distance)
     if not exact:
-        return shown, False
-    columns = zip(*exact, _shown_values(exact[0]), shown, strict=True)
+        return rounded, False
+    columns = zip(*exact, _shown_values(exact[0]), rounded, strict=True)
     numbers = tuple([full if value in (short, zeroed) else value for full, short, zeroed, value in columns])
     return numbers, numbers == exact[0]
 
@@ -234,9 +232,9 @@ def _as_shown(vector: tuple[float, ...]) -> tuple[float, ...]:
 @functools.lru_cache(maxsize=4096)
 def _shown_values(numbers: tuple[float, ...]) -> tuple[float, ...]:
     """The numbers that the properties hold where the ten numbers of `exact` are stored."""
-    shown = [*_as_shown(numbers[0:3]), *_as_shown(numbers[3:6]), *_as_shown(numbers[6:9]), numbers[9]]
+    rounded = [*_as_shown(numbers[0:3]), *_as_shown(numbers[3:6]), *_as_shown(numbers[6:9]), numbers[9]]
     with np.errstate(over="ignore"):
-        return tuple(np.array(shown, dtype=np.float32).tolist())
+        return tuple(np.array(rounded, dtype=np.float32).tolist())
 
 
 @functools.lru_cache(maxsize=4096)

@@ -177,8 +177,8 @@ def bound(camera_object: bpy.types.Object) -> set[tuple[str, int]]:
 
 def names(camera_object: bpy.types.Object) -> dict[str, str]:
     """The targets' names by the words for the point: {"look-at": "Empty"}."""
-    found = ((words, target_of(camera_object, point)) for point, words in POINTS.items())
-    return {words: target.name for words, target in found if target}
+    targets = ((words, target_of(camera_object, point)) for point, words in POINTS.items())
+    return {words: target.name for words, target in targets if target}
 
 
 def release(camera_object: bpy.types.Object, point: str) -> None:
@@ -223,8 +223,8 @@ def _missing(camera_object: bpy.types.Object, point: str, target: bpy.types.Obje
         return f"bone {bone!r}"
     if target.type == "MESH" and group:
         evaluated = target.evaluated_get(datablocks.depsgraph_of(datablocks.scene_of(camera_object)))
-        found = group_of(camera_object, point, evaluated)
-        if found is None or _middle(evaluated, found) is None:
+        present = group_of(camera_object, point, evaluated)
+        if present is None or _middle(evaluated, present) is None:
             return f"vertex in a group {group!r}"
     return None
 
@@ -299,11 +299,11 @@ def _shapers(block: bpy.types.Object) -> Iterator[bpy.types.Object]:
     """The objects that a mesh's shape depends on directly: the objects of its modifiers, and of the drivers of its shape
     keys."""
     for modifier in block.modifiers:
-        found = [getattr(modifier, each.identifier) for each in modifier.bl_rna.properties]
+        settings = [getattr(modifier, each.identifier) for each in modifier.bl_rna.properties]
         if modifier.type == "NODES" and modifier.node_group:
             items = modifier.node_group.interface.items_tree
-            found += (versions.modifier_input(modifier, each.identifier) for each in items if each.item_type == "SOCKET")
-        yield from (each for each in found if isinstance(each, bpy.types.Object))
+            settings += (versions.modifier_input(modifier, each.identifier) for each in items if each.item_type == "SOCKET")
+        yield from (each for each in settings if isinstance(each, bpy.types.Object))
     keys = block.data.shape_keys
     for curve in versions.drivers(keys) if keys else ():
         yield from _ids(curve)

@@ -50,7 +50,7 @@ from types import ModuleType
 import numpy as np
 
 from .. import checks, terminal
-from ..errors import InputError
+from ..errors import InputError, several
 from ..files import written_whole
 from ..pinhole import Pinhole
 from . import (
@@ -71,7 +71,6 @@ from . import (
     metashape,
     mitsuba,
     mujoco,
-    naming,
     nerfstudio_path,
     open3d,
     opencv,
@@ -186,8 +185,8 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
     with _told_of_damage(source, module.TITLE), np.errstate(all="ignore"):  # anything may stand in a file
         if format and not _recognises(module, source):
             raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
-        found = _of_all(source, module, options)
-        return leveled(found) if options.up_from == "cameras" else found
+        read_cameras = _of_all(source, module, options)
+        return leveled(read_cameras) if options.up_from == "cameras" else read_cameras
 
 
 def _of_all(source: Source, module: ModuleType, options: Options) -> list[Camera]:
@@ -201,7 +200,7 @@ def _of_all(source: Source, module: ModuleType, options: Options) -> list[Camera
     cameras = []
     for (name, _), part in zip(parts, sources, strict=True):
         if not module.recognises(part):
-            raise InputError(f"{source.name} names the camera {checks.shown(name)} and has no such camera: export it again")
+            raise InputError(f"{source.name} names the camera {checks.quoted(name)} and has no such camera: export it again")
         cameras += [replace(camera, name=name) for camera in _read(part, module, options)]
     return cameras
 
@@ -228,10 +227,10 @@ def _each_of_folder(source: Source, module: ModuleType, options: Options) -> lis
             others.append(path.name)
             continue
         with left_out.unless_pinhole(name):
-            found = _read(file, module, options)
-            cameras += [replace(camera, name=name if len(found) == 1 else f"{name} {camera.name}") for camera in found]
-    told = (f"Not read, since they are not {module.TITLE}: {naming.several(others)}",) if others else ()
-    return [camera.noted(*told) for camera in left_out.told(sorted(cameras, key=lambda camera: camera.name))]
+            members = _read(file, module, options)
+            cameras += [replace(camera, name=name if len(members) == 1 else f"{name} {camera.name}") for camera in members]
+    notes = (f"Not read, since they are not {module.TITLE}: {several(others)}",) if others else ()
+    return [camera.noted(*notes) for camera in left_out.with_notes(sorted(cameras, key=lambda camera: camera.name))]
 
 
 def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
@@ -247,9 +246,9 @@ def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
     notes = module.notes_in(source) if hasattr(module, "notes_in") else [source.text]
     cameras = _to_the_bit(cameras, [pinhole for text in notes for pinhole in own.pinholes_in(text)], module, options)
     world = module.in_world(source, options) if hasattr(module, "in_world") else options
-    told = _told_of_world(notes, world)
-    found = [_readable(_doubted(_unmirrored(moved(camera, world), options))) for camera in cameras]
-    return [camera.noted(*told) for camera in found] if told else found
+    noted = _told_of_world(notes, world)
+    result = [_readable(_doubted(_unmirrored(moved(camera, world), options))) for camera in cameras]
+    return [camera.noted(*noted) for camera in result] if noted else result
 
 
 @contextlib.contextmanager
@@ -258,7 +257,7 @@ def _told_of_damage(source: Source, title: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if (sentence := _shown(str(error))) == str(error):
+        if (sentence := _quoted(str(error))) == str(error):
             raise
         raise InputError(sentence) from error.__cause__
     except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
@@ -283,7 +282,7 @@ def recognised(source: str | Path | Source) -> str:
     if source.json_problem:
         raise InputError(f"{source.name} looks like JSON and is none ({source.json_problem}): correct it")
     if source.path is None:
-        place = checks.shown(source.text.strip()[:40])
+        place = checks.quoted(source.text.strip()[:40])
         raise InputError(
             f"the text is no camera that is understood, from its beginning {place} on: copy a whole camera, or write "
             "eye=1,2,3 look_at=0,0,0 up=0,0,1 d=1000"
@@ -335,7 +334,7 @@ def _module(name: str, does: str) -> ModuleType:
     able: Sequence[str] = readable() if does == "read" else writable()
     if name not in able:
         raise InputError(
-            f"the format {checks.shown(name)} can't be {'read' if does == 'read' else 'written'}: {', '.join(able)} can"
+            f"the format {checks.quoted(name)} can't be {'read' if does == 'read' else 'written'}: {', '.join(able)} can"
         )
     return FORMATS[name]
 
@@ -370,10 +369,10 @@ def _read_again(pinholes: list[Pinhole], writer: ModuleType, reader: ModuleType,
 
 def _told_of_world(notes: Iterable[str], options: Options) -> tuple[str, ...]:
     """A note where the file remembers that it was written with other axes or another scale than it is read with."""
-    said = next((found for text in notes if (found := _REMEMBERED.search(text[:10_000]))), None)
-    if said is None or said[1] == options.remembered.partition(": ")[2]:
+    remembered = next((match for text in notes if (match := _REMEMBERED.search(text[:10_000]))), None)
+    if remembered is None or remembered[1] == options.remembered.partition(": ")[2]:
         return ()
-    return (f"The file says that it was written with {said[1]}: choose the same to have the cameras back",)
+    return (f"The file says that it was written with {remembered[1]}: choose the same to have the cameras back",)
 
 
 def _doubted(camera: Camera) -> Camera:
@@ -390,11 +389,11 @@ def _readable(camera: Camera) -> Camera:
     texts = (camera.name, camera.image or "", *camera.notes)
     if all(text.isprintable() and len(text) <= _LONGEST for text in texts):
         return camera
-    image = camera.image if camera.image == _shown(camera.image or "") else None
-    return replace(camera, name=_shown(camera.name), image=image, notes=tuple(map(_shown, camera.notes)))
+    image = camera.image if camera.image == _quoted(camera.image or "") else None
+    return replace(camera, name=_quoted(camera.name), image=image, notes=tuple(map(_quoted, camera.notes)))
 
 
-def _shown(text: str) -> str:
+def _quoted(text: str) -> str:
     """The text on one line of characters that show, and not too long a one."""
     text = terminal.plain(text)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"

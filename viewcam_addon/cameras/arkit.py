@@ -109,8 +109,8 @@ def _record3d(source: Source, options: Options) -> list[Camera]:
         each = values.get("perFrameIntrinsicCoeffs")
         if not isinstance(each, list) or len(each) != len(poses):
             raise InputError(f"perFrameIntrinsicCoeffs of {source.name} should be four numbers for each pose: record it again")
-        of_poses = [Record({"perFrameIntrinsicCoeffs": one}, what) for one, what in zip(each, whats, strict=True)]
-        planes = [axes.view_plane(*one.numbers("perFrameIntrinsicCoeffs", 4), size) for one in of_poses]
+        of_poses = [Record({"perFrameIntrinsicCoeffs": row}, what) for row, what in zip(each, whats, strict=True)]
+        planes = [axes.view_plane(*coefficients.numbers("perFrameIntrinsicCoeffs", 4), size) for coefficients in of_poses]
     numbers = [Record({"pose": pose}, what).numbers("pose", 7) for pose, what in zip(poses, whats, strict=True)]
     x, y, z, w, *eyes = np.array(numbers).T
     turns = axes.rotations_of(np.stack([w, x, y, z], axis=-1), whats)

@@ -154,8 +154,8 @@ class _Code:
         places = self._assigned.get(path, [])
         if path not in self._numbers:
             self._numbers[path] = None  # while it is looked for
-            found = {value if isinstance(value := self._reader.value(place)[0], float) else None for place in places[:20]}
-            self._numbers[path] = found.pop() if len(found) == 1 and len(places) <= 20 else None
+            numbers = {value if isinstance(value := self._reader.value(place)[0], float) else None for place in places[:20]}
+            self._numbers[path] = numbers.pop() if len(numbers) == 1 and len(places) <= 20 else None
         return self._numbers[path]
 
     def values(self) -> dict[str, Any]:
@@ -184,25 +184,25 @@ class _Code:
 
     def _array(self, at: int) -> list | None:
         """The rows of an array that begins at a place, none if they are computed; None if there is no array."""
-        made = self._made(at, 0)
-        if made is None:
+        parsed = self._parsed(at, 0)
+        if parsed is None:
             return None
-        rows, end = made
+        rows, end = parsed
         after = tokens.token(self.text, end)
         is_computed = after.text in ("*", "/", "@", "+", "-") and "\n" not in self.text[end : after.start]
         is_part = after.text in JOINTS or (after.text in ("[", "(") and after.start == end)
         return [] if rows is None or is_computed or is_part else rows
 
-    def _made(self, at: int, depth: int) -> "tuple[list | None, int] | None":
+    def _parsed(self, at: int, depth: int) -> "tuple[list | None, int] | None":
         """The rows and where they end; rows None if they are computed; None if no array begins there."""
         first = tokens.token(self.text, at)
         if depth > 6:
             return None
         if first.text == "new":
-            return self._made(first.end, depth + 1)
+            return self._parsed(first.end, depth + 1)
         if first.kind == "name":
             return self._called(first)
-        if first.text == "(" and (inner := self._made(first.end, depth + 1)):
+        if first.text == "(" and (inner := self._parsed(first.end, depth + 1)):
             closed = tokens.token(self.text, inner[1])
             if closed.text == ")":
                 return self._changed(inner[0], closed.end)
@@ -229,7 +229,7 @@ class _Code:
             return None
         if after.text not in ("(", "{"):
             return None
-        inner = self._made(after.end, 1)
+        inner = self._parsed(after.end, 1)
         holds_array = inner is not None and tokens.token(self.text, after.end).kind != "number"
         close = _end_of(self.text, after.start)
         if self.text[close : close + 60].lstrip().startswith("<<"):  # cv::Mat_<double>(3, 3) << 1, 2, …
@@ -289,9 +289,9 @@ class _Code:
                 inner, at = self._bracket(next_.start, depth + 1)
                 values = [*values, inner] if inner is not None else None
             elif next_.text != ",":
-                if next_.kind == "name" and _MAKERS.fullmatch(next_.text) and (made := self._called(next_)):
-                    value: object = made[0]
-                    at = made[1]
+                if next_.kind == "name" and _MAKERS.fullmatch(next_.text) and (parsed := self._called(next_)):
+                    value: object = parsed[0]
+                    at = parsed[1]
                 else:
                     value, at = self._element(next_.start, close, has_commas)
                 if isinstance(value, str) or (next_.kind == "name" and tokens.token(self.text, next_.end).text == "="):

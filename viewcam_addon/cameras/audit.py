@@ -145,7 +145,7 @@ class Depths:
     def errors(self, views: Views) -> Array:
         """The error of each sample in each pair of pictures: by which part the two depths differ; ½ where the other picture
         lacks it."""
-        found = []
+        result = []
         for i, j in self.pairs:
             columns, rows, depth = self.samples[i]
             many = np.full(len(columns), i)
@@ -156,8 +156,8 @@ class Depths:
             there = _between(self.maps[j], places) * views.depth_scale
             with np.errstate(all="ignore"):
                 error = np.abs(np.log(there / z))
-            found.append(np.where((z > 0) & np.isfinite(error), np.minimum(error, 0.5), 0.5))
-        return np.concatenate(found) if found else np.zeros(0)
+            result.append(np.where((z > 0) & np.isfinite(error), np.minimum(error, 0.5), 0.5))
+        return np.concatenate(result) if result else np.zeros(0)
 
 
 def _between(depth: Array, places: Array) -> Array:
@@ -283,7 +283,7 @@ def _mistakes() -> list[Mistake]:
     fine = [
         Mistake(
             "half_pixel",
-            "the principal point is half a pixel too small: it counts from the first pixel's centre",
+            "the principal point is half a pixel too small: it counts from the first pixel's center",
             lambda v: replace(v, center=v.center + 0.5),
         ),
         Mistake(
@@ -415,9 +415,9 @@ def _mistakes() -> list[Mistake]:
         ),
     ]
     return fine + [
-        Mistake(kind, sentence.format(said), lambda v, undone=undone, factor=factor: undone(v, factor))
+        Mistake(kind, sentence.format(description), lambda v, undone=undone, factor=factor: undone(v, factor))
         for kind, sentence, factors, undone in by_factors
-        for said, factor in factors.items()
+        for description, factor in factors.items()
     ]
 
 
@@ -496,12 +496,12 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     usual = max(evidence.floor, min(_usual(each, evidence) for each in (as_is, *errors)))
     costs = np.array([_cost(each, usual) for each in (as_is, *errors)])
     best = int(np.argmin(costs))
-    found = (as_is, *errors)[best]
-    error, error_as_is = _usual(found, evidence), _usual(as_is, evidence)
+    errors_found = (as_is, *errors)[best]
+    error, error_as_is = _usual(errors_found, evidence), _usual(as_is, evidence)
     certainty = float(costs[0] - costs[best])
-    shown = {"error": error, "error_as_is": error_as_is, "certainty": certainty, "observations": len(as_is)}
+    measured = {"error": error, "error_as_is": error_as_is, "certainty": certainty, "observations": len(as_is)}
     sentence = f"something is wrong, in no way that is known: the evidence is off by {error_as_is:.3g} {evidence.unit}"
-    unknown = Verdict("unknown", sentence, **shown)
+    unknown = Verdict("unknown", sentence, **measured)
     if certainty < _SURE:
         if error_as_is <= evidence.plausible:
             sentence = f"nothing is wrong with the cameras: the evidence fits to {error_as_is:.2g} {evidence.unit}"
@@ -517,7 +517,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
                 turns = tuple(dict.fromkeys(mistake.kind for mistake in MISTAKES if mistake.of_world))
                 sentence += f"; depth maps do not show how the whole world is turned: {', '.join(turns)}"
                 possible += turns
-            return Verdict("none", sentence, possible, **shown | {"certainty": min(over)[0] if over else 0.0})
+            return Verdict("none", sentence, possible, **measured | {"certainty": min(over)[0] if over else 0.0})
         return unknown
     if error > evidence.plausible:
         return unknown
@@ -529,7 +529,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     sentence = f"{first.sentence} (undone, the evidence fits to {error:.2g} {evidence.unit} in place of {error_as_is:.3g})"
     if others:
         sentence += f"; the evidence can't tell it from: {', '.join(others)}"
-    return Verdict(first.kind, sentence, others, **shown)
+    return Verdict(first.kind, sentence, others, **measured)
 
 
 def _usual(errors: Array, evidence: "Tracks | Depths") -> float:

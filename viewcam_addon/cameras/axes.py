@@ -104,7 +104,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
     rows = matrix.tolist()
     if len(rows) == 4 and max(map(abs, map(float.__sub__, rows.pop(), (0.0, 0.0, 0.0, 1.0)))) > _NOTED:
         hint = "transpose it" if not any(row[3] for row in rows) else "it should be 0 0 0 1"
-        raise InputError(f"the last row of the matrix of {what} is {checks.shown(matrix[3].tolist())}: {hint}")
+        raise InputError(f"the last row of the matrix of {what} is {checks.quoted(matrix[3].tolist())}: {hint}")
     eye = checks.vector(f"the eye of {what}", [row[3] for row in rows], 3)
     away = math.hypot(*eye)
     if not away < _FARTHEST:
@@ -114,7 +114,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
     if mirrored:
         notes = (*notes, f"The axes of {what} are left-handed: the picture is mirrored")
     reach = 2.0 ** math.ceil(math.log2(max(1.0, away)))
-    made = Pinhole(
+    camera = Pinhole(
         eye=eye,
         look_at=tuple(a - reach * b for a, b in zip(eye, z, strict=True)),
         up=y,
@@ -124,7 +124,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
         principal_point=plane.principal_point,
         mirrored=mirrored,
     )
-    return made, notes
+    return camera, notes
 
 
 def pinholes(matrices: np.ndarray, planes: Sequence[ViewPlane], whats: Sequence[str]) -> list[tuple[Pinhole, tuple[str, ...]]]:
@@ -141,9 +141,9 @@ def pinholes(matrices: np.ndarray, planes: Sequence[ViewPlane], whats: Sequence[
         fine &= (np.cross(x, y) * z).sum(axis=-1) > 0
         at = np.flatnonzero(fine & (_lengths(eye) < 1e150))
         reach = 2.0 ** np.ceil(np.log2(np.maximum(1.0, _lengths(eye[at]))))
-    made = Pinhole.of_poses(eye[at], eye[at] - reach[:, None] * z[at], y[at], [planes[i] for i in at.tolist()])
-    found = dict(zip(at.tolist(), ((each, ()) for each in made), strict=True))
-    return [found.get(i) or pinhole(matrices[i], planes[i], whats[i]) for i in range(len(matrices))]
+    cameras = Pinhole.of_poses(eye[at], eye[at] - reach[:, None] * z[at], y[at], [planes[i] for i in at.tolist()])
+    placed = dict(zip(at.tolist(), ((each, ()) for each in cameras), strict=True))
+    return [placed.get(i) or pinhole(matrices[i], planes[i], whats[i]) for i in range(len(matrices))]
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:
@@ -313,8 +313,8 @@ def leveled(cameras: Sequence[Camera]) -> list[Camera]:
     if z > 0 or (x, y) != (0, 0):  # about up × z, by the angle between them: 1 + K + K² / (1 + cos)
         cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
         rows = np.identity(3) + cross + cross @ cross * (1 / (1 + z) if z > 0 else (1 - z) / (x * x + y * y))
-    told = f"The world was turned by {math.degrees(math.atan2(math.hypot(x, y), z)):.4g}°: the mean of the cameras' up is z"
-    return [_in_world(camera, lambda p: tuple((rows @ p).tolist()), 1.0).noted(told) for camera in cameras]
+    note = f"The world was turned by {math.degrees(math.atan2(math.hypot(x, y), z)):.4g}°: the mean of the cameras' up is z"
+    return [_in_world(camera, lambda p: tuple((rows @ p).tolist()), 1.0).noted(note) for camera in cameras]
 
 
 def _in_world(camera: Camera, turn: Callable[[Triple], Triple] | None, scale: float) -> Camera:

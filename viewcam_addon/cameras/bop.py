@@ -21,7 +21,7 @@ SUFFIX = ".json"
 FILE = "scene_camera.json"
 
 _FOLDERS = ("rgb", "gray")
-_UNITS = "BOP counts in millimetres: a scale of 0.001 makes them metres"
+_UNITS = "BOP counts in millimeters: a scale of 0.001 makes them meters"
 
 
 def recognises(source: Source) -> bool:
@@ -57,14 +57,14 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
     for number, camera in enumerate(cameras):
         (f_x, _, c_x), (_, f_y, c_y), _ = axes.intrinsics(camera.pinhole)
         rows = axes.world_to_camera(camera.pinhole)[:3]
-        said = {
+        document = {
             "cam_K": [f_x, 0.0, c_x - half, 0.0, f_y, c_y - half, 0.0, 0.0, 1.0],
             "cam_R_w2c": [part for row in rows for part in row[:3]],
             "cam_t_w2c": [row[3] for row in rows],
             "depth_scale": 1.0,
             own.KEY: own.document(camera.pinhole),
         }
-        lines.append(f' "{number}": {json.dumps(said)}')
+        lines.append(f' "{number}": {json.dumps(document)}')
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 

@@ -56,8 +56,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     lost = len(blocks) - len(placed)
     if lost and not placed:
         raise InputError(f"none of the {lost} cameras of {source.name} was placed: let Bundler place them first")
-    told = (f"{lost} cameras that were not placed were left out",) if lost else ()
-    return [camera.noted(*told) for camera in cameras]
+    lost_note = (f"{lost} cameras that were not placed were left out",) if lost else ()
+    return [camera.noted(*lost_note) for camera in cameras]
 
 
 def _lens(

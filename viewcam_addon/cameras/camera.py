@@ -16,8 +16,8 @@ AXES = {
     "y_down": "Y down in the file, as COLMAP's worlds often have it, Z up here: (x, y, z) there is (x, z, −y) here",
 }
 PIXELS = {
-    "corner": "(0, 0) is the picture's corner and the first pixel's centre is (0.5, 0.5)",
-    "center": "(0, 0) is the centre of the first pixel",
+    "corner": "(0, 0) is the picture's corner and the first pixel's center is (0.5, 0.5)",
+    "center": "(0, 0) is the center of the first pixel",
 }
 POSES = {
     "w2c_opencv": "World to camera, x right, y down, z into the view: OpenCV, COLMAP",
@@ -151,18 +151,18 @@ def choose(cameras: list[Camera], name: str | None = None) -> Camera:
     InputError
         if there are several and none is named, or none is called so; it has their names.
     """
-    names = ", ".join(checks.shown(camera.name) for camera in cameras[:_NAMED]) + (" …" if len(cameras) > _NAMED else "")
-    found = [camera for camera in cameras if name is None or camera.name == name]
-    if len(found) == 1:
-        return found[0]
-    if not found:
+    names = ", ".join(checks.quoted(camera.name) for camera in cameras[:_NAMED]) + (" …" if len(cameras) > _NAMED else "")
+    chosen = [camera for camera in cameras if name is None or camera.name == name]
+    if len(chosen) == 1:
+        return chosen[0]
+    if not chosen:
         for left_out, sentence in (each for camera in cameras[:1] for each in camera.left_out):
             if left_out == name:
                 raise InputError(sentence)
-        raise InputError(f"there is no camera {checks.shown(name)}: name one of {names}")
+        raise InputError(f"there is no camera {checks.quoted(name)}: name one of {names}")
     if name is None:
-        raise InputError(f"there are {len(found)} cameras and one is wanted: name one of {names}")
-    raise InputError(f"{len(found)} cameras are called {checks.shown(name)}: rename all but one")
+        raise InputError(f"there are {len(chosen)} cameras and one is wanted: name one of {names}")
+    raise InputError(f"{len(chosen)} cameras are called {checks.quoted(name)}: rename all but one")
 
 
 class NoPinholeError(InputError):
@@ -192,7 +192,7 @@ class LeftOut:
         except self._kind as error:
             self._sentences.setdefault(name, str(error))
 
-    def told(self, cameras: Sequence[Camera]) -> list[Camera]:
+    def with_notes(self, cameras: Sequence[Camera]) -> list[Camera]:
         """The cameras, which know and tell those that were left out.
 
         Raises
@@ -206,7 +206,7 @@ class LeftOut:
             raise self._kind(next(iter(self._sentences.values())))
         names_by_sentence: dict[str, list[str]] = {}
         for name, sentence in self._sentences.items():
-            names_by_sentence.setdefault(sentence, []).append(checks.shown(name))
+            names_by_sentence.setdefault(sentence, []).append(checks.quoted(name))
         notes = [
             f"Left out: {', '.join(names[:_NAMED])}{' …' if len(names) > _NAMED else ''}, since {sentence}"
             for sentence, names in names_by_sentence.items()
@@ -217,4 +217,4 @@ class LeftOut:
 
 def _choice(name: str, value: object, among: dict[str, str]) -> None:
     if not isinstance(value, str) or value not in among:
-        raise InputError(f"{name} is {checks.shown(value)}: give one of {', '.join(among)}")
+        raise InputError(f"{name} is {checks.quoted(value)}: give one of {', '.join(among)}")

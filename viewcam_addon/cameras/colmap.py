@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import checks
-from ..errors import InputError
+from ..errors import InputError, several
 from ..pinhole import Pinhole, ViewPlane
 from . import axes, distortion, naming, own
 from .axes import intrinsics, quaternion, world_to_camera
@@ -92,13 +92,14 @@ class _Image(NamedTuple):
 class Tracks(NamedTuple):
     """Points in world space, and where pictures show them.
 
-    positions : (n, 3). colours : (n, 3), 0 … 255. shown : of each picture the numbers of the points that it shows, (m,) from 0,
-    and their places, (m, 2): x to the right and y down from the picture's corner.
+    positions : (n, 3). colours : (n, 3), 0 … 255.
+    observations : of each picture the numbers of the points that it shows, (m,) from 0, and their places, (m, 2): x to the
+        right and y down from the picture's corner.
     """
 
     positions: np.ndarray
     colours: np.ndarray
-    shown: Sequence[tuple[np.ndarray, np.ndarray]]
+    observations: Sequence[tuple[np.ndarray, np.ndarray]]
 
 
 def recognises(source: Source) -> bool:
@@ -112,13 +113,15 @@ def read(source: Source, options: Options) -> list[Camera]:
         intrinsic, images = _binary_cameras(files[0]), [*_binary_images(files[1])]
     else:
         intrinsic, images = _text_cameras(files[0]), [*_text_images(files[1])]
-    told = suffix == ".bin" and _files(source, folder, ".txt")
-    notes = ("The folder has the model as text, too: the binary one counts",) if told else ()
+    has_texts = suffix == ".bin" and _files(source, folder, ".txt")
+    notes = ("The folder has the model as text, too: the binary one counts",) if has_texts else ()
     planes: dict[int, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}
     left_out, taken = LeftOut(), []
     for image, name in zip(images, naming.distinct([image.name for image in images]), strict=True):
         if image.camera not in intrinsic:
-            raise InputError(f"{source.name}: image {checks.shown(image.name)} is of camera {image.camera}, which is not there")
+            raise InputError(
+                f"{source.name}: image {checks.quoted(image.name)} is of camera {image.camera}, which is not there"
+            )
         with left_out.unless_pinhole(name):
             if image.camera not in planes:
                 planes[image.camera] = _plane(intrinsic[image.camera], f"camera {image.camera}", options)
@@ -128,11 +131,11 @@ def read(source: Source, options: Options) -> list[Camera]:
         Camera(name, pinhole, True, (*notes, *planes[image.camera][2], *more), image.name, lens=planes[image.camera][1])
         for (image, name), (pinhole, more) in zip(taken, poses, strict=True)
     ]
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def _poses(images: Sequence[_Image], planes: dict) -> list[tuple[Pinhole, tuple[str, ...]]]:
-    whats = [f"image {checks.shown(image.name)}" for image in images]
+    whats = [f"image {checks.quoted(image.name)}" for image in images]
     numbers = [
         checks.vector(f"the pose of {what}", (*image.quaternion, *image.translation), 7)
         for image, what in zip(images, whats, strict=True)
@@ -169,8 +172,8 @@ def model(source: Source) -> tuple[tuple[str, ...], str] | None:
 
 def _files(source: Source, folder: Sequence[str], suffix: str) -> list[Source]:
     """The files of cameras and images; none if one is not there."""
-    found = [source.file(*folder, f"{name}{suffix}") for name in _FILES]
-    return found if all(found) else []
+    paths = [source.file(*folder, f"{name}{suffix}") for name in _FILES]
+    return paths if all(paths) else []
 
 
 def _plane(intrinsic: _Intrinsics, what: str, options: Options) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
@@ -219,18 +222,18 @@ def _lines(source: Source) -> list[str]:
 
 
 def _text_cameras(source: Source) -> dict[int, _Intrinsics]:
-    found = {}
+    result = {}
     for number, line in enumerate(_lines(source), start=1):
         if not (words := line.split()) or words[0].startswith("#"):
             continue
         place = f"line {number} of {source.name}"
         if len(words) < 5 or not words[0].isdecimal():
-            raise InputError(f"{place} is {checks.shown(line)}: it should be CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
+            raise InputError(f"{place} is {checks.quoted(line)}: it should be CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
         if words[1] not in MODELS:
-            raise InputError(f"{place}: the camera model {checks.shown(words[1])} is unknown: convert it to PINHOLE")
+            raise InputError(f"{place}: the camera model {checks.quoted(words[1])} is unknown: convert it to PINHOLE")
         size = (pixels(f"{what} of {place}", word) for what, word in zip(("width", "height"), words[2:4], strict=True))
-        found[_id(words[0], place)] = _Intrinsics(words[1], *size, flat(f"parameters of {place}", words[4:]))
-    return found
+        result[_id(words[0], place)] = _Intrinsics(words[1], *size, flat(f"parameters of {place}", words[4:]))
+    return result
 
 
 def _text_images(source: Source) -> Iterator[_Image]:
@@ -241,7 +244,7 @@ def _text_images(source: Source) -> Iterator[_Image]:
             continue
         place = f"line {number} of {source.name}"
         if len(words) < 10 or not words[0].isdecimal():
-            raise InputError(f"{place} is {checks.shown(line)}: it should be IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")
+            raise InputError(f"{place} is {checks.quoted(line)}: it should be IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")
         pose = flat(f"the pose in {place}", words[1:8])
         yield _Image(
             _id(words[0], place), re.split(r"\s+", line.strip(), maxsplit=9)[9], pose[:4], pose[4:], _id(words[8], place)
@@ -256,7 +259,7 @@ def _text_images(source: Source) -> Iterator[_Image]:
 
 def _id(word: str, place: str) -> int:
     if not word.isdecimal() or len(word) > 20:
-        raise InputError(f"{place} has {checks.shown(word)} where a number of a camera or image should be: correct it")
+        raise InputError(f"{place} has {checks.quoted(word)} where a number of a camera or image should be: correct it")
     return int(word)
 
 
@@ -268,11 +271,11 @@ class _Reader:
 
     def numbers(self, form: str) -> tuple:
         try:
-            found = struct.unpack_from(f"<{form}", self._source.data, self._at)
+            numbers = struct.unpack_from(f"<{form}", self._source.data, self._at)
         except struct.error:
             self._ended()
         self._at += struct.calcsize(f"<{form}")
-        return found
+        return numbers
 
     def skip(self, count: int) -> None:
         self._at += count
@@ -283,9 +286,9 @@ class _Reader:
         end = self._source.data.find(b"\0", self._at)
         if end < 0:
             self._ended()
-        found = self._source.data[self._at : end].decode("utf-8", errors="replace")
+        text_bytes = self._source.data[self._at : end].decode("utf-8", errors="replace")
         self._at = end + 1
-        return found
+        return text_bytes
 
     def _ended(self):
         raise InputError(f"{self._source.name} ends in the middle, or is no COLMAP file: copy it again")
@@ -293,15 +296,15 @@ class _Reader:
 
 def _binary_cameras(source: Source) -> dict[int, _Intrinsics]:
     names = {number: name for name, (number, _) in MODELS.items()}
-    reader, found = _Reader(source), {}
+    reader, result = _Reader(source), {}
     for _ in range(reader.numbers("Q")[0]):
         number, model, width, height = reader.numbers("IiQQ")
         if model not in names:
             raise InputError(f"camera {number} of {source.name} is of the unknown model {model}: convert it to PINHOLE")
         size = (pixels(f"{side} of camera {number}", value) for side, value in (("width", width), ("height", height)))
         name = names[model]
-        found[number] = _Intrinsics(name, *size, reader.numbers(f"{len(MODELS[name][1])}d"))
-    return found
+        result[number] = _Intrinsics(name, *size, reader.numbers(f"{len(MODELS[name][1])}d"))
+    return result
 
 
 def _binary_images(source: Source) -> Iterator[_Image]:
@@ -322,7 +325,7 @@ def check_names(files: Iterable[str]) -> None:
     """Raise InputError if a picture's name holds a space, of any width, since some readers part there, too."""
     parted = [file for file in files if any(map(str.isspace, file))]
     if parted:
-        raise InputError(f"a COLMAP model can't name a picture with a space, as {naming.several(parted)}: rename it")
+        raise InputError(f"a COLMAP model can't name a picture with a space, as {several(parted)}: rename it")
 
 
 def texts(cameras: Iterable[Camera], tracks: Tracks | None = None) -> dict[str, str]:
@@ -359,23 +362,23 @@ def _points(tracks: Tracks | None, images: int) -> tuple[list[str], str]:
         return images * [""], ""
     shown_in: list[list[str]] = [[] for _ in tracks.positions]
     lines = []
-    for image, (points, places) in enumerate(tracks.shown, start=1):
-        found = list(zip(points.tolist(), places.tolist(), strict=True))
-        lines.append(" ".join(f"{_spaced(*place)} {point + 1}" for point, place in found))
-        for index, (point, _) in enumerate(found):
+    for image, (points, places) in enumerate(tracks.observations, start=1):
+        observed = list(zip(points.tolist(), places.tolist(), strict=True))
+        lines.append(" ".join(f"{_spaced(*place)} {point + 1}" for point, place in observed))
+        for index, (point, _) in enumerate(observed):
             shown_in[point].append(f"{image} {index}")
-    told = zip(tracks.positions.tolist(), tracks.colours.tolist(), shown_in, strict=True)
+    rows = zip(tracks.positions.tolist(), tracks.colours.tolist(), shown_in, strict=True)
     return lines, "".join(
         f"{number} {_spaced(*position)} {_spaced(*colour)} 0.0 {' '.join(track)}\n"
-        for number, (position, colour, track) in enumerate(told, start=1)
+        for number, (position, colour, track) in enumerate(rows, start=1)
     )
 
 
 def points_without_tracks(source: Source) -> str:
     """The lines of points3D.txt of a model's points, for pictures in which they are elsewhere; empty where there are none."""
-    if (found := model(source)) is None:
+    if (sparse_model := model(source)) is None:
         return ""
-    folder, suffix = found
+    folder, suffix = sparse_model
     file = source.file(*folder, f"points3D{suffix}")
     if file is None:
         return ""

@@ -126,19 +126,20 @@ class Lens:
 
     def _inverse_polynomial(self, points: np.ndarray) -> np.ndarray:
         """The inverse by Newton's method, from the points themselves; NaN without one, or with one beyond the lens's fold."""
-        found, size = points.copy(), 1 + np.abs(points).max(axis=-1)
+        inverse, size = points.copy(), 1 + np.abs(points).max(axis=-1)
         for _ in range(_STEPS):
-            off = self._polynomial(found) - points
+            off = self._polynomial(inverse) - points
             along_x, along_y = (
-                (self._polynomial(found + step) - self._polynomial(found - step)) / (2 * _STEP) for step in _STEP * np.eye(2)
+                (self._polynomial(inverse + step) - self._polynomial(inverse - step)) / (2 * _STEP)
+                for step in _STEP * np.eye(2)
             )
             turned = _cross(along_x, along_y)
             step = np.stack([_cross(off, along_y), _cross(along_x, off)], axis=-1) / turned[..., None]
-            found = found - step
+            inverse = inverse - step
             if not (np.abs(step).max(axis=-1) > _SAME * size).any():
                 break
-        is_right = (np.abs(self._polynomial(found) - points).max(axis=-1) < _INVERSE * size) & (turned > 0)
-        return np.where(is_right[..., None], found, np.nan)
+        is_right = (np.abs(self._polynomial(inverse) - points).max(axis=-1) < _INVERSE * size) & (turned > 0)
+        return np.where(is_right[..., None], inverse, np.nan)
 
 
 PROJECTIONS = ("pinhole", "equidistant", "fov", "division", "eucm")
@@ -207,10 +208,10 @@ def settle(lens: Lens, plane: ViewPlane, what: str, left_out: bool) -> tuple[Len
     if lens.projection == "pinhole" and not any(value for _, value in lens.terms):
         return None, ()
     pixels = displacement(lens, plane)
-    said = f"The lens distortion of {what} ({_listed(lens)})"
+    sentence = f"The lens distortion of {what} ({_listed(lens)})"
     if left_out or pixels < _UNSEEN:
-        return None, (f"{said} was left out: it {_moves(pixels)}",)
-    return lens, (f"{said} {_moves(pixels)}: the camera is the pinhole of the undistorted picture",)
+        return None, (f"{sentence} was left out: it {_moves(pixels)}",)
+    return lens, (f"{sentence} {_moves(pixels)}: the camera is the pinhole of the undistorted picture",)
 
 
 def refuse(lens: Lens | None, plane: ViewPlane, what: str, place: str) -> None:

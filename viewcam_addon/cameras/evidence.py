@@ -45,11 +45,11 @@ def tracks(path: Path, cameras: Sequence[Camera]) -> Tracks | None:
     numbers = {camera.image or camera.name: number for number, camera in enumerate(cameras)}
     short = {PurePosixPath(name).name: number for name, number in numbers.items()}
     which, seen, ids = [], [], []
-    for name, found in _binary_tracks(where / "images.bin") if binary else _text_tracks(where / "images.txt"):
+    for name, observations in _binary_tracks(where / "images.bin") if binary else _text_tracks(where / "images.txt"):
         number = numbers.get(name, short.get(PurePosixPath(name).name))
         if number is None:
             continue
-        for x, y, point in found:
+        for x, y, point in observations:
             if point in places:
                 which.append(number)
                 seen.append((x, y))
@@ -66,7 +66,7 @@ def _text_points(path: Path) -> Iterator[tuple[int, tuple[float, float, float]]]
             try:
                 yield int(words[0]), checks.vector("a point", [float(word) for word in words[1:4]], 3)
             except ValueError:
-                raise InputError(f"line {number} of {path} is {checks.shown(line)}: it should be POINT3D_ID X Y Z …") from None
+                raise InputError(f"line {number} of {path} is {checks.quoted(line)}: it should be POINT3D_ID X Y Z …") from None
 
 
 def _text_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, int]]]]:
@@ -80,7 +80,7 @@ def _text_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, int
             yield name, [(float(x), float(y), int(p)) for x, y, p in zip(words[::3], words[1::3], words[2::3], strict=True)]
         except (ValueError, IndexError):
             raise InputError(
-                f"{path} has a line {checks.shown(head)}: each image has two lines, the second X Y POINT3D_ID"
+                f"{path} has a line {checks.quoted(head)}: each image has two lines, the second X Y POINT3D_ID"
             ) from None
 
 
@@ -107,9 +107,9 @@ def _binary_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, i
             (many,) = struct.unpack_from("<Q", data, end + 1)
             if many > len(data) // 24:
                 raise struct.error
-            found = [struct.unpack_from("<2dQ", data, end + 9 + 24 * i) for i in range(many)]
+            observations = [struct.unpack_from("<2dQ", data, end + 9 + 24 * i) for i in range(many)]
             at = end + 9 + 24 * many
-            yield name, [each for each in found if each[2] != _NO_POINT]
+            yield name, [each for each in observations if each[2] != _NO_POINT]
     except (struct.error, ValueError, OverflowError):
         raise InputError(f"{path} ends too early: copy it again") from None
 
@@ -127,19 +127,19 @@ def depths(path: Path, cameras: Sequence[Camera]) -> Depths | None:
     if key is None:
         return None
     scale = Record(document, source.name).number("depth_unit_scale_factor", 0.001, 1e-12, 1e12)
-    said = "depth_unit_scale_factor" in document
+    has_scale = "depth_unit_scale_factor" in document
     maps = []
     for number, frame in enumerate(frames):
         file = source.path.parent / Record(frame, f"frame {number}").text(key)
-        maps.append(_depth(file, scale, said))
+        maps.append(_depth(file, scale, has_scale))
     return Depths(maps)
 
 
-def _depth(path: Path, scale: float, said: bool) -> np.ndarray:
+def _depth(path: Path, scale: float, has_scale: bool) -> np.ndarray:
     try:
         data = read_bytes(path)
         if path.suffix == ".npy":
-            depth, scale = npy.read(data), scale if said else 1.0
+            depth, scale = npy.read(data), scale if has_scale else 1.0
         else:
             depth = _pixels(data, path)
     except (OSError, ValueError) as error:

@@ -40,7 +40,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     nodes = document.records("nodes", "node") if "nodes" in document else []
     worlds = _Worlds(nodes)
     moving = _moving(document)
-    left_out, found = LeftOut(InputError), []
+    left_out, result = LeftOut(InputError), []
     for index, node in enumerate(nodes):
         if "camera" not in node:
             continue
@@ -49,11 +49,11 @@ def read(source: Source, options: Options) -> list[Camera]:
             (text for text in (node.get("name"), camera.get("name")) if isinstance(text, str) and text), f"node {index}"
         )
         with left_out.unless_pinhole(name):
-            found.append(_camera(name, camera, worlds.of(index), options))
+            result.append(_camera(name, camera, worlds.of(index), options))
             if moving & {index, *worlds.above(index)}:
-                found[-1] = found[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
-    names = naming.distinct([camera.name for camera in found])
-    return left_out.told([_renamed(camera, name) for camera, name in zip(found, names, strict=True)])
+                result[-1] = result[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
+    names = naming.distinct([camera.name for camera in result])
+    return left_out.with_notes([_renamed(camera, name) for camera, name in zip(result, names, strict=True)])
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
@@ -103,7 +103,7 @@ class _Worlds:
             for child in _list(node.get("children")):
                 if not isinstance(child, int) or not 0 <= child < len(nodes) or child in self._parents:
                     raise InputError(
-                        f"{node.place} has the child {checks.shown(child)}, which is none or another's: correct it"
+                        f"{node.place} has the child {checks.quoted(child)}, which is none or another's: correct it"
                     )
                 self._parents[child] = index
 
@@ -139,7 +139,7 @@ def _local(node: Record) -> np.ndarray:
 def _index(node: Record, key: str, count: int) -> int:
     index = node.get(key)
     if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < count:
-        raise InputError(f"{node.called(key)} is {checks.shown(index)}: the file has {count} of them")
+        raise InputError(f"{node.called(key)} is {checks.quoted(index)}: the file has {count} of them")
     return index
 
 
@@ -149,8 +149,8 @@ def _moving(document: Record) -> set[int]:
     moving = {"nodes": {node for target in targets if isinstance(node := _key(target, "node"), int)}, "cameras": set()}
     for target in targets:
         pointer = _key(_key(_key(target, "extensions"), "KHR_animation_pointer"), "pointer")
-        if isinstance(pointer, str) and (found := re.match(r"/(nodes|cameras)/(\d{1,9})/", pointer)):
-            moving[found[1]].add(int(found[2]))
+        if isinstance(pointer, str) and (match := re.match(r"/(nodes|cameras)/(\d{1,9})/", pointer)):
+            moving[match[1]].add(int(match[2]))
     through = ((number, _key(node, "camera")) for number, node in enumerate(_list(document.get("nodes"))))
     return moving["nodes"] | {number for number, camera in through if isinstance(camera, int) and camera in moving["cameras"]}
 
@@ -164,9 +164,9 @@ def _key(value: object, key: str) -> object:
 
 
 def _camera(name: str, camera: Record, matrix: np.ndarray, options: Options) -> Camera:
-    what = f"camera {checks.shown(name)}"
+    what = f"camera {checks.quoted(name)}"
     if camera.get("type") != "perspective":
-        not_a_pinhole(what, f"{checks.shown(camera.get('type'))}")
+        not_a_pinhole(what, f"{checks.quoted(camera.get('type'))}")
     lens = camera.record("perspective")
     angle = lens.number("yfov", least=1e-9)
     if angle >= math.pi:
@@ -193,8 +193,8 @@ def _camera(name: str, camera: Record, matrix: np.ndarray, options: Options) -> 
 def _size(camera: Record, what: str, options: Options) -> tuple[tuple[int, int], bool]:
     extras = camera.get("extras")
     if isinstance(extras, dict) and {"width", "height"} <= extras.keys():
-        said = Record(extras, what)
-        return (said.size("width"), said.size("height")), True
+        stated_size = Record(extras, what)
+        return (stated_size.size("width"), stated_size.size("height")), True
     return options.size_or_refuse(what), False
 
 
@@ -218,7 +218,7 @@ def _perspective(camera: Camera) -> dict:
     pinhole = camera.pinhole
     width, height = pinhole.width, pinhole.height
     if pinhole.principal_point != (width / 2, height / 2):
-        raise InputError(f"glTF can't say that a camera is shifted, as {checks.shown(camera.name)} is: choose another format")
+        raise InputError(f"glTF can't say that a camera is shifted, as {checks.quoted(camera.name)} is: choose another format")
     d_x, d_y = pinhole.distance
     lens = {
         "yfov": 2 * math.atan2(height / 2, d_y),

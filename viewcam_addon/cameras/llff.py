@@ -60,7 +60,7 @@ def _images(source: Source, count: int) -> list[str]:
     folder = source.path if source.is_folder else source.path.parent if source.path else None
     for name in _FOLDERS if folder else ():
         if (folder / name).is_dir():
-            found = sorted(each.name for each in (folder / name).iterdir() if naming.has_suffix(each.name))
-            if len(found) == count:
-                return [f"{name}/{each}" for each in found]
+            names = sorted(each.name for each in (folder / name).iterdir() if naming.has_suffix(each.name))
+            if len(names) == count:
+                return [f"{name}/{each}" for each in names]
     return []

@@ -140,7 +140,7 @@ _LENSES = {"ThinLens", "FishEye", "Fisheye", "Spherical", "Stereo", "StereoCamer
 
 
 @dataclass
-class _Said:
+class _Scene:
     """The statements of a text: role → (value, place), and the events whose order counts."""
 
     values: dict[str, tuple[object, int]] = field(default_factory=dict)
@@ -407,11 +407,11 @@ class _Code:
             return None
         self._following.add(last)
         try:
-            found = [self._at(place) for place in self.assigned[last]]
+            values = [self._at(place) for place in self.assigned[last]]
         finally:
             self._following.discard(last)
         # What is known once and computed elsewhere is not known.
-        value = found[0] if not any(map(_is_unknown, found)) and all(each == found[0] for each in found) else None
+        value = values[0] if not any(map(_is_unknown, values)) and all(each == values[0] for each in values) else None
         if not self._following:
             self._values[last] = value
         return value
@@ -426,11 +426,11 @@ class _Code:
 
     # ---- what it says
 
-    def said(self) -> _Said:
+    def scene(self) -> _Scene:
         if len(self.statements) > _MOST_STATEMENTS:
             raise InputError(f"the text says more than {_MOST_STATEMENTS} things of cameras: copy one camera")
         is_potree = bool(_OF_POTREE.search(self.text))
-        said = _Said(three=is_potree or bool(re.search(r"\b(?:THREE|PerspectiveCamera)\b", self.text)), is_z_up=is_potree)
+        scene = _Scene(three=is_potree or bool(re.search(r"\b(?:THREE|PerspectiveCamera)\b", self.text)), is_z_up=is_potree)
         for at in self._all(*_LENSES):
             if self._words[at + 1] == "*" or self._words[at - 1] == "new":
                 not_a_pinhole("the text's camera", f"a {self._words[at]}")
@@ -445,10 +445,10 @@ class _Code:
                 continue
             if self._role(parts[:-1], sign) in _VECTORS:
                 texts.fail(self.text, start, "this is one coordinate, write the whole vector where it is set")
-        if said.three and (turning := self._made_new(_OTHER_CONTROLS)) is not None:
+        if scene.three and (turning := self._made_new(_OTHER_CONTROLS)) is not None:
             texts.fail(self.text, self._places[turning], "these turn the camera by themselves, write where it looks then")
-        if said.three and (turning := self._made_new(_CONTROLS)) is not None:
-            said.controls = self._words[turning]
+        if scene.three and (turning := self._made_new(_CONTROLS)) is not None:
+            scene.controls = self._words[turning]
         if (moved := self._view_moved()) is not None:
             texts.fail(self.text, moved, "this moves the view by other means, write eye, look-at and up")
         parts_of: dict[str, dict[str, float]] = {}
@@ -460,9 +460,9 @@ class _Code:
                 moved_before = start if name in _GL_MOVES else None
             elif role == "look_at" and moved_before is not None and texts.plain(parts[-1]) == "glulookat":
                 texts.fail(self.text, moved_before, "this moves the view by other means, write eye, look-at and up")
-            elif sign == "(" and texts.plain(parts[-1]) == "resetcamera" and said.moved:
+            elif sign == "(" and texts.plain(parts[-1]) == "resetcamera" and scene.moved:
                 texts.fail(self.text, start, "this moves the camera until all is seen, write where it is then")
-            elif said.three and self._adds_camera(parts, sign, at):
+            elif scene.three and self._adds_camera(parts, sign, at):
                 texts.fail(self.text, start, "the camera is part of this, which may move it, write where it is in the scene")
             if role is None or (sign == ":" and role in ("width", "height", "size")):
                 continue
@@ -475,54 +475,54 @@ class _Code:
             elif role == "moves":
                 continue
             elif role == "look_at":
-                if said.three and len(parts) > 1 and not self._is_camera(parts[:-1]):
+                if scene.three and len(parts) > 1 and not self._is_camera(parts[:-1]):
                     continue  # a mesh's or a lamp's
-                self._look_at(said, parts, at - 1, start)
+                self._look_at(scene, parts, at - 1, start)
             elif role == "perspective":
-                self._perspective(said, parts, at - 1, start)
+                self._perspective(scene, parts, at - 1, start)
             elif role == "set_view":
-                self._of_potree(said, at - 1, start)
+                self._of_potree(scene, at - 1, start)
             elif role in _PYTORCH3D:
-                self._of_pytorch3d(said, role, at - 1, start)
+                self._of_pytorch3d(scene, role, at - 1, start)
             elif role == "computeviewmatrixfromyawpitchroll":
-                self._of_pybullet(said, at - 1, start)
+                self._of_pybullet(scene, at - 1, start)
             elif role == "getcameraimage":
                 values, named, _ = self.reader.arguments(at - 1)
                 self._set(
-                    said, "size", tuple((*values[:2], *(named[key] for key in ("width", "height") if key in named))), start
+                    scene, "size", tuple((*values[:2], *(named[key] for key in ("width", "height") if key in named))), start
                 )
             elif role == "frustum":
                 values, _, _ = self.reader.arguments(at - 1)
-                said.frustum = numbers(tuple(values[:6]), 6) if len(values) >= 6 else None
-                if said.frustum is None:
+                scene.frustum = numbers(tuple(values[:6]), 6) if len(values) >= 6 else None
+                if scene.frustum is None:
                     texts.fail(self.text, start, "give six plain numbers for the frustum")
             elif role == "setviewoffset":
                 values, _, _ = self.reader.arguments(at - 1)
-                self._set(said, "view_offset", numbers(tuple(values), 6) or Unknown(start), start)
+                self._set(scene, "view_offset", numbers(tuple(values), 6) or Unknown(start), start)
             elif role == "clearviewoffset":
-                said.values.pop("view_offset", None)
+                scene.values.pop("view_offset", None)
             elif role == "orthographic":
-                said.orthographic = start
+                scene.orthographic = start
             elif role == "camera_position":
-                self._camera_position(said, at, start)
+                self._camera_position(scene, at, start)
             elif role[:-1] in ("position_", "up_"):
                 value = self.reader.value(at)[0]
                 if not isinstance(value, float):
                     texts.fail(self.text, at, "this is computed from what the text does not say, write the number")
-                said.moved.append(start)
+                scene.moved.append(start)
                 before = parts_of.setdefault(role[:-2], {}).setdefault(role[-1], value)
                 if value != before:
                     texts.fail(self.text, at, f"this is {before:g} elsewhere in the text, copy one camera")
             else:
-                self._plain(said, role, parts, sign, at, start)
-        for name, given in parts_of.items():
+                self._plain(scene, role, parts, sign, at, start)
+        for name, stated in parts_of.items():
             role = {"position": "eye", "up": "up"}[name]
             usual = (0.0, 0.0, 0.0) if role == "eye" else (0.0, 1.0, 0.0)
-            now = said.values.get(role, (usual, 0))[0]
+            now = scene.values.get(role, (usual, 0))[0]
             if not isinstance(now, tuple):
                 continue  # computed before: refused where it is needed
-            said.values[role] = (tuple(given.get(axis, old) for axis, old in zip("xyz", now, strict=True)), 0)
-        return said
+            scene.values[role] = (tuple(stated.get(axis, old) for axis, old in zip("xyz", now, strict=True)), 0)
+        return scene
 
     def _adds_camera(self, parts: list[str], sign: str, at: int) -> bool:
         """True if the statement makes a camera part of something else than the scene."""
@@ -531,15 +531,15 @@ class _Code:
         added = re.match(r"\s*([\w$.]+)\s*[,)]", self.text[at : at + 200])
         return bool(added) and self._is_camera(added[1].split("."))
 
-    def _set(self, said: _Said, role: str, value: object, at: int) -> None:
-        before = said.values.get(role)
+    def _set(self, scene: _Scene, role: str, value: object, at: int) -> None:
+        before = scene.values.get(role)
         if before and before[0] != value and not _is_unknown(value) and not _is_unknown(before[0]):
             line = self.text.count("\n", 0, before[1]) + 1
             texts.fail(self.text, at, f"{role} is something else in line {line}, copy one camera")
         if before is None or _is_unknown(value):  # of what is known once and computed once nobody knows which counts
-            said.values[role] = (value, at)
+            scene.values[role] = (value, at)
 
-    def _plain(self, said: _Said, role: str, parts: list[str], sign: str, at: int, start: int) -> None:
+    def _plain(self, scene: _Scene, role: str, parts: list[str], sign: str, at: int, start: int) -> None:
         if sign in "({":
             values, named, _ = self.reader.arguments(at - 1)
             value: object = values[0] if len(values) == 1 else tuple(values)
@@ -549,22 +549,22 @@ class _Code:
             value = self.reader.value(at)[0]
         if role in _VECTORS:
             value = _only(value)
-            found = numbers(value, 3)
-            if found is None and sign in "({" and _looks_declared(self.text, at - 1):
+            vector = numbers(value, 3)
+            if vector is None and sign in "({" and _looks_declared(self.text, at - 1):
                 return
-            if found is None:
+            if vector is None:
                 parts_unknown = [part for part in value if isinstance(part, Unknown)] if isinstance(value, tuple) else [value]
                 value = next((part for part in parts_unknown if isinstance(part, Unknown)), Unknown(start))
             else:
-                value = found
-            if role == "eye" or (role == "up" and said.three):
-                said.moved.append(start)
-        self._set(said, role, value, start)
+                value = vector
+            if role == "eye" or (role == "up" and scene.three):
+                scene.moved.append(start)
+        self._set(scene, role, value, start)
 
-    def _look_at(self, said: _Said, parts: list[str], opened: int, start: int) -> None:
+    def _look_at(self, scene: _Scene, parts: list[str], opened: int, start: int) -> None:
         values, named, _ = self.reader.arguments(opened)
         if texts.plain(parts[-1]).endswith("lh"):
-            said.mirrored = True
+            scene.mirrored = True
         if named:
             roles = {key: _SPECIFIC.get(texts.plain(key)) for key in named}
             spelt = {own._spelt(roles[key] or key): value for key, value in named.items()}
@@ -573,7 +573,7 @@ class _Code:
         if (nine := numbers(flat[-9:], 9)) and len(flat) in (9, 10):
             values = [nine[:3], nine[3:6], nine[6:]]
         if len(values) == 3 and numbers(flat, 3) and not named:
-            said.aimed.append((start, numbers(flat, 3)))
+            scene.aimed.append((start, numbers(flat, 3)))
             return
         if len(values) == 1:
             point = numbers(values[0], 3)
@@ -581,7 +581,7 @@ class _Code:
                 if _looks_declared(self.text, opened):
                     return
                 texts.fail(self.text, getattr(values[0], "at", 0) or start, "give plain numbers for the point that it looks at")
-            said.aimed.append((start, point))
+            scene.aimed.append((start, point))
             return
         if not values:
             return
@@ -591,37 +591,37 @@ class _Code:
                 return
             texts.fail(self.text, start, "give eye, target and up as plain numbers")
         for role, vector in zip(("eye", "target", "up"), vectors, strict=True):
-            self._set(said, role, vector, start)
+            self._set(scene, role, vector, start)
 
-    def _of_potree(self, said: _Said, opened: int, start: int) -> None:
+    def _of_potree(self, scene: _Scene, opened: int, start: int) -> None:
         """setView(position, target, how long it takes there, what is done then)."""
         values = self.reader.arguments(opened)[0]
         vectors = [numbers(value, 3) for value in values[:2]]
         if len(vectors) < 2 or None in vectors:
             texts.fail(self.text, start, "give position and target as plain numbers")
-        said.moved.append(start)
+        scene.moved.append(start)
         for role, vector in zip(("eye", "target"), vectors, strict=True):
-            self._set(said, role, vector, start)
+            self._set(scene, role, vector, start)
 
-    def _of_pybullet(self, said: _Said, opened: int, start: int) -> None:
+    def _of_pybullet(self, scene: _Scene, opened: int, start: int) -> None:
         """A point of view on a sphere about the target: degrees, whose roll, which also moves the eye, must be 0."""
         values, named, _ = self.reader.arguments(opened)
-        given = (
+        arguments = (
             dict(zip(("cameraTargetPosition", "distance", "yaw", "pitch", "roll", "upAxisIndex"), values, strict=False)) | named
         )
-        target = numbers(given.get("cameraTargetPosition"), 3)
-        rest = numbers(tuple(given.get(name, 0.0) for name in ("distance", "yaw", "pitch", "roll", "upAxisIndex")), 5)
+        target = numbers(arguments.get("cameraTargetPosition"), 3)
+        rest = numbers(tuple(arguments.get(name, 0.0) for name in ("distance", "yaw", "pitch", "roll", "upAxisIndex")), 5)
         if target is None or rest is None or rest[3] or rest[4] not in (1.0, 2.0):
             texts.fail(self.text, start, "give plain numbers and no roll, or write computeViewMatrix with eye, target and up")
         distance, yaw, pitch, _, axis = rest
         around, sideways = texts.turn(yaw, np.eye(3)[int(axis)]), texts.turn(pitch if axis == 2 else -pitch, np.eye(3)[0])
         offset = around @ sideways @ (-distance * np.eye(3)[1 if axis == 2 else 2])
-        said.moved.append(start)
-        self._set(said, "eye", tuple((np.array(target) + offset).tolist()), start)
-        self._set(said, "target", target, start)
-        self._set(said, "up", tuple((around @ sideways @ np.eye(3)[int(axis)]).tolist()), start)
+        scene.moved.append(start)
+        self._set(scene, "eye", tuple((np.array(target) + offset).tolist()), start)
+        self._set(scene, "target", target, start)
+        self._set(scene, "up", tuple((around @ sideways @ np.eye(3)[int(axis)]).tolist()), start)
 
-    def _of_pytorch3d(self, said: _Said, role: str, opened: int, start: int) -> None:
+    def _of_pytorch3d(self, scene: _Scene, role: str, opened: int, start: int) -> None:
         values, named, _ = self.reader.arguments(opened)
         if role == "perspectivecameras":
             texts.fail(self.text, start, "write FoVPerspectiveCameras with the fov that this focal length makes")
@@ -629,18 +629,18 @@ class _Code:
             if "degrees" in named or named.get("aspect_ratio", 1.0) != 1.0:
                 texts.fail(self.text, start, "give fov in degrees and leave degrees and aspect_ratio out")
             angle = named.get("fov", values[2] if len(values) > 2 else 60.0)
-            self._set(said, "fov_of_shorter", Degrees(angle) if isinstance(angle, float) else Unknown(start), start)
+            self._set(scene, "fov_of_shorter", Degrees(angle) if isinstance(angle, float) else Unknown(start), start)
             return
         names = ("dist", "elev", "azim", "degrees", "eye", "at", "up")
-        given = dict(zip(names, values, strict=False)) | named
+        by_name = dict(zip(names, values, strict=False)) | named
         eye, at, up = (
-            numbers(_only(given.get(name, usual)), 3) for name, usual in zip(names[4:], _PYTORCH3D_LOOK, strict=True)
+            numbers(_only(by_name.get(name, usual)), 3) for name, usual in zip(names[4:], _PYTORCH3D_LOOK, strict=True)
         )
-        if "eye" not in given:
+        if "eye" not in by_name:
             spherical = numbers(
-                tuple(_only(given.get(name, usual)) for name, usual in zip(names, (1.0, 0.0, 0.0), strict=False)), 3
+                tuple(_only(by_name.get(name, usual)) for name, usual in zip(names, (1.0, 0.0, 0.0), strict=False)), 3
             )
-            if spherical is None or "degrees" in given or at is None:
+            if spherical is None or "degrees" in by_name or at is None:
                 texts.fail(self.text, start, "give dist, elev and azim as plain numbers in degrees, or eye, at and up")
             distance, elevation, azimuth = spherical[0], math.radians(spherical[1]), math.radians(spherical[2])
             around = distance * math.cos(elevation)
@@ -648,34 +648,34 @@ class _Code:
             eye = tuple(a + b for a, b in zip(at, offset, strict=True))
         if None in (eye, at, up):
             texts.fail(self.text, start, "give eye, at and up as plain numbers")
-        said.moved.append(start)
+        scene.moved.append(start)
         for name, vector in zip(("eye", "target", "up"), (eye, at, up), strict=True):
-            self._set(said, name, vector, start)
-        said.is_height_first = True
+            self._set(scene, name, vector, start)
+        scene.is_height_first = True
 
-    def _camera_position(self, said: _Said, at: int, start: int) -> None:
+    def _camera_position(self, scene: _Scene, at: int, start: int) -> None:
         value = self.reader.value(at)[0]
-        if one := numbers(value, 3):
-            said.moved.append(start)
-            return self._set(said, "eye", one, start)
+        if single := numbers(value, 3):
+            scene.moved.append(start)
+            return self._set(scene, "eye", single, start)
         vectors = [numbers(part, 3) for part in value] if isinstance(value, tuple) and len(value) == 3 else [None]
         if None in vectors:
             texts.fail(self.text, start, "give position, focal point and up as three numbers each")
-        said.moved.append(start)
+        scene.moved.append(start)
         for role, vector in zip(("eye", "target", "up"), vectors, strict=True):
-            self._set(said, role, vector, start)
+            self._set(scene, role, vector, start)
 
-    def _perspective(self, said: _Said, parts: list[str], opened: int, start: int) -> None:
+    def _perspective(self, scene: _Scene, parts: list[str], opened: int, start: int) -> None:
         values, named, _ = self.reader.arguments(opened)
         name = texts.plain(parts[-1])
         family = texts.plain("".join(parts))
         if name.endswith("lh") and not any(self._role(other, sign) == "look_at" for other, sign, _, _ in self.statements):
-            said.mirrored = True
+            scene.mirrored = True
         if values and isinstance(values[0], Unknown) and len(values) >= 5:  # the matrix that gl-matrix and D3DX fill
             values = values[1:]
         if not values and not named:
             if name == "perspectivecamera":
-                self._set(said, "fov_y", Degrees(50.0), start)
+                self._set(scene, "fov_y", Degrees(50.0), start)
             return
         angle = named.get("fov", named.get("fovy", values[0] if values else None))
         if isinstance(angle, float) and not isinstance(angle, Radians | Degrees):
@@ -683,13 +683,13 @@ class _Code:
                 angle = Degrees(angle)
             elif angle < math.pi and ("glm" in family or "mat4" in family or name.startswith(("xm", "d3dx", "create"))):
                 angle = Radians(angle)
-        self._set(said, "fov_y", angle if angle is not None else Unknown(start), start)
+        self._set(scene, "fov_y", angle if angle is not None else Unknown(start), start)
         if name == "perspectivefov" and len(values) >= 3:
-            self._set(said, "size", (values[1], values[2]), start)
+            self._set(scene, "size", (values[1], values[2]), start)
         elif len(values) > 1 or "aspect" in named:
             aspect = named.get("aspect", values[1] if len(values) > 1 else None)
             if isinstance(aspect, float):
-                self._set(said, "aspect_of_lens", aspect, start)
+                self._set(scene, "aspect_of_lens", aspect, start)
 
 
 def _only(value: object) -> object:
@@ -717,9 +717,9 @@ def _looks_declared(text: str, opened: int) -> bool:
 
 def read(source: Source, options: Options) -> list[Camera]:
     code = _code(source.text)
-    said = code.said()
-    values, text = said.values, code.text
-    if said.orthographic is not None and not {"fov", "fov_x", "fov_y"} & values.keys() and said.frustum is None:
+    scene = code.scene()
+    values, text = scene.values, code.text
+    if scene.orthographic is not None and not {"fov", "fov_x", "fov_y"} & values.keys() and scene.frustum is None:
         not_a_pinhole("the text's camera", "orthographic")
     if _plain_number(values, "parallel", 0.0, text):
         not_a_pinhole("the text's camera", "in parallel projection")
@@ -727,10 +727,10 @@ def read(source: Source, options: Options) -> list[Camera]:
         texts.fail(text, values["blur"][1], "this lens blurs and is no pinhole, set it to 0 for its middle")
     if _plain_number(values, "roll", 0.0, text):
         texts.fail(text, values["roll"][1], "which way a roll turns differs between books, write the up that it makes")
-    eye, look_at, up, notes = _pose(said, text, options)
-    plane, stated, more = _plane(said, text, options)
+    eye, look_at, up, notes = _pose(scene, text, options)
+    plane, stated, more = _plane(scene, text, options)
     singular_is_fine = "view_distance" in values
-    pinhole = texts.posed(eye, look_at, up, plane, said.mirrored, singular_is_fine)
+    pinhole = texts.posed(eye, look_at, up, plane, scene.mirrored, singular_is_fine)
     camera = Camera("Camera", pinhole, stated, (*notes, *more))
     return [texts.mirroring(camera, "The text's camera")]
 
@@ -755,32 +755,32 @@ def _plain_number(values: dict, role: str, usual: float, text: str) -> float:
     return float(value)
 
 
-def _pose(said: _Said, text: str, options: Options) -> tuple:
+def _pose(scene: _Scene, text: str, options: Options) -> tuple:
     """eye, look_at, up and notes."""
-    values, base = said.values, options.base
+    values, base = scene.values, options.base
     notes: tuple[str, ...] = ()
-    found = {role: _known(values, role, text, f"write {role} in plain numbers") for role in _VECTORS}
-    eye, target, up, direction = (found[role] for role in ("eye", "target", "up", "direction"))
-    if said.three and eye is None:
+    vectors = {role: _known(values, role, text, f"write {role} in plain numbers") for role in _VECTORS}
+    eye, target, up, direction = (vectors[role] for role in ("eye", "target", "up", "direction"))
+    if scene.three and eye is None:
         eye = (0.0, 0.0, 0.0)
-    if said.controls:
+    if scene.controls:
         known = _known(values, "target_of_controls", text, "write the target in plain numbers") or (0.0, 0.0, 0.0)
         if (target := numbers(known, 3)) is None:
             texts.fail(text, values["target_of_controls"][1], "write the target in plain numbers")
-        notes = (f"{said.controls} turn the camera to their target, {target}",)
-    if target is None and (aims := {point for _, point in said.aimed}):
+        notes = (f"{scene.controls} turn the camera to their target, {target}",)
+    if target is None and (aims := {point for _, point in scene.aimed}):
         if len(aims) > 1:
-            texts.fail(text, said.aimed[1][0], "it looks at several points, copy one camera")
-        target = said.aimed[0][1]
-        if said.moved and said.moved[-1] > said.aimed[-1][0]:
+            texts.fail(text, scene.aimed[1][0], "it looks at several points, copy one camera")
+        target = scene.aimed[0][1]
+        if scene.moved and scene.moved[-1] > scene.aimed[-1][0]:
             texts.fail(
                 text,
-                said.moved[-1],
+                scene.moved[-1],
                 "the camera changes after it was turned to look at a point, set position and up before lookAt",
             )
     if target is None and "target_of_controls" in values:
         target = numbers(_known(values, "target_of_controls", text, "write the target in plain numbers"), 3)
-    if target is None and said.three and direction is None:
+    if target is None and scene.three and direction is None:
         if "OrbitControls" in text:
             target, notes = (0.0, 0.0, 0.0), ("OrbitControls turn the camera to the origin",)
         else:
@@ -793,8 +793,8 @@ def _pose(said: _Said, text: str, options: Options) -> tuple:
                 f"the text does not say the camera's {'position' if name == 'eye' else 'target'} in plain numbers: write it"
             )
     if up is None:
-        if said.three or re.search(r"vtk|SetViewAngle|SetFocalPoint|pinhole|set_view_distance", text, re.IGNORECASE):
-            up = (0.0, 0.0, 1.0) if said.is_z_up else (0.0, 1.0, 0.0)
+        if scene.three or re.search(r"vtk|SetViewAngle|SetFocalPoint|pinhole|set_view_distance", text, re.IGNORECASE):
+            up = (0.0, 0.0, 1.0) if scene.is_z_up else (0.0, 1.0, 0.0)
         elif base:
             up, notes = base.up, (*notes, "The text does not say which way is up: that of the camera before was taken")
         else:
@@ -802,20 +802,20 @@ def _pose(said: _Said, text: str, options: Options) -> tuple:
     return eye, target, up, notes
 
 
-def _plane(said: _Said, text: str, options: Options) -> tuple:
+def _plane(scene: _Scene, text: str, options: Options) -> tuple:
     """The view plane, whether its size is stated, and notes."""
-    values = said.values
+    values = scene.values
     what = "the text"
     aspect = next((v for role in ("aspect_of_lens", "aspect") if isinstance(v := values.get(role, (None, 0))[0], float)), None)
     if aspect is not None and not 1e-4 < aspect < 1e4:
         raise InputError(f"the picture's aspect is {aspect:g}: give its width over its height")
     size = _size(values, aspect)
-    if said.is_height_first and isinstance(values.get("size", (None,))[0], float):
+    if scene.is_height_first and isinstance(values.get("size", (None,))[0], float):
         size = _size(values | {"size": ((values["size"][0],) * 2, values["size"][1])}, aspect)
-    elif said.is_height_first and size:
+    elif scene.is_height_first and size:
         size = (size[1], size[0])
-    if said.frustum:
-        left, right, bottom, top, near, _ = said.frustum
+    if scene.frustum:
+        left, right, bottom, top, near, _ = scene.frustum
         if not (left != right and bottom != top and near > 0):
             raise InputError("the frustum is empty: give left, right, bottom, top, near and far")
         film = texts.film(options, what, size, abs((right - left) / (top - bottom)))
@@ -834,9 +834,9 @@ def _plane(said: _Said, text: str, options: Options) -> tuple:
         )
         if s <= 0 or zoom <= 0:
             raise InputError(f"pixel size and zoom are {s:g} and {zoom:g}: give positive ones")
-        return film.centred(d * zoom / s), film.is_stated, film.notes
+        return film.centered(d * zoom / s), film.is_stated, film.notes
     said_angles = [role for role in ("fov_of_shorter", "fov_y", "fov_x", "view_angle", "fov") if role in values]
-    if _plain_number(values, "zoom", 1.0, text) != 1 and not (said.three and said_angles):
+    if _plain_number(values, "zoom", 1.0, text) != 1 and not (scene.three and said_angles):
         texts.fail(text, values["zoom"][1], "what this zooms differs between programs, write the field of view that it makes")
     if not said_angles:
         if _OF_VTK.search(text):
@@ -862,7 +862,7 @@ def _plane(said: _Said, text: str, options: Options) -> tuple:
         value = value if isinstance(value, Radians) else Degrees(value)
         axis = "x" if _plain_number(values, "use_horizontal", 0.0, text) else "y"
     if role == "fov":
-        if said.three:
+        if scene.three:
             value, axis = Degrees(value), "y"
         elif "Cesium" in text or "frustum.fov" in text:
             value, axis = Radians(value), "larger"
@@ -878,40 +878,40 @@ def _plane(said: _Said, text: str, options: Options) -> tuple:
     )
     if not 0 < radians < math.pi:
         raise InputError(f"the field of view is {math.degrees(radians):g}°: give an angle between 0 and 180")
-    if said.three and (zoom := _plain_number(values, "zoom", 1.0, text)) != 1 and zoom > 0:
+    if scene.three and (zoom := _plain_number(values, "zoom", 1.0, text)) != 1 and zoom > 0:
         radians = 2 * math.atan(math.tan(radians / 2) / zoom)
     if "view_offset" in values:
-        return _part_of_picture(said, text, options, size, radians)
+        return _part_of_picture(scene, text, options, size, radians)
     film = texts.film(options, what, size, aspect)
     plane = film.plane(radians, axis, name)
     if not film.is_stated and aspect and axis == "x":
         half = math.tan(radians / 2)
-        plane = film.centred(film.height * aspect / 2 / half / film.pixel_aspect)
+        plane = film.centered(film.height * aspect / 2 / half / film.pixel_aspect)
     if size and "aspect_of_lens" in values and aspect and abs(film.aspect / aspect - 1) * film.width > 1:
         d_y = plane.distance[1]
         plane = axes.view_plane(d_y * film.aspect / aspect, d_y, film.width / 2, film.height / 2, size)
     if "window_center" in values:
-        shift = numbers(_known(values, "window_center", text, "write the window's centre in numbers"), 2)
+        shift = numbers(_known(values, "window_center", text, "write the window's center in numbers"), 2)
         if shift is None:
-            texts.fail(text, values["window_center"][1], "write the window's centre in numbers")
+            texts.fail(text, values["window_center"][1], "write the window's center in numbers")
         c_x, c_top = (1 - shift[0]) / 2 * film.width, (1 + shift[1]) / 2 * film.height
         plane = axes.view_plane(*plane.distance, c_x, c_top, (film.width, film.height))
     return plane, film.is_stated, film.notes
 
 
 def _part_of_picture(
-    said: _Said, text: str, options: Options, size: tuple[int, int] | None, fov_y: float
+    scene: _Scene, text: str, options: Options, size: tuple[int, int] | None, fov_y: float
 ) -> tuple[ViewPlane, bool, tuple[str, ...]]:
     """The view plane of three.js' setViewOffset(fullWidth, fullHeight, x, y, width, height), x and y from the top left.
 
     size : of the picture that shows this part; by default its own. fov_y : radians, of the full picture. As of `_plane`.
     """
-    place = said.values["view_offset"][1]
-    part = _known(said.values, "view_offset", text, "give six plain numbers: fullWidth, fullHeight, x, y, width, height")
+    place = scene.values["view_offset"][1]
+    part = _known(scene.values, "view_offset", text, "give six plain numbers: fullWidth, fullHeight, x, y, width, height")
     full_width, full_height, left, top, width, height = map(float, part)
     if not min(full_width, full_height, width, height) > 0:
         texts.fail(text, place, "this is an empty part of a picture, give widths and heights above 0")
-    later = said.values.get("aspect", (None, 0))
+    later = scene.values.get("aspect", (None, 0))
     if isinstance(later[0], float) and later[1] > place and abs(later[0] * full_height / full_width - 1) > 1e-6:
         texts.fail(text, later[1], "setViewOffset has set another aspect before, leave this out")
     is_whole = width.is_integer() and height.is_integer() and max(width, height) < 2**31
@@ -926,8 +926,8 @@ def _part_of_picture(
 def _size(values: dict, aspect: float | None) -> tuple[int, int] | None:
     both = values.get("size", (None, 0))[0]
     width, height = (values.get(role, (None, 0))[0] for role in ("width", "height"))
-    if isinstance(both, tuple) and (found := numbers(both, 2)):
-        width, height = found
+    if isinstance(both, tuple) and (pair := numbers(both, 2)):
+        width, height = pair
     if isinstance(width, float) and aspect and not isinstance(height, float):
         height = float(max(1, int(width / aspect)))
     if all(isinstance(x, float) and x.is_integer() and 1 <= x < 2**31 for x in (width, height)):

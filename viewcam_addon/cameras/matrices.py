@@ -57,10 +57,10 @@ _ROUNDED = 1e-4  # what digits leave of a zero, relative to the largest number
 
 
 def recognises(source: Source) -> bool:
-    return not source.is_binary and bool(_found(source.text))
+    return not source.is_binary and bool(_matrices_in(source.text))
 
 
-def _found(text: str) -> list[tuple[str, list[float], int]]:
+def _matrices_in(text: str) -> list[tuple[str, list[float], int]]:
     """Each matrix: view, projection or both; sixteen numbers; its place."""
     result = []
     for name in _NAMES.finditer(text[: 2**20]):
@@ -77,52 +77,52 @@ def _sixteen(text: str, at: int) -> list[float] | None:
     numbers: list[float] = []
     rows = 0
     while len(numbers) < 16:
-        found = _NUMBER.match(text, at)
-        if not found:
+        match = _NUMBER.match(text, at)
+        if not match:
             rows += 1
             skipped = _ROW.match(text, at) if rows <= 4 else None
             if not skipped:
                 return None
             at = skipped.end()
             continue
-        numbers.append(float(found[1]))
-        at = found.end()
+        numbers.append(float(match[1]))
+        at = match.end()
     return None if _NUMBER.match(text, at) and re.match(r"[ \t,]*[-+.\d]", text[at : at + 40]) else numbers
 
 
 def read(source: Source, options: Options) -> list[Camera]:
     text = source.text
-    given = _found(text)
-    if len(given) > _MOST:
+    texts_found = _matrices_in(text)
+    if len(texts_found) > _MOST:
         raise InputError(f"there are more than {_MOST} matrices: copy one camera's view and projection")
-    found: dict[str, np.ndarray] = {}
+    result: dict[str, np.ndarray] = {}
     like_rows: bool | None = None  # where a view does not tell the order, it is the projection's
-    for role, numbers, at in sorted(given, key=lambda matrix: matrix[0] == "view"):
+    for role, numbers, at in sorted(texts_found, key=lambda matrix: matrix[0] == "view"):
         as_written = np.array(numbers).reshape(4, 4)
         matrix = _in_rows(role, as_written, text, at, like_rows)
         if role == "projection":
             like_rows = np.array_equal(matrix, as_written)
-        if role in found and not np.array_equal(found[role], matrix):
+        if role in result and not np.array_equal(result[role], matrix):
             texts.fail(text, at, f"there is another {role} matrix before, copy one camera")
-        found[role] = matrix
+        result[role] = matrix
     size = _SIZE.search(text)
-    whole = found.get("both")
-    if whole is None and "projection" in found and "view" in found:
-        whole = found["projection"] @ found["view"]
-    if whole is None and "projection" in found:
+    whole = result.get("both")
+    if whole is None and "projection" in result and "view" in result:
+        whole = result["projection"] @ result["view"]
+    if whole is None and "projection" in result:
         raise InputError("there is a projection matrix and no view matrix: copy both")
     if whole is None:
-        return [_posed(found["view"], options)]
+        return [_posed(result["view"], options)]
     shape = (
-        abs(found["projection"][1, 1] / found["projection"][0, 0])
-        if "projection" in found and found["projection"][0, 0]
+        abs(result["projection"][1, 1] / result["projection"][0, 0])
+        if "projection" in result and result["projection"][0, 0]
         else None
     )
     film = texts.film(options, "the projection", (int(size[1]), int(size[2])) if size else None, shape)
     notes = film.notes
     exact = film.width if film.is_stated or not shape else film.height * shape / film.pixel_aspect
     rows = whole[[0, 1, 3]]
-    if "projection" in found and found["projection"][1, 1] < 0:
+    if "projection" in result and result["projection"][1, 1] < 0:
         rows[1] = -rows[1]
         notes = (*notes, "The projection's y points down, as Vulkan's: taken as such")
     to_pixels = np.array([[exact / 2, 0, film.width / 2], [0, -film.height / 2, film.height / 2], [0, 0, 1]]) @ rows

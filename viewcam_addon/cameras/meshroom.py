@@ -49,7 +49,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         raise InputError(
             f"none of the {len(views)} views of {source.name} has a pose: let Meshroom run StructureFromMotion first"
         )
-    told = (f"{len(views) - len(placed)} views without a pose were left out",) if len(placed) < len(views) else ()
+    lost_note = (f"{len(views) - len(placed)} views without a pose were left out",) if len(placed) < len(views) else ()
     paths = [str(view.get("path") or f"view {view.get('viewId')}") for view in placed]
     planes: dict[str, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}
     left_out, cameras = LeftOut(), []
@@ -61,7 +61,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             plane, lens, notes = planes[intrinsic]
             if "rigId" in view and str(view.get("isPoseIndependant")).lower() in ("false", "0"):
                 raise InputError(
-                    f"view {checks.shown(name)} is of a rig, on whose pose its cameras stand: give each a pose of its own"
+                    f"view {checks.quoted(name)} is of a rig, on whose pose its cameras stand: give each a pose of its own"
                 )
             pose = poses[str(view.get("poseId"))].record("pose").record("transform")
             matrix = np.eye(4)
@@ -69,9 +69,9 @@ def read(source: Source, options: Options) -> list[Camera]:
                 3, 3
             )  # column by column is its transpose, row by row
             matrix[:3, 3] = pose.numbers("center", 3)
-            pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
-            cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), path, lens=lens))
-    return left_out.told(cameras)
+            pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.quoted(name)}")
+            cameras.append(Camera(name, pinhole, True, (*lost_note, *notes, *more), path, lens=lens))
+    return left_out.with_notes(cameras)
 
 
 def _key(record: Record, key: str) -> str:
@@ -88,7 +88,7 @@ def _plane(
 ) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
     kind = str(intrinsic.get("type") or "pinhole")
     if kind not in _PINHOLES:
-        not_a_pinhole(intrinsic.place, f"of the type {checks.shown(kind)}")
+        not_a_pinhole(intrinsic.place, f"of the type {checks.quoted(kind)}")
     width, height = intrinsic.size("width"), intrinsic.size("height")
     ratio = intrinsic.number("pixelRatio", 1.0, 1e-6)
     if "pxFocalLength" in intrinsic:
@@ -113,22 +113,22 @@ def _plane(
     notes: tuple[str, ...] = ()
     if height > width and "pxFocalLength" not in intrinsic:
         notes = (f"{intrinsic.place} is of upright pictures: its focal length was taken for that of the sensor's width",)
-    lens, told = _of_lens(intrinsic, kind, plane, options)
-    return plane, lens, notes + told
+    lens, note = _of_lens(intrinsic, kind, plane, options)
+    return plane, lens, notes + note
 
 
 def _of_lens(
     intrinsic: Record, kind: str, plane: ViewPlane, options: Options
 ) -> tuple[distortion.Lens | None, tuple[str, ...]]:
-    given = intrinsic.values.get("distortionParams") or []
-    numbers = intrinsic.numbers("distortionParams", len(given)) if isinstance(given, list) and given else ()
+    parameters = intrinsic.values.get("distortionParams") or []
+    numbers = intrinsic.numbers("distortionParams", len(parameters)) if isinstance(parameters, list) and parameters else ()
     if not any(numbers):
         return None, ()
     model = str(intrinsic.get("distortionType") or kind)
     if model not in _LENSES:
-        said = f"{intrinsic.place} has lens distortion of the unknown model {checks.shown(model)}"
+        reason = f"{intrinsic.place} has lens distortion of the unknown model {checks.quoted(model)}"
         if options.without_distortion:
-            return None, (f"{said}, which was left out",)
-        raise NoPinholeError(f"{said}, which no pinhole has: undistort the pictures, or choose to take it without distortion")
+            return None, (f"{reason}, which was left out",)
+        raise NoPinholeError(f"{reason}, which no pinhole has: undistort the pictures, or choose to take it without distortion")
     values = dict(zip(_LENSES[model], numbers, strict=False))
     return distortion.settle(distortion.opencv(values), plane, intrinsic.place, options.without_distortion)

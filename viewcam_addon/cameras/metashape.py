@@ -36,7 +36,7 @@ def recognises(source: Source) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    left_out, found, lost = LeftOut(), [], 0
+    left_out, result, lost = LeftOut(), [], 0
     for chunk in source.xml.iter("chunk"):
         whole = _placed(chunk.find("transform"), "the chunk")
         components = {  # in the world, as the chunk's own transform repeats of the active one
@@ -49,14 +49,14 @@ def read(source: Source, options: Options) -> list[Camera]:
         cameras = {camera.get("id"): camera for camera in chunk.iter("camera")}
         for camera in chunk.iter("camera"):
             label = camera.get("label") or f"camera {camera.get('id')}"
-            what = f"camera {checks.shown(label)}"
+            what = f"camera {checks.quoted(label)}"
             master = cameras.get(camera.get("master_id")) if _transform(camera) is None else None
             if (own := _transform(camera if master is None else master)) is None:
                 lost += 1
                 continue
             sensor = camera.get("sensor_id")
             if sensor not in sensors:
-                raise InputError(f"{what} is of the sensor {checks.shown(sensor)}, which is not there: export the XML again")
+                raise InputError(f"{what} is of the sensor {checks.quoted(sensor)}, which is not there: export the XML again")
             with left_out.unless_pinhole(naming.stem(label)):
                 if sensor not in planes:
                     planes[sensor] = _plane(sensors[sensor], options)
@@ -66,19 +66,21 @@ def read(source: Source, options: Options) -> list[Camera]:
                     raise InputError(f"the transform of {what} has {len(numbers)} numbers: it should have 16")
                 belongs = camera.get("component_id")
                 if components and belongs is not None and belongs not in components:
-                    raise InputError(f"component {checks.shown(belongs)}, of which {what} is, has no transform: align it first")
+                    raise InputError(
+                        f"component {checks.quoted(belongs)}, of which {what} is, has no transform: align it first"
+                    )
                 matrix = components.get(belongs, whole) @ np.array(numbers).reshape(4, 4)
                 if master is not None:
                     matrix = matrix @ _on_rig(sensors[sensor], what)
-                    notes = (*notes, f"{what} is of a rig: it was placed on its master {checks.shown(master.get('label'))}")
+                    notes = (*notes, f"{what} is of a rig: it was placed on its master {checks.quoted(master.get('label'))}")
                 pinhole, more = axes.pinhole(_without_scale(axes.of_opencv(matrix)), plane, what)
                 image = label if naming.has_suffix(label) else None
-                found.append(Camera(naming.stem(label), pinhole, True, (*notes, *more), image, lens=lens))
-    found = left_out.told(found)
-    if lost and not found:
+                result.append(Camera(naming.stem(label), pinhole, True, (*notes, *more), image, lens=lens))
+    result = left_out.with_notes(result)
+    if lost and not result:
         raise InputError(f"none of the {lost} cameras of {source.name} is aligned: align them in Metashape first")
-    told = (f"{lost} cameras that are not aligned were left out",) if lost else ()
-    return [camera.noted(*told) for camera in found]
+    lost_note = (f"{lost} cameras that are not aligned were left out",) if lost else ()
+    return [camera.noted(*lost_note) for camera in result]
 
 
 def _transform(camera: ElementTree.Element) -> str | None:
@@ -125,11 +127,11 @@ def _without_scale(matrix: np.ndarray) -> np.ndarray:
 
 
 def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
-    what = f"sensor {checks.shown(sensor.get('label') or sensor.get('id'))}"
+    what = f"sensor {checks.quoted(sensor.get('label') or sensor.get('id'))}"
     if sensor.get("type", "frame") not in ("frame", "fisheye"):
-        not_a_pinhole(what, f"of the type {checks.shown(sensor.get('type'))}")
-    found = [each for each in sensor.findall("calibration") if each.find("f") is not None]
-    adjusted = [each for each in found if each.get("class") == "adjusted"] or found
+        not_a_pinhole(what, f"of the type {checks.quoted(sensor.get('type'))}")
+    calibrations = [each for each in sensor.findall("calibration") if each.find("f") is not None]
+    adjusted = [each for each in calibrations if each.get("class") == "adjusted"] or calibrations
     if not adjusted and sensor.find("calibration/fx") is not None:
         raise InputError(f"{what} is from before Metashape 1.2, whose numbers mean something else: export it with a newer one")
     if not adjusted:

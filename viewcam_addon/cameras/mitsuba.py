@@ -103,7 +103,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             if sensor.kind != "perspective":
                 not_a_pinhole(f"Mitsuba's sensor {sensor.name}", f"a {sensor.kind}")
             cameras.append(_camera(sensor, options))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def _camera(sensor: _Sensor, options: Options) -> Camera:
@@ -119,7 +119,7 @@ def _camera(sensor: _Sensor, options: Options) -> Camera:
         if "fov" in values:
             axis = str(values.get("fovaxis", "x")).lower()
             if axis not in _FOV_AXES:
-                raise InputError(f"fov_axis of {what} is {checks.shown(axis)}: give one of {', '.join(_FOV_AXES)}")
+                raise InputError(f"fov_axis of {what} is {checks.quoted(axis)}: give one of {', '.join(_FOV_AXES)}")
             angle = math.radians(_number(values["fov"], f"fov of {what}"))
         else:
             length = str(values.get("focallength", "50mm")).strip().removesuffix("mm")
@@ -173,7 +173,7 @@ def _number(value: object, name: str) -> float:
         try:
             value = float(value.strip())
         except ValueError:
-            raise InputError(f"{name} is {checks.shown(value)}: give a number") from None
+            raise InputError(f"{name} is {checks.quoted(value)}: give a number") from None
     if isinstance(value, Unknown):
         raise InputError(f"{name} is computed from what the text does not say: write the number")
     return checks.number(name, value, -1e300, 1e300)
@@ -191,34 +191,34 @@ def _whole(value: object, name: str, least: int = 1) -> int:
 
 def _in_xml(root: ElementTree.Element) -> Iterator[_Sensor]:
     defaults = {e.get("name", ""): e.get("value", "") for e in root.iter("default")}
-    given = {e.get("id"): e for e in root.iter() if e.get("id")}
+    by_id = {e.get("id"): e for e in root.iter() if e.get("id")}
 
-    def said(found: re.Match) -> str:  # the longest name that is one: $fovx may be $fov and an x
-        name = next((name for end in range(len(found[1]), 0, -1) if (name := found[1][:end]) in defaults), None)
-        return found[0] if name is None else defaults[name] + found[1][len(name) :]
+    def replacement(match: re.Match) -> str:  # the longest name that is one: $fovx may be $fov and an x
+        name = next((name for end in range(len(match[1]), 0, -1) if (name := match[1][:end]) in defaults), None)
+        return match[0] if name is None else defaults[name] + match[1][len(name) :]
 
     def text(value: str) -> str:
         if "$" not in value:
             return value
-        value = _DEFAULT.sub(said, value)
+        value = _DEFAULT.sub(replacement, value)
         if "$" in value:
-            raise InputError(f"{checks.shown(value)} stands for a value that the text does not say: write the value")
+            raise InputError(f"{checks.quoted(value)} stands for a value that the text does not say: write the value")
         return value
 
     # An emitter's or a texture's transform is nobody's camera.
-    found = [e for e in _elements(root, "sensor") if e.get("type")]
-    if not found and not any(e.tag.lower() in ("emitter", "shape", "bsdf", "texture", "scene") for e in root.iter()):
+    sensors = [e for e in _elements(root, "sensor") if e.get("type")]
+    if not sensors and not any(e.tag.lower() in ("emitter", "shape", "bsdf", "texture", "scene") for e in root.iter()):
         looks = [e for e in root.iter() if e.tag.lower() == "lookat"]
-        found = [root] if looks or any(e.tag.lower() == "transform" for e in root.iter()) else []
-    for number, element in enumerate(found):
-        name = text(element.get("id") or (f"sensor {number + 1}" if len(found) > 1 else "sensor"))
+        sensors = [root] if looks or any(e.tag.lower() == "transform" for e in root.iter()) else []
+    for number, element in enumerate(sensors):
+        name = text(element.get("id") or (f"sensor {number + 1}" if len(sensors) > 1 else "sensor"))
         is_fragment = element is root and element.tag.lower() != "sensor"
         yield _sensor(
             element,
             "fragment" if is_fragment else name,
             "perspective" if is_fragment else text(element.get("type", "")),
             text,
-            given,
+            by_id,
         )
 
 
@@ -229,10 +229,10 @@ def _elements(root: ElementTree.Element, tag: str) -> list[ElementTree.Element]:
     return [element for child in root for element in _elements(child, tag)]
 
 
-def _sensor(element: ElementTree.Element, name: str, kind: str, text, given: Mapping) -> _Sensor:
+def _sensor(element: ElementTree.Element, name: str, kind: str, text, by_id: Mapping) -> _Sensor:
     values: dict[str, object] = {}
     film, pose = None, None
-    children = [given.get(text(child.get("id", "")), child) if child.tag.lower() == "ref" else child for child in element]
+    children = [by_id.get(text(child.get("id", "")), child) if child.tag.lower() == "ref" else child for child in element]
     if element.tag.lower() == "lookat" or element.tag.lower() == "transform":
         children = [element] if element.tag.lower() == "transform" else [ElementTree.Element("transform", {"name": "to_world"})]
         if element.tag.lower() == "lookat":
@@ -249,7 +249,7 @@ def _sensor(element: ElementTree.Element, name: str, kind: str, text, given: Map
             raise InputError(f"Mitsuba's sensor {name} moves while the shutter is open: give one transform")
         elif tag == "ref":
             raise InputError(
-                f"Mitsuba's sensor {name} refers to {checks.shown(child.get('id'))}, which is not there: copy it as well"
+                f"Mitsuba's sensor {name} refers to {checks.quoted(child.get('id'))}, which is not there: copy it as well"
             )
         elif child.get("value") is not None and key:
             values[key] = _read(child, text)
@@ -267,13 +267,13 @@ def _read(element: ElementTree.Element, text) -> str:
 
 def _transform(steps: Sequence[ElementTree.Element], name: str, text) -> "np.ndarray | _Look":
     moves = [step for step in steps if isinstance(step.tag, str)]
-    made = [_step(step, name, text) for step in moves]
-    if len(made) == 1:
-        return made[0]
-    if len(made) == 2 and isinstance(made[1], _Look) and _is_mirror(made[0]):
-        return _Look(made[1].eye, made[1].target, made[1].up, True)
+    matrices = [_step(step, name, text) for step in moves]
+    if len(matrices) == 1:
+        return matrices[0]
+    if len(matrices) == 2 and isinstance(matrices[1], _Look) and _is_mirror(matrices[0]):
+        return _Look(matrices[1].eye, matrices[1].target, matrices[1].up, True)
     result = np.eye(4)
-    for step in made:
+    for step in matrices:
         result = (step.matrix() if isinstance(step, _Look) else step) @ result
     return result
 
@@ -292,7 +292,7 @@ def _step(step: ElementTree.Element, name: str, text) -> "np.ndarray | _Look":
         if len(parts) == 1 and usual == 1.0:
             parts = parts * 3
         if len(parts) != 3:
-            raise InputError(f"{key} of {what} is {checks.shown(step.get(key, ''))}: give three numbers")
+            raise InputError(f"{key} of {what} is {checks.quoted(step.get(key, ''))}: give three numbers")
         return tuple(_number(part, f"{key} of {what}") for part in parts)
 
     result = np.eye(4)
@@ -317,7 +317,7 @@ def _step(step: ElementTree.Element, name: str, text) -> "np.ndarray | _Look":
         else:
             raise InputError(f"{what} has {len(parts)} numbers: give 16, row by row")
         if result[3].tolist() != [0, 0, 0, 1]:
-            raise InputError(f"the last row of {what} is {checks.shown(result[3].tolist())}: it should be 0 0 0 1")
+            raise InputError(f"the last row of {what} is {checks.quoted(result[3].tolist())}: it should be 0 0 0 1")
     else:
         raise InputError(f"{what} is no move of a camera that is known: give lookat, translate, rotate, scale or matrix")
     return result
@@ -328,7 +328,7 @@ def _step(step: ElementTree.Element, name: str, text) -> "np.ndarray | _Look":
 
 def _in_python(text: str) -> Iterator[_Sensor]:
     text = texts.without(r"#[^\n]*", text)
-    starts = [found for found in _SENSOR.finditer(text)]
+    starts = [match for match in _SENSOR.finditer(text)]
     if not starts:
         looks = list(_LOOK.finditer(text))
         if len(looks) != 1:
@@ -336,11 +336,11 @@ def _in_python(text: str) -> Iterator[_Sensor]:
         values = {texts.plain(key): value for key, value in _FRAGMENT.findall(text)}
         yield _Sensor("perspective", "fragment", values, None, _product(text, _start_of(text, looks[0].start())))
         return
-    for found in starts:
-        opened = _enclosing(text, found.start())
+    for match in starts:
+        opened = _enclosing(text, match.start())
         named = re.search(r"['\"](\w{1,60})['\"]\s*:\s*\Z|(\w{1,60})\s*=\s*\Z", text[max(0, opened - 90) : opened])
         name = next((part for part in named.groups() if part), "sensor") if named else "sensor"
-        yield _dictionary(text, opened, found[1], name)
+        yield _dictionary(text, opened, match[1], name)
 
 
 _FRAGMENT = re.compile(r"['\"](fov|fov_axis|focal_length)['\"]\s*:\s*['\"]?([^\s,'\"}]+)")
@@ -418,7 +418,7 @@ def _start_of(text: str, at: int) -> int:
 
 def _product(text: str, at: int) -> "np.ndarray | _Look":
     """A transform: calls of translate, rotate, scale, look_at or a matrix, in a chain with dots or a product with @."""
-    made: list = []
+    factors: list = []
     reader = Expressions(text)
     while True:
         name = tokens.token(text, at)
@@ -430,20 +430,20 @@ def _product(text: str, at: int) -> "np.ndarray | _Look":
             continue
         if (closed := tokens.token(text, at)).text == ")":
             at = closed.end
-            made += [np.eye(4)] if tokens.token(text, at).text != "." else []
+            factors += [np.eye(4)] if tokens.token(text, at).text != "." else []
         else:
             values, named, at = reader.arguments(opened.start)
-            made.append(_call(name.text, values, named, text, name.start))
+            factors.append(_call(name.text, values, named, text, name.start))
         after = tokens.token(text, at)
         if after.text not in (".", "@"):
             break
         at = after.end
-    if len(made) == 1:
-        return made[0]
-    if len(made) == 2 and isinstance(made[0], _Look) and _is_mirror(made[1]):
-        return _Look(made[0].eye, made[0].target, made[0].up, True)
+    if len(factors) == 1:
+        return factors[0]
+    if len(factors) == 2 and isinstance(factors[0], _Look) and _is_mirror(factors[1]):
+        return _Look(factors[0].eye, factors[0].target, factors[0].up, True)
     result = np.eye(4)
-    for step in made:
+    for step in factors:
         result = result @ (step.matrix() if isinstance(step, _Look) else step)
     return result
 
@@ -453,10 +453,10 @@ def _call(name: str, values: list, named: dict, text: str, at: int) -> "np.ndarr
 
     def argument(place: int, key: str, count: int) -> tuple[float, ...]:
         value = named.get(key, values[place] if place < len(values) else None)
-        found = numbers(value, count)
-        if found is None:
+        parsed = numbers(value, count)
+        if parsed is None:
             texts.fail(text, getattr(value, "at", at) or at, f"give {count} numbers for {key} of {name}")
-        return found
+        return parsed
 
     if name == "look_at":
         return _Look(argument(0, "origin", 3), argument(1, "target", 3), argument(2, "up", 3))

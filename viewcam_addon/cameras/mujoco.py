@@ -49,7 +49,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         name = element.get("name") or f"camera {number}"
         with left_out.unless_pinhole(name):
             cameras.append(model.camera(name, element, matrix))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 class _Model:
@@ -58,7 +58,7 @@ class _Model:
         self.in_radians = compiler.get("angle") == "radian"
         self.sequence = compiler.get("eulerseq", "xyz")
         if len(self.sequence) != 3 or not {*self.sequence.lower()} <= {*"xyz"}:
-            raise InputError(f"eulerseq of the compiler is {checks.shown(self.sequence)}: give three of x, y, z, X, Y, Z")
+            raise InputError(f"eulerseq of the compiler is {checks.quoted(self.sequence)}: give three of x, y, z, X, Y, Z")
         usual = root.find("default/camera")
         self.usual = {} if usual is None else dict(usual.attrib)
         self.has_classes = root.find("default//default//camera") is not None
@@ -76,11 +76,11 @@ class _Model:
                 yield child, matrix
             elif child.tag in ("body", "frame") and child.find(".//camera") is not None:
                 yield from self._inside(
-                    child, matrix @ self._pose(child.attrib, f"{child.tag} {checks.shown(child.get('name', ''))}")
+                    child, matrix @ self._pose(child.attrib, f"{child.tag} {checks.quoted(child.get('name', ''))}")
                 )
 
     def camera(self, name: str, element: ElementTree.Element, around: np.ndarray) -> Camera:
-        what = f"camera {checks.shown(name)}"
+        what = f"camera {checks.quoted(name)}"
         if self.has_classes:
             raise InputError(
                 f"a default class says something of cameras, and which one {what} has is not followed: write it out"
@@ -114,13 +114,13 @@ class _Model:
 
     def _pose(self, values: dict[str, str], what: str) -> np.ndarray:
         """(4, 4) of pos and the one orientation."""
-        given = [key for key in _ORIENTATIONS if key in values]
-        if len(given) > 1:
-            raise InputError(f"{what} has {' and '.join(given)}: MuJoCo takes one orientation")
+        stated = [key for key in _ORIENTATIONS if key in values]
+        if len(stated) > 1:
+            raise InputError(f"{what} has {' and '.join(stated)}: MuJoCo takes one orientation")
         result = np.eye(4)
         result[:3, 3] = _numbers(values, "pos", 3, what) if "pos" in values else (0, 0, 0)
-        if given:
-            result[:3, :3] = self._turn(given[0], np.array(_numbers(values, given[0], _ORIENTATIONS[given[0]], what)), what)
+        if stated:
+            result[:3, :3] = self._turn(stated[0], np.array(_numbers(values, stated[0], _ORIENTATIONS[stated[0]], what)), what)
         return result
 
     def _turn(self, kind: str, numbers: np.ndarray, what: str) -> np.ndarray:

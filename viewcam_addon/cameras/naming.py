@@ -11,10 +11,9 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path, PurePosixPath
 
 from .. import checks
-from ..errors import InputError
+from ..errors import InputError, several
 from .camera import Camera
 
-_NAMED = 3  # files in a sentence
 _PLACES = (".", "images", "..", "../images", "../..", "../../images")
 _SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".JPG", ".PNG")
 _PICTURES = (
@@ -92,7 +91,7 @@ def check_image(file: object) -> None:
     """
     if not isinstance(file, str) or any(map(_is_unseen, file)) or "\\" in file or {"", ".", ".."} & set(file.split("/")):
         raise InputError(
-            f"file is {checks.shown(file)}: give the picture's path inside the folder of the batch, as in images/left.png"
+            f"file is {checks.quoted(file)}: give the picture's path inside the folder of the batch, as in images/left.png"
         )
 
 
@@ -146,12 +145,6 @@ def refuse_mirrored(cameras: Iterable[Camera], written: str) -> None:
     mirrored = [image_of(camera) for camera in cameras if camera.pinhole.mirrored]
     if mirrored:
         raise InputError(f"{written} can't say that a camera is mirrored, as in {several(mirrored)}: make its scale positive")
-
-
-def several(files: Sequence[str]) -> str:
-    """The files in a sentence, not too long a one."""
-    rest = len(files) - _NAMED
-    return ", ".join(files[:_NAMED]) + (f" and {rest} more" if rest > 0 else "")
 
 
 def _is_unseen(character: str) -> bool:

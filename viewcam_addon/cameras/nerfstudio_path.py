@@ -49,7 +49,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         name = str(frame.get("name") or f"{number:05d}")
         with left_out.unless_pinhole(name):
             if kind is not None and str(kind).lower() != "perspective":
-                not_a_pinhole(frame.place, f"of the camera type {checks.shown(kind)}")
+                not_a_pinhole(frame.place, f"of the camera type {checks.quoted(kind)}")
             fov = math.radians(frame.number("fov", least=1e-6, most=180 - 1e-6))
             d = size[1] / 2 / math.tan(fov / 2)
             matrix = np.array(frame.numbers("camera_to_world", 16)).reshape(4, 4)
@@ -58,7 +58,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             plane = axes.view_plane(d, d, size[0] / 2, size[1] / 2, size)
             pinhole, more = axes.pinhole(matrix, plane, frame.place)
             cameras.append(Camera(name, pinhole, True, (*notes, *more), time=None if fps is None else number / fps))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def notes_in(source: Source) -> list[str]:
@@ -89,9 +89,9 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
     for camera in cameras:
         d_x, d_y = camera.pinhole.distance
         if camera.pinhole.principal_point != (width / 2, height / 2):
-            raise InputError(f"camera_path.json can't say that a camera is shifted, as {checks.shown(camera.name)} is")
+            raise InputError(f"camera_path.json can't say that a camera is shifted, as {checks.quoted(camera.name)} is")
         if d_x != d_y:
-            raise InputError(f"camera_path.json has square pixels, and those of {checks.shown(camera.name)} are none")
+            raise InputError(f"camera_path.json has square pixels, and those of {checks.quoted(camera.name)} are none")
     lines = [
         json.dumps(
             {

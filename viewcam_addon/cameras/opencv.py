@@ -72,18 +72,18 @@ _WAY = "R and t were taken as from world to camera, x right, y down, z into the 
 
 
 def recognises(source: Source) -> bool:
-    return any(True for _ in _found(source))
+    return any(True for _ in _cameras_in(source))
 
 
 def read(source: Source, options: Options) -> list[Camera]:
     left_out, cameras, before = LeftOut(), [], np.eye(4)
-    for name, values in _found(source):
+    for name, values in _cameras_in(source):
         if "tcncnm1" in values:  # Kalibr's: from the camera before to this one
-            before = _four_rows(values["tcncnm1"], f"T_cn_cnm1 of camera {checks.shown(name)}") @ before
+            before = _four_rows(values["tcncnm1"], f"T_cn_cnm1 of camera {checks.quoted(name)}") @ before
             values |= {"r": before[:3, :3].tolist(), "t": before[:3, 3].tolist()}
         with left_out.unless_pinhole(name):
             cameras.append(camera(name, values, options))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def _four_rows(value: Any, name: str) -> np.ndarray:
@@ -108,7 +108,7 @@ def told_of_half_pixel(options: Options, program: str) -> tuple[str, ...]:
     """The note on it."""
     if options.pixel:
         return ()
-    return (f"{program} counts pixels from the first one's centre: half a pixel was added to the principal point",)
+    return (f"{program} counts pixels from the first one's center: half a pixel was added to the principal point",)
 
 
 def _text(camera: Camera, options: Options) -> str:
@@ -199,7 +199,7 @@ def _is_camera(values: Mapping[str, Any]) -> bool:
         return False
 
 
-def _found(source: Source):
+def _cameras_in(source: Source):
     """(name, values by plain name) of each camera in the file."""
     document = _document(source)
     by_name = _by_name(document)
@@ -282,7 +282,7 @@ def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float
         f_x, skew, c_x, lower, f_y, c_y, *last = values
         if [lower, *last[:2]] != [0, 0, 0] or last[2] != 1:
             hint = "transpose it" if [values[1], values[2], values[5]] == [0, 0, 0] else "its last row should be 0 0 1"
-            raise InputError(f"K of {what} is {checks.shown([*values])}: {hint}")
+            raise InputError(f"K of {what} is {checks.quoted([*values])}: {hint}")
         if abs(skew) > 1e-9 * abs(f_x):
             raise NoPinholeError(
                 f"K of {what} has a skew of {skew:g} pixels, which no pinhole camera here has: rectify the pictures"
@@ -315,9 +315,9 @@ def of_window(plane: ViewPlane, values: Mapping[str, Any], what: str) -> tuple[V
     values : `roi` of ROS' camera_info, a window of the sensor in its own pixels (0 × 0: all of it), and `binning_x` and
     `binning_y`, how many of these are one of the picture (0: one), with underscores or without.
     """
-    given = Record({plain(key): value for key, value in values.items()}, what)
-    x, y = (given.number(f"binning{side}", 1.0, 0, 1e4) or 1.0 for side in "xy")
-    roi = given.record("roi") if "roi" in given else Record({}, f"roi of {what}")
+    record = Record({plain(key): value for key, value in values.items()}, what)
+    x, y = (record.number(f"binning{side}", 1.0, 0, 1e4) or 1.0 for side in "xy")
+    roi = record.record("roi") if "roi" in record else Record({}, f"roi of {what}")
     left, top, width, height = (roi.number(key, 0.0, 0, 1e9) for key in ("x_offset", "y_offset", "width", "height"))
     if (x, y, left, top, width, height) == (1, 1, 0, 0, 0, 0):
         return plane, ()
@@ -328,10 +328,10 @@ def of_window(plane: ViewPlane, values: Mapping[str, Any], what: str) -> tuple[V
         raise InputError(f"the roi of {what} has no pixel left once {x:g} × {y:g} are one: correct it")
     (f_x, f_y), (c_x, c_y) = plane.distance, plane.principal_point
     cut = axes.view_plane(f_x / x, f_y / y, (c_x - left) / x, (plane.height - c_y - top) / y, size)
-    told = (
+    notes = (
         f"{what} shows the window of its sensor from {left:g}, {top:g} on, {x:g} × {y:g} of its pixels as one: K was taken so"
     )
-    return cut, (f"{told}, in a picture of {size[0]} × {size[1]}",)
+    return cut, (f"{notes}, in a picture of {size[0]} × {size[1]}",)
 
 
 def coefficients(numbers: Sequence[float], what: str) -> dict[str, float]:
@@ -375,7 +375,7 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     InputError
         if they are no camera, or leave open what it is.
     """
-    what = f"camera {checks.shown(name)}"
+    what = f"camera {checks.quoted(name)}"
     is_fisheye = says_fisheye(values, what)
     if {"t", "hw"} <= values.keys():
         return _of_infinigen(name, values, what, options)
@@ -386,8 +386,8 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     size, stated = _size(values, what, options)
     plane = plane_of_k(_numbers("K", k), size, half_pixel(options), what)
     plane, windowed = of_window(plane, values, what)
-    lens, told = settled(_coefficients(values, what, is_fisheye), is_fisheye, plane, what, options)
-    notes = told_of_half_pixel(options, "OpenCV") + windowed + told
+    lens, note = settled(_coefficients(values, what, is_fisheye), is_fisheye, plane, what, options)
+    notes = told_of_half_pixel(options, "OpenCV") + windowed + note
     matrix, more = _pose(values, what, options)
     pinhole, more_of_pose = axes.pinhole(matrix, plane, what)
     return Camera(name, pinhole, stated, (*notes, *more, *more_of_pose), lens=lens)
@@ -398,8 +398,8 @@ def _of_infinigen(name: str, values: Mapping[str, Any], what: str, options: Opti
     height, width = (pixels(f"HW of {what}", side) for side in checks.vector(f"HW of {what}", flat("HW", values["hw"]), 2))
     plane = plane_of_k(_numbers("K", _first(values, _K)), (width, height), half_pixel(options, "corner"), what)
     pinhole, notes = axes.pinhole(axes.of_opencv(_four_rows(values["t"], f"T of {what}")), plane, what)
-    told = f"K, T and HW of {what} were taken as Infinigen's: T from the camera to the world, x right, y down, z into the view"
-    return Camera(name, pinhole, True, (told, *notes))
+    note = f"K, T and HW of {what} were taken as Infinigen's: T from the camera to the world, x right, y down, z into the view"
+    return Camera(name, pinhole, True, (note, *notes))
 
 
 def says_fisheye(values: Mapping[str, Any], what: str) -> bool:
@@ -418,7 +418,7 @@ def says_fisheye(values: Mapping[str, Any], what: str) -> bool:
     is_fisheye = [bool(_FISHEYE.search(model.lower())) for model in models]
     for model, known in zip(models, is_fisheye, strict=True):
         if not known and _OTHER_LENS.search(model.lower()):
-            not_a_pinhole(what, f"of the model {checks.shown(model)}")
+            not_a_pinhole(what, f"of the model {checks.quoted(model)}")
     return any(is_fisheye)
 
 
@@ -435,22 +435,22 @@ def _coefficients(values: Mapping[str, Any], what: str, is_fisheye: bool) -> Seq
     InputError
         if there is one in words that nobody knows.
     """
-    given = _first(values, _DISTORTION)
-    listed = _numbers("the distortion", given) if given is not None else ()
+    stated = _first(values, _DISTORTION)
+    listed = _numbers("the distortion", stated) if stated is not None else ()
     if is_fisheye and len(listed) > 4:
         raise InputError(f"{what} has {len(listed)} distortion coefficients: OpenCV's fisheye has four")
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     for name, value in values.items():
         if name in _DISTORTION or not _OTHER_DISTORTION.search(name) or isinstance(value, str) or value is None:
             continue
         numbers = [value] if isinstance(value, int | float) else list(_numbers(name, value))
-        if name in NAMES and given is None:
-            found[name] = number(f"{name} of {what}", value)
+        if name in NAMES and stated is None:
+            result[name] = number(f"{name} of {what}", value)
         elif any(numbers):
             raise InputError(
                 f"{what} says {name}, which may be lens distortion: call it distortion_coefficients, in OpenCV's order"
             )
-    return found if given is None else listed
+    return result if stated is None else listed
 
 
 def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple[int, int], bool]:

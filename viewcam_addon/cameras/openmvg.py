@@ -40,7 +40,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         kinds.setdefault(number, str(value.values.get("polymorphic_name") or "pinhole"))
         intrinsics[str(each.values.get("key"))] = (kinds[number], value.record("ptr_wrapper").record("data"))
     root = document.values.get("root_path")
-    found, lost = [], 0
+    result, lost = [], 0
     for each in document.records("views", "view"):
         view = each.record("value").record("ptr_wrapper").record("data")
         pose_id, intrinsic_id = str(view.values.get("id_pose")), str(view.values.get("id_intrinsic"))
@@ -48,15 +48,15 @@ def read(source: Source, options: Options) -> list[Camera]:
             lost += 1
             continue
         path = "/".join(part for part in (str(view.get("local_path") or ""), str(view.get("filename") or "")) if part)
-        found.append((path or f"view {view.get('id_view')}", poses[pose_id], *intrinsics[intrinsic_id]))
-    if not found:
+        result.append((path or f"view {view.get('id_view')}", poses[pose_id], *intrinsics[intrinsic_id]))
+    if not result:
         raise InputError(f"none of the {lost} views of {source.name} has a pose: let OpenMVG reconstruct it first")
-    told: tuple[str, ...] = (f"{lost} views without a pose were left out",) if lost else ()
+    note: tuple[str, ...] = (f"{lost} views without a pose were left out",) if lost else ()
     if not options.pixel:
-        told += ("OpenMVG does not say from where it counts pixels: the principal point was taken from the picture's corner",)
+        note += ("OpenMVG does not say from where it counts pixels: the principal point was taken from the picture's corner",)
     planes: dict[int, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}
     left_out, cameras = LeftOut(), []
-    for (path, pose, kind, data), name in zip(found, naming.distinct([path for path, *_ in found]), strict=True):
+    for (path, pose, kind, data), name in zip(result, naming.distinct([path for path, *_ in result]), strict=True):
         with left_out.unless_pinhole(name):
             if id(data) not in planes:
                 planes[id(data)] = _plane(data, kind, options)
@@ -64,15 +64,15 @@ def read(source: Source, options: Options) -> list[Camera]:
             matrix = np.eye(4)
             matrix[:3, :3] = np.array(pose.numbers("rotation", 9)).reshape(3, 3).T
             matrix[:3, 3] = pose.numbers("center", 3)
-            pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
+            pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.quoted(name)}")
             image = f"{root}/{path}" if isinstance(root, str) and root else path
-            cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), image, lens=lens))
-    return left_out.told(cameras)
+            cameras.append(Camera(name, pinhole, True, (*note, *notes, *more), image, lens=lens))
+    return left_out.with_notes(cameras)
 
 
 def _plane(data: Record, kind: str, options: Options) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
     if kind not in _PINHOLES:
-        not_a_pinhole(data.place, f"of the type {checks.shown(kind)}")
+        not_a_pinhole(data.place, f"of the type {checks.quoted(kind)}")
     inner = data.record("value0") if "value0" in data and "focal_length" not in data else data
     f = inner.number("focal_length", least=1e-9)
     c_x, c_y = inner.numbers("principal_point", 2)

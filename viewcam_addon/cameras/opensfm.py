@@ -50,23 +50,23 @@ def read(source: Source, options: Options) -> list[Camera]:
     planes: dict[str, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}
     left_out, result = LeftOut(), []
     for path, name in zip(shots.values, naming.distinct([*shots.values]), strict=True):
-        shot = Record(shots.values[path], f"shot {checks.shown(path)}")
+        shot = Record(shots.values[path], f"shot {checks.quoted(path)}")
         with left_out.unless_pinhole(name):
             key = shot.text("camera")
             if key not in planes:
-                planes[key] = _plane(Record(cameras.needed(key), f"camera {checks.shown(key)}"), options)
+                planes[key] = _plane(Record(cameras.needed(key), f"camera {checks.quoted(key)}"), options)
             plane, lens, told = planes[key]
             turn = opencv.of_rotation_vector(shot.numbers("rotation", 3), shot.place)
             matrix = axes.from_world_to_camera(turn, shot.numbers("translation", 3), shot.place)
             pinhole, more = axes.pinhole(matrix, plane, shot.place)
             result.append(Camera(name, pinhole, True, (*notes, *told, *more), path, lens=lens))
-    return left_out.told(result)
+    return left_out.with_notes(result)
 
 
 def _plane(camera: Record, options: Options) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
     kind = camera.text("projection_type", "perspective")
     if kind not in _LENSES:
-        not_a_pinhole(camera.place, f"of the type {checks.shown(kind)}")
+        not_a_pinhole(camera.place, f"of the type {checks.quoted(kind)}")
     width, height = size = camera.size("width"), camera.size("height")
     longer = max(size)
     f_x = camera.number("focal_x" if "focal_x" in camera else "focal", least=1e-9)

@@ -147,11 +147,11 @@ def beginning(camera: Camera, sign: str) -> list[str]:
 def parts(text: str) -> list[tuple[str, str]]:
     """The name and the code of each camera of a text, split where `beginning` stands; none if it stands nowhere."""
     starts = [*_BEGINNINGS.finditer(text)]
-    ends = [*(found.start() for found in starts[1:]), len(text)]
-    whole = [0, *(found.start() for found in starts[1:])]  # what stands before the first is the first one's
+    ends = [*(match.start() for match in starts[1:]), len(text)]
+    whole = [0, *(match.start() for match in starts[1:])]  # what stands before the first is the first one's
     return [
-        (str(json.loads(found[1], strict=False)), text[start:end])
-        for found, start, end in zip(starts, whole, ends, strict=False)
+        (str(json.loads(match[1], strict=False)), text[start:end])
+        for match, start, end in zip(starts, whole, ends, strict=False)
     ]
 
 
@@ -176,10 +176,10 @@ def camera(values: Values, options: Options, what: str) -> Camera:
         raise InputError("the text says neither eye, look-at, up nor distance of a camera: copy one, or write eye=1,2,3")
     vectors = {}
     for name in VECTORS:
-        given = values.get(name, getattr(options.base, name, None))
-        if given is None:
+        value = values.get(name, getattr(options.base, name, None))
+        if value is None:
             raise InputError(f"{what} says no {name} of the camera: add {name}=x,y,z")
-        vectors[name] = checks.vector(name, given, 3)
+        vectors[name] = checks.vector(name, value, 3)
     plane, stated, notes = _plane(values, options, what)
     mirrored = values.get("mirrored", bool(options.base and options.base.mirrored and not values.keys() & _LENS))
     pinhole = Pinhole(
@@ -194,21 +194,21 @@ def camera(values: Values, options: Options, what: str) -> Camera:
 
 
 def _plane(values: Values, options: Options, what: str) -> tuple[ViewPlane, bool, tuple[str, ...]]:
-    said = [key for key in ("distance", "fov", "fov_x", "fov_y") if key in values]
-    if len(said) > 1:
+    lengths = [key for key in ("distance", "fov", "fov_x", "fov_y") if key in values]
+    if len(lengths) > 1:
         raise InputError("the text says the field of view or distance more than once: leave one of them out")
-    if not said:
+    if not lengths:
         return options.plane_or_refuse(what), False, ()
     width, height = (checks.whole(key, values[key]) if key in values else None for key in ("width", "height"))
     film = texts.film(options, what, (width, height) if width and height else None)
-    if said == ["distance"]:
+    if lengths == ["distance"]:
         distance = values["distance"]
         if isinstance(distance, tuple):
             plane = ViewPlane(distance, (film.width / 2, film.height / 2), film.width, film.height)
         else:  # in pixels of a picture of which perhaps only the width is known
-            plane = film.centred(distance * (film.width / width if width else 1.0))
+            plane = film.centered(distance * (film.width / width if width else 1.0))
     else:
-        angle, axis = _angle(values, said[0], options)
+        angle, axis = _angle(values, lengths[0], options)
         plane = film.plane(angle, axis)
     if "principal_point" in values:
         plane = ViewPlane(plane.distance, values["principal_point"], film.width, film.height)
@@ -219,8 +219,8 @@ def _angle(values: Values, key: str, options: Options) -> tuple[float, str]:
     value = values[key]
     axis = {"fov": values.get("axis"), "fov_x": "x", "fov_y": "y"}[key]
     if axis is None:
-        shown = f"{math.degrees(value) if isinstance(value, _Angle) else value:g}"
-        raise InputError(f"a field of view of {shown}° may be meant across or upwards: add axis=x or axis=y")
+        degrees = f"{math.degrees(value) if isinstance(value, _Angle) else value:g}"
+        raise InputError(f"a field of view of {degrees}° may be meant across or upwards: add axis=x or axis=y")
     radians = value if isinstance(value, _Angle) else texts.angle_of(value, "the field of view", options)
     if not 0 < radians < math.pi:
         raise InputError(f"the field of view is {math.degrees(radians):g}°: give an angle between 0 and 180")
@@ -239,8 +239,8 @@ def lines_of(source: Source) -> list[dict]:
     lines = [line for line in source.text.split("\n", _MOST_LINES) if line.strip()]
     if len(lines) < 2 or not all(line.startswith("{") and line.rstrip().endswith("}") for line in lines):
         return []
-    found = [Source(line).document for line in lines]
-    return found if all(map(_is_camera_of_several, found)) else []
+    documents = [Source(line).document for line in lines]
+    return documents if all(map(_is_camera_of_several, documents)) else []
 
 
 def _is_camera_of_several(document: dict) -> bool:
@@ -261,20 +261,20 @@ def _document(source: Source) -> object:
 
 def _of_json(document: dict) -> Values:
     # What was asked for comes before what Blender made of it.
-    given = next((document[key] for key in ("stated_camera", "camera") if isinstance(document.get(key), dict)), document)
+    camera = next((document[key] for key in ("stated_camera", "camera") if isinstance(document.get(key), dict)), document)
     values: Values = {}
-    for key, value in given.items():
-        if key == "name" and given is document:
+    for key, value in camera.items():
+        if key == "name" and camera is document:
             continue
         name = _spelt(key)
         if name is None:
-            raise InputError(f"the key {checks.shown(key)} is none of a camera: write eye, look_at, up and distance")
+            raise InputError(f"the key {checks.quoted(key)} is none of a camera: write eye, look_at, up and distance")
         if name in values:
-            raise InputError(f"the key {checks.shown(key)} says {name} once more: leave one of them out")
+            raise InputError(f"the key {checks.quoted(key)} says {name} once more: leave one of them out")
         values[name] = _checked(key, name, value)
     if "size" in values:
         values["width"], values["height"] = values.pop("size")
-    if "origin" in document and given is not document:  # a scene whose coordinates are counted from there
+    if "origin" in document and camera is not document:  # a scene whose coordinates are counted from there
         origin = checks.vector("origin", document["origin"], 3)
         for key in values.keys() & {"eye", "look_at"}:
             values[key] = tuple(a + b for a, b in zip(values[key], origin, strict=True))
@@ -333,13 +333,13 @@ def _value(text: str, start: int, name: str) -> tuple[object, int]:
     if name == "axis":
         return axis(text, start)
     if name == "mirrored":
-        if not (found := _TRUTH.match(text, start)):
+        if not (match := _TRUTH.match(text, start)):
             fail(text, start, "say true or false for mirrored")
-        return found[1].lower() in ("true", "yes", "1"), found.end()
+        return match[1].lower() in ("true", "yes", "1"), match.end()
     if name == "size":
-        if not (found := _SIZE.match(text, start)):
+        if not (match := _SIZE.match(text, start)):
             fail(text, start, "give the size as in 1920x1080")
-        return (int(found[1]), int(found[2])), found.end()
+        return (int(match[1]), int(match[2])), match.end()
     if name in _COUNTS:
         return numbers(text, start, _COUNTS[name], name)
     (value,), at = numbers(text, start, 1, name)

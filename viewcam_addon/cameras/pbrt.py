@@ -134,32 +134,32 @@ class _Scene:
         elif word == "Film":
             self.film = parameters
 
-    def _move(self, word: str, at: int, given: list) -> None:
-        if len(given) != _MOVES[word] or not all(isinstance(x, float) for x in given):
+    def _move(self, word: str, at: int, numbers: list) -> None:
+        if len(numbers) != _MOVES[word] or not all(isinstance(x, float) for x in numbers):
             texts.fail(self.text, at, f"give {_MOVES[word]} finite numbers for {word}")
         self.moves += 1
         if self.moves > _MOST_MOVES:
             raise InputError(f"the text has more than {_MOST_MOVES} transforms before WorldBegin: copy one camera")
-        step = _matrix(word, given, self.text, at)
+        step = _matrix(word, numbers, self.text, at)
         if word == "LookAt" and self.is_lux:
             step = _MIRROR @ step
         self.transforms = tuple(
-            self._moved(each, word, given, step) if time in self.active else each for time, each in enumerate(self.transforms)
+            self._moved(each, word, numbers, step) if time in self.active else each for time, each in enumerate(self.transforms)
         )
 
-    def _moved(self, before: "_Transform", word: str, given: list, step: np.ndarray) -> "_Transform":
+    def _moved(self, before: "_Transform", word: str, numbers: list, step: np.ndarray) -> "_Transform":
         matrix = step if word in ("Transform", "Identity") else before.matrix @ step
         if word != "LookAt":
             return _Transform(matrix)
         mirrors = np.array_equal(before.matrix, _MIRROR)
         alone = mirrors or np.array_equal(before.matrix, _NOTHING)
-        return _Transform(matrix, given if alone else None, mirrors == self.is_lux)
+        return _Transform(matrix, numbers if alone else None, mirrors == self.is_lux)
 
     def camera(self, options: Options) -> Camera:
         kind, at, parameters = self.lens or ("perspective", 0, {})
         if kind != "perspective":
-            said = checks.shown(kind)
-            not_a_pinhole(f"pbrt's Camera {said}", "of a real lens" if kind == "realistic" else said.strip("'"))
+            kind_quoted = checks.quoted(kind)
+            not_a_pinhole(f"pbrt's Camera {kind_quoted}", "of a real lens" if kind == "realistic" else kind_quoted.strip("'"))
         matrix, look, mirrored = (self.at_camera or self.transforms)[0]
         notes = [f"pbrt's {name} was not taken" for name in parameters if name not in (*_HARMLESS, *_OF_LENS)]
         if self.cameras > 1:
@@ -255,8 +255,8 @@ def _statements(text: str) -> Iterator[tuple[str, int, list, _Parameters]]:
     word, at, arguments, parameters = "", 0, [], {}
     values: list | None = None  # of the parameter that is being read
     inside, is_open = False, False
-    for found in _WORDS.finditer(text):
-        string, name, number, bracket, stray = found.groups()
+    for match in _WORDS.finditer(text):
+        string, name, number, bracket, stray = match.groups()
         if bracket:
             is_open = bracket == "["
             inside = is_open and values is not None
@@ -265,23 +265,23 @@ def _statements(text: str) -> Iterator[tuple[str, int, list, _Parameters]]:
             (arguments if values is None else values).append(name)
         elif name:
             if is_open:
-                texts.fail(text, found.start(), "close the bracket before it")
+                texts.fail(text, match.start(), "close the bracket before it")
             if word:
                 yield word, at, arguments, parameters
-            word, at, arguments, parameters, values = name, found.start(), [], {}, None
+            word, at, arguments, parameters, values = name, match.start(), [], {}, None
         elif number:
-            (arguments if values is None else values).append(_finite(number, text, found.start()))
+            (arguments if values is None else values).append(_finite(number, text, match.start()))
         elif stray:
             if word == "WorldBegin" or not word:
                 continue
-            texts.fail(text, found.start(), "pbrt's statements have words, numbers, quotes and brackets only")
+            texts.fail(text, match.start(), "pbrt's statements have words, numbers, quotes and brackets only")
         elif inside or (is_open and values is not None):
             values.append(string)
         else:
             parts = string.split()
             if len(parts) == 2 and word and (arguments or word not in ("Camera", "Film")):
                 values = []
-                parameters[parts[1]] = (values, found.start())
+                parameters[parts[1]] = (values, match.start())
             elif values is not None and not values:
                 values.append(string)
             else:
@@ -315,23 +315,23 @@ def _whole(parameters: _Parameters, name: str, usual: int, text: str) -> int:
     return int(value)
 
 
-def _matrix(word: str, given: list[float], text: str, at: int) -> np.ndarray:
+def _matrix(word: str, numbers: list[float], text: str, at: int) -> np.ndarray:
     step = np.eye(4)
     if word == "Translate":
-        step[:3, 3] = given
+        step[:3, 3] = numbers
     elif word == "Scale":
-        step[:3, :3] = np.diag(given)
+        step[:3, :3] = np.diag(numbers)
     elif word in ("Transform", "ConcatTransform"):
-        step = np.array(given).reshape(4, 4).T
+        step = np.array(numbers).reshape(4, 4).T
         if step[3].tolist() != [0, 0, 0, 1]:
             texts.fail(text, at, "its last four numbers should be a translation and 1, pbrt's matrices go column by column")
     elif word == "Rotate":
-        length = math.hypot(*given[1:])
+        length = math.hypot(*numbers[1:])
         if not length:
             texts.fail(text, at, "the axis has no direction, give another")
-        step[:3, :3] = texts.turn(given[0], [x / length for x in given[1:]])
+        step[:3, :3] = texts.turn(numbers[0], [x / length for x in numbers[1:]])
     elif word == "LookAt":
-        e, l, up = (np.array(given[i : i + 3]) for i in (0, 3, 6))
+        e, l, up = (np.array(numbers[i : i + 3]) for i in (0, 3, 6))
         pose = Pinhole(tuple(e), tuple(l), tuple(up), 1.0, 1, 1)
         if pose.is_singular:
             texts.fail(text, at, "it looks along its up, for which pbrt has no picture, change up")

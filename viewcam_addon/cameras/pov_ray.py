@@ -58,9 +58,9 @@ def recognises(source: Source) -> bool:
     if source.is_binary or not _CAMERA.search(source.text):
         return False
     text = texts.without(_COMMENT, source.text)
-    declared = {found[1] for found in _DECLARE.finditer(text)}
-    said = any(found[1] is None or found[1] in declared or found[2] for found in _SAYS_CAMERA.finditer(text))
-    return said and _in_use(text) is not None
+    declared = {match[1] for match in _DECLARE.finditer(text)}
+    is_stated = any(match[1] is None or match[1] in declared or match[2] for match in _SAYS_CAMERA.finditer(text))
+    return is_stated and _in_use(text) is not None
 
 
 def read(source: Source, options: Options) -> list[Camera]:
@@ -71,28 +71,28 @@ def read(source: Source, options: Options) -> list[Camera]:
         texts.fail(
             text, version.start(), "before version 3.5 the order of the statements counted otherwise, write #version 3.7"
         )
-    found = _in_use(text)
-    if found is None:
+    block = _in_use(text)
+    if block is None:
         raise InputError(f"{source.name} has camera {{ … }} in comments only: give one outside of them")
-    start, others = found
+    start, others = block
     camera = _Block(text, start, options, _size(source.text), number).camera()
     return [camera.noted(*([f"Of {others + 1} cameras the last is the one in use"] if others else []))]
 
 
 def _size(text: str) -> tuple[int, int] | None:
     """The pixels that the command line asks for, if a comment repeats it, as in // +W640 +H360."""
-    found = {(letter.upper(), int(number)) for letter, number in _PIXELS.findall(text)}
-    said = dict(found)
-    return (said["W"], said["H"]) if len(found) == 2 and said.keys() == {"W", "H"} and min(said.values()) > 0 else None
+    sizes = {(letter.upper(), int(number)) for letter, number in _PIXELS.findall(text)}
+    size = dict(sizes)
+    return (size["W"], size["H"]) if len(sizes) == 2 and size.keys() == {"W", "H"} and min(size.values()) > 0 else None
 
 
 def _in_use(text: str) -> tuple[int, int] | None:
     """The opening of the block of the camera in use, and how many others there are; None if there is no camera."""
-    blocks = [found.end() - 1 for found in _CAMERA.finditer(text)]
+    blocks = [match.end() - 1 for match in _CAMERA.finditer(text)]
     if not blocks:
         return None
-    declared = {found.end(): found[1] for found in _DECLARE.finditer(text)}
-    starts = {found.end() - 1: found.start() for found in _CAMERA.finditer(text)}
+    declared = {match.end(): match[1] for match in _DECLARE.finditer(text)}
+    starts = {match.end() - 1: match.start() for match in _CAMERA.finditer(text)}
     used = [opened for opened in blocks if starts[opened] not in declared]
     chosen = used or blocks
     if not used and len(blocks) > 1:
@@ -109,14 +109,14 @@ class _Block:
         self.conditions = _conditions(text)
         self._refuse_condition(opened)
         self.declared = {}
-        for found in _DECLARE.finditer(text, 0, opened):
-            self.declared.setdefault(found[1], []).append(found.end())
+        for match in _DECLARE.finditer(text, 0, opened):
+            self.declared.setdefault(match[1], []).append(match.end())
         self._before, self._depth = opened, 0
         self._values: dict[int, object] = {}  # by where it is declared
         self._aspect_of_film = False
         self.film: texts.Film | None = None
         self.reader = Expressions(text, self._name, angled=True)
-        self.said: dict[str, object] = {}
+        self.values: dict[str, object] = {}
         self.moves: list[tuple[np.ndarray, np.ndarray]] = []
         self._collect(opened, 0)
 
@@ -165,9 +165,9 @@ class _Block:
     def _collect(self, opened: int, depth: int) -> None:
         end = texts.closing(self.text, opened, "{}")
         at, is_first = opened + 1, True
-        while found := _WORD.match(self.text, at, end):
-            word, at = found[1], found.end()
-            at = self._take(word, found.start(1), at, is_first, depth)
+        while match := _WORD.match(self.text, at, end):
+            word, at = match[1], match.end()
+            at = self._take(word, match.start(1), at, is_first, depth)
             is_first = False
             while self.text[at : at + 1] in (",", ";", " ", "\n", "\t") and at < end:
                 at += 1
@@ -181,13 +181,13 @@ class _Block:
             not_a_pinhole("POV-Ray's camera", word)
         if word in _VECTORS:
             value, end = self.reader.value(at)
-            self.said[word] = self._vector(value, at, word)
+            self.values[word] = self._vector(value, at, word)
             return end
         if word in ("angle", "aperture", *_BLUR):
             value, end = self.reader.value(at)
             if word in ("angle", "aperture") and not isinstance(value, float):
                 texts.fail(self.text, _place(value, at), f"give a plain number for {word}")
-            self.said[word] = value
+            self.values[word] = value
             if word == "bokeh":
                 texts.fail(self.text, start, "this camera blurs and is no pinhole, take bokeh out")
             if self.text[(after := end) : after + 1] == ",":  # angle of a fisheye, confidence
@@ -214,10 +214,10 @@ class _Block:
         value, end = self.reader.value(at)
         turn, shift = np.eye(3), np.zeros(3)
         if word == "matrix":
-            given = numbers(value, 12)
-            if given is None:
+            numbers_given = numbers(value, 12)
+            if numbers_given is None:
                 texts.fail(self.text, _place(value, at), "give twelve plain numbers for matrix")
-            rows = np.array(given).reshape(4, 3)
+            rows = np.array(numbers_given).reshape(4, 3)
             turn, shift = rows[:3].T, rows[3]
         else:
             vector = self._vector(value, at, word)
@@ -232,38 +232,38 @@ class _Block:
         return end
 
     def camera(self) -> Camera:
-        said = self.said
-        if said.get("aperture"):
+        values = self.values
+        if values.get("aperture"):
             raise InputError("the camera's aperture blurs, so it is no pinhole: set it to 0 for its middle")
-        if "right" not in said and self.version >= 3.8:  # as wide as the picture
-            said["right"] = (self._filmed().width * self._filmed().pixel_aspect / self._filmed().height, 0.0, 0.0)
+        if "right" not in values and self.version >= 3.8:  # as wide as the picture
+            values["right"] = (self._filmed().width * self._filmed().pixel_aspect / self._filmed().height, 0.0, 0.0)
             self._aspect_of_film = True
-        right = np.array(said.get("right", (1.33, 0.0, 0.0)))
-        up, direction = np.array(said.get("up", _UNITS["y"])), np.array(said.get("direction", _UNITS["z"]))
-        sky, eye = said.get("sky", _UNITS["y"]), np.array(said.get("location", (0.0, 0.0, 0.0)))
+        right = np.array(values.get("right", (1.33, 0.0, 0.0)))
+        up, direction = np.array(values.get("up", _UNITS["y"])), np.array(values.get("direction", _UNITS["z"]))
+        sky, eye = values.get("sky", _UNITS["y"]), np.array(values.get("location", (0.0, 0.0, 0.0)))
         lengths = [math.hypot(*vector) for vector in (right, up, direction)]
         if min(lengths) < 1e-12 or max(lengths) > 1e12:
             raise InputError("right, up or direction of POV-Ray's camera has no length: give each one")
-        if "angle" in said:
-            angle = float(said["angle"])
+        if "angle" in values:
+            angle = float(values["angle"])
             if not _NARROWEST < angle < 180:
                 raise InputError(f"angle of POV-Ray's camera is {angle:g}°: give one between 0 and 180")
             direction = direction / lengths[2] * (lengths[0] / 2 / math.tan(math.radians(angle) / 2))
             lengths[2] = math.hypot(*direction)
         is_left_handed = float(np.cross(up, direction) @ right) > 0
-        along = np.array(said["look_at"]) - eye if "look_at" in said else np.zeros(3)
+        along = np.array(values["look_at"]) - eye if "look_at" in values else np.zeros(3)
         if along.any() and np.abs(np.cross(sky, along / math.hypot(*along))).max() < _PARALLEL:
             along, right = along / math.hypot(*along), right / lengths[0]  # POV-Ray keeps right as it is then
             up, direction = np.cross(along, right) * lengths[1], along * lengths[2]
             right = right * (lengths[0] if is_left_handed else -lengths[0])
-            said = {word: value for word, value in said.items() if word != "look_at"}
+            values = {word: value for word, value in values.items() if word != "look_at"}
         film = self._film(lengths[0] / lengths[1])
         size = (film.width, film.height)
         # A picture whose pixels nobody said has square ones, and a width that is whole: half a pixel may be missing there.
         is_known = film.is_stated or self._aspect_of_film or self._is_given
         exact = size[0] if is_known else size[1] * lengths[0] / lengths[1] / film.pixel_aspect
-        if "look_at" in said:
-            look_at = said["look_at"]
+        if "look_at" in values:
+            look_at = values["look_at"]
             plane = axes.view_plane(
                 lengths[2] * exact / lengths[0], lengths[2] * size[1] / lengths[1], size[0] / 2, size[1] / 2, size
             )
@@ -274,14 +274,14 @@ class _Block:
                 u, v, w = pinhole.basis()
                 direction, up = -w * lengths[2], v * lengths[1]
                 right = (-u if is_left_handed else u) * lengths[0]
-        if "look_at" not in said or self.moves:
+        if "look_at" not in values or self.moves:
             for turn, shift in self.moves:
                 eye, right, up, direction = turn @ eye + shift, turn @ right, turn @ up, turn @ direction
             rays = np.column_stack([right / exact, -up / size[1], direction - right / 2 + up / 2])
             if abs(np.linalg.det(rays)) < 1e-30:
                 raise InputError("right, up and direction of POV-Ray's camera lie in one plane: turn one of them")
-            centred = np.array([[1, 0, (size[0] - exact) / 2], [0, 1, 0], [0, 0, 1]])
-            pinhole, notes = texts.projected(centred @ np.linalg.inv(rays), tuple(eye.tolist()), size, "POV-Ray's camera")
+            centered = np.array([[1, 0, (size[0] - exact) / 2], [0, 1, 0], [0, 0, 1]])
+            pinhole, notes = texts.projected(centered @ np.linalg.inv(rays), tuple(eye.tolist()), size, "POV-Ray's camera")
         camera = Camera("Camera", pinhole, film.is_stated, (*film.notes, *notes))
         return texts.mirroring(camera, "POV-Ray")
 
@@ -314,13 +314,13 @@ def _place(value: object, at: int) -> int:
 def _conditions(text: str) -> list[tuple[int, int]]:
     """The beginnings and ends of #if … #end and their like."""
     result, opened = [], []
-    for found in _CONDITION.finditer(text):
-        if found[1] != "end":
-            opened.append(found.start())
+    for match in _CONDITION.finditer(text):
+        if match[1] != "end":
+            opened.append(match.start())
         elif opened:
             start = opened.pop()
             if not opened:
-                result.append((start, found.start()))
+                result.append((start, match.start()))
     return result + [(start, len(text)) for start in opened[:1]]
 
 

@@ -34,12 +34,12 @@ def recognises(source: Source) -> bool:
 
 def read(source: Source, options: Options) -> list[Camera]:
     text = source.text + "\n"
-    found = list(_CAMERA.finditer(text))
-    if len(found) > 1:
-        raise InputError(f"{source.name} adds {len(found)} cameras: keep one of them")
+    matches = list(_CAMERA.finditer(text))
+    if len(matches) > 1:
+        raise InputError(f"{source.name} adds {len(matches)} cameras: keep one of them")
     lines = []
-    for line in text[found[0].end() :].split("\n"):
-        if line.strip() and len(line) - len(line.lstrip()) <= len(found[0][1]):
+    for line in text[matches[0].end() :].split("\n"):
+        if line.strip() and len(line) - len(line.lstrip()) <= len(matches[0][1]):
             break
         lines.append(line)
     values = Record(yaml.read("\n".join(lines)), "the camera")

@@ -33,7 +33,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     for file in files:
         with left_out.unless_pinhole(naming.stem(file.path.stem) if file.path else "RealityCapture"):
             cameras.append(_camera(file, options))
-    return left_out.told(cameras)
+    return left_out.with_notes(cameras)
 
 
 def _camera(source: Source, options: Options) -> Camera:
@@ -65,7 +65,7 @@ def _camera(source: Source, options: Options) -> Camera:
         notes += (f"{what} is of an upright picture: its focal length was taken for that of the longer side",)
     bent = flat(f"the distortion of {what}", values.get("DistortionCoeficients") or values.get("DistortionCoefficients") or "0")
     numbers = dict(zip(_LENS, bent, strict=False))
-    lens, told = distortion.settle(_lens(values.get("DistortionModel", ""), numbers), plane, what, options.without_distortion)
+    lens, note = distortion.settle(_lens(values.get("DistortionModel", ""), numbers), plane, what, options.without_distortion)
     turn, eye = flat(f"Rotation of {what}", values["Rotation"]), flat(f"Position of {what}", values["Position"])
     if len(turn) != 9 or len(eye) != 3:
         raise InputError(f"{what} has {len(turn)} numbers of a rotation and {len(eye)} of a position: it should have 9 and 3")
@@ -73,7 +73,7 @@ def _camera(source: Source, options: Options) -> Camera:
     matrix[:3, :3] = np.array(turn).reshape(3, 3).T
     matrix[:3, 3] = eye
     pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, what)
-    return Camera(naming.stem(name), pinhole, stated, (*notes, *told, *more), image, lens=lens)
+    return Camera(naming.stem(name), pinhole, stated, (*notes, *note, *more), image, lens=lens)
 
 
 def _lens(model: str, numbers: dict[str, float]) -> distortion.Lens:

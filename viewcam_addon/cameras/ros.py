@@ -33,7 +33,7 @@ def recognises(source: Source) -> bool:
 def read(source: Source, options: Options) -> list[Camera]:
     document = Record(source.yaml, source.name)
     name = str(document.values.get("camera_name") or "camera")
-    what = f"camera {checks.shown(name)}"
+    what = f"camera {checks.quoted(name)}"
     is_fisheye = opencv.says_fisheye(document.values, what)
     k = document.record("camera_matrix").numbers("data", 9)
     if k[0] == 0:
@@ -46,8 +46,8 @@ def read(source: Source, options: Options) -> list[Camera]:
         inner = document.record("distortion_coefficients")
         numbers = inner.get("data") if "data" in inner else []
         numbers = Record({"data": numbers}, what).numbers("data", len(numbers))
-        lens, told = opencv.settled(numbers[:4] if is_fisheye else numbers, is_fisheye, plane, what, options)
-        notes += told
+        lens, note = opencv.settled(numbers[:4] if is_fisheye else numbers, is_fisheye, plane, what, options)
+        notes += note
     else:
         lens = None
         opencv.refuse_unknown_distortion(document.values, what)

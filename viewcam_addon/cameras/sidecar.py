@@ -24,7 +24,7 @@ SUFFIX = ".json"
 
 CONVENTION = (
     "K times the first three numbers of worldToCamera times (x, y, z, 1) is depth times (column, row, 1): column vectors; "
-    "camera x right, y down, z into the view; pixels from the upper left corner of the picture, the first one's centre at "
+    "camera x right, y down, z into the view; pixels from the upper left corner of the picture, the first one's center at "
     "(0.5, 0.5). cameraToWorld: camera x right, y up, z away from the view, as Blender's matrix_world"
 )
 
@@ -80,7 +80,7 @@ def _camera(source: Source) -> Camera:
     camera = document.record("camera")
     fields = {field.name for field in dataclasses.fields(Pinhole)}
     if unknown := camera.values.keys() - fields:
-        raise InputError(f"the key {checks.shown(min(unknown))} of {camera.place} is none of a camera: take it out")
+        raise InputError(f"the key {checks.quoted(min(unknown))} of {camera.place} is none of a camera: take it out")
     if missing := fields - camera.values.keys():
         raise InputError(f"{camera.place} has no {min(missing)}: it can't be a camera without")
     preview = next((document.get(key) for key in ("preview", "image") if isinstance(document.get(key), str)), None)

@@ -116,8 +116,8 @@ class Source:
         except (LookupError, ValueError):
             encoding = ""
         if encoding not in _ENCODINGS:
-            return usual, f"{self.name} says that its encoding is {checks.shown(name)}, which is unknown: {advice}"
-        contradicts = f"{self.name} says that its encoding is {checks.shown(name)} and is not written in it: {advice}"
+            return usual, f"{self.name} says that its encoding is {checks.quoted(name)}, which is unknown: {advice}"
+        contradicts = f"{self.name} says that its encoding is {checks.quoted(name)} and is not written in it: {advice}"
         if bool(utf_16) != encoding.startswith("utf-16"):
             return usual, contradicts
         encoding = usual if encoding in ("utf-8", "utf-16", "utf-16-le", "utf-16-be") else encoding
@@ -136,7 +136,8 @@ class Source:
         problem = ""
         for attempt in attempts:
             try:
-                return json.loads(attempt, object_pairs_hook=_unique, parse_int=_whole, parse_constant=_not_finite), ""
+                numbers = {"parse_int": checks.whole_of_json, "parse_constant": _not_finite}
+                return json.loads(attempt, object_pairs_hook=_unique, **numbers), ""
             except json.JSONDecodeError as error:
                 problem = f"line {error.lineno}, column {error.colno}: {error.msg}"
             except RecursionError:
@@ -207,7 +208,7 @@ class Record:
 
     def __init__(self, values: object, place: str) -> None:
         if not isinstance(values, dict):
-            raise InputError(f"{place} is {checks.shown(values)}: it should be an object with keys")
+            raise InputError(f"{place} is {checks.quoted(values)}: it should be an object with keys")
         self.values, self.place = values, place
 
     def __contains__(self, key: str) -> bool:
@@ -239,7 +240,7 @@ class Record:
     def text(self, key: str, default: str | None = None) -> str:
         value = self.values.get(key, default)
         if not isinstance(value, str):
-            raise InputError(f"{self.called(key)} is {checks.shown(value)}: it should be a text")
+            raise InputError(f"{self.called(key)} is {checks.quoted(value)}: it should be a text")
         return value
 
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
@@ -256,9 +257,9 @@ class Record:
         """The objects of a list, or of an object by their keys. kind : what one of them is ("frame")."""
         values = self.values.get(key)
         if isinstance(values, dict):
-            return [Record(value, f"{kind} {checks.shown(name)}") for name, value in values.items()]
+            return [Record(value, f"{kind} {checks.quoted(name)}") for name, value in values.items()]
         if not isinstance(values, list):
-            raise InputError(f"{self.called(key)} is {checks.shown(values)}: it should be a list")
+            raise InputError(f"{self.called(key)} is {checks.quoted(values)}: it should be a list")
         return [Record(value, f"{kind} {number}") for number, value in enumerate(values)]
 
 
@@ -270,7 +271,7 @@ def number(name: str, value: object, least: float = -1e300, most: float = 1e300)
                 raise ValueError
             value = float(value)
         except ValueError:
-            raise InputError(f"{name} is {checks.shown(value)}: give a number") from None
+            raise InputError(f"{name} is {checks.quoted(value)}: give a number") from None
     return checks.number(name, value, least, most)
 
 
@@ -287,11 +288,11 @@ def flat(name: str, value: object) -> tuple[float, ...]:
     if isinstance(value, str):
         value = re.split(r"[\s,;]+", value.strip())
     if not isinstance(value, list | tuple):
-        raise InputError(f"{name} is {checks.shown(value)}: give a list of numbers")
-    found: list[float] = []
+        raise InputError(f"{name} is {checks.quoted(value)}: give a list of numbers")
+    result: list[float] = []
     for item in value:
-        found += flat(name, item) if isinstance(item, list) else [number(name, item)]
-    return tuple(found)
+        result += flat(name, item) if isinstance(item, list) else [number(name, item)]
+    return tuple(result)
 
 
 def numbered_lines(source: Source) -> list[tuple[int, str]]:
@@ -351,20 +352,16 @@ def _size_in(head: bytes) -> tuple[int, int] | None:
 
 
 def _without_comments(text: str) -> str:
-    text = _COMMENT.sub(lambda found: found[0] if found[0][0] == '"' or found["end"] == "" else " ", text)
-    return _TRAILING_COMMA.sub(lambda found: found[0] if found[0][0] == '"' else " ", text)
+    text = _COMMENT.sub(lambda match: match[0] if match[0][0] == '"' or match["end"] == "" else " ", text)
+    return _TRAILING_COMMA.sub(lambda match: match[0] if match[0][0] == '"' else " ", text)
 
 
 def _unique(pairs: list[tuple[str, object]]) -> dict:
     result = dict(pairs)
     if len(result) < len(pairs):
         twice, _ = Counter(key for key, _ in pairs).most_common(1)[0]
-        raise InputError(f"the key {checks.shown(twice)} is given twice: leave one out")
+        raise InputError(f"the key {checks.quoted(twice)} is given twice: leave one out")
     return result
-
-
-def _whole(digits: str) -> int | float:
-    return int(digits) if len(digits) <= 300 else float(digits)  # Python refuses thousands of them
 
 
 def _not_finite(name: str) -> float:

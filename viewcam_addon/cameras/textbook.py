@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from . import look_at, own, texts
 from .camera import Camera, Options
-from .unreal import centred_field_of_view
+from .unreal import centered_field_of_view
 
 TITLE = "textbook ray tracer (set_eye, set_lookat …)"
 READER = look_at
@@ -23,7 +23,7 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
 
 def _written(camera: Camera) -> str:
     pinhole = camera.pinhole
-    centred_field_of_view(camera, "a textbook ray tracer")
+    centered_field_of_view(camera, "a textbook ray tracer")
     lines = [
         *own.beginning(camera, "//"),
         "Pinhole* camera = new Pinhole;",

@@ -42,7 +42,7 @@ def fail(text: str, at: int, advice: str) -> NoReturn:
     place = text[at : at + 40].strip()
     line = text.count("\n", 0, at) + 1
     raise InputError(
-        f"the text is not understood {f'at {checks.shown(place)}' if place else 'at its end'} (line {line}): {advice}"
+        f"the text is not understood {f'at {checks.quoted(place)}' if place else 'at its end'} (line {line}): {advice}"
     )
 
 
@@ -52,8 +52,8 @@ def without(comments: str, text: str) -> str:
     return pattern.sub(_blanked, text)
 
 
-def _blanked(found: re.Match) -> str:
-    matched = found[0]
+def _blanked(match: re.Match) -> str:
+    matched = match[0]
     if matched[0] == '"':
         return matched
     return " " * len(matched) if "\n" not in matched else "\n".join(" " * len(line) for line in matched.split("\n"))
@@ -64,21 +64,21 @@ def numbers(text: str, at: int, count: int, name: str) -> tuple[tuple[float, ...
     result: list[float] = []
     while len(result) < count:
         at = _GAP.match(text, at).end()
-        found = _NUMBER.match(text, at)
-        if not found or not math.isfinite(float(found[0])):
+        match = _NUMBER.match(text, at)
+        if not match or not math.isfinite(float(match[0])):
             fail(text, at, f"give {count} finite numbers for {name}" if count > 1 else f"give a finite number for {name}")
-        result.append(float(found[0]))
-        at = found.end()
+        result.append(float(match[0]))
+        at = match.end()
     return tuple(result), at
 
 
 def closing(text: str, opened: int, brackets: str) -> int:
     """The place where the bracket that opens at `opened` closes."""
     depth = 0
-    for found in re.compile("[" + re.escape(brackets) + "]").finditer(text, opened):
-        depth += 1 if found[0] == brackets[0] else -1
+    for match in re.compile("[" + re.escape(brackets) + "]").finditer(text, opened):
+        depth += 1 if match[0] == brackets[0] else -1
         if depth == 0:
-            return found.start()
+            return match.start()
     fail(text, opened, f"close it with {brackets[1]}")
 
 
@@ -115,9 +115,9 @@ class Film:
             "smaller": min(width, height),
             "larger": max(width, height),
         }[axis]
-        return self.centred(side / 2 / math.tan(angle / 2) / self.pixel_aspect)
+        return self.centered(side / 2 / math.tan(angle / 2) / self.pixel_aspect)
 
-    def centred(self, distance: float) -> ViewPlane:
+    def centered(self, distance: float) -> ViewPlane:
         """The view plane of a distance in pixel widths, its principal point in the middle."""
         if checks.number("the distance", distance) <= 0:
             raise InputError(f"distance is {distance:g} pixels: the view plane must lie before the eye, give d > 0")
@@ -158,8 +158,8 @@ def film(
     if not 1e-4 < aspect < 1e4:
         raise InputError(f"the picture of {what} is {aspect:g} times as wide as high: give an aspect between 0.0001 and 10000")
     width = max(1, round(taken.height * aspect / taken.pixel_aspect))
-    told = f"The picture of {what} is {aspect:.6g} times as wide as high: taken as {width} × {taken.height} pixels"
-    return replace(taken, width=width, notes=(*notes, told))
+    note = f"The picture of {what} is {aspect:.6g} times as wide as high: taken as {width} × {taken.height} pixels"
+    return replace(taken, width=width, notes=(*notes, note))
 
 
 def posed(

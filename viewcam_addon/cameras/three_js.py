@@ -32,22 +32,22 @@ def recognises(source: Source) -> bool:
 def _tops(source: Source) -> list[dict]:
     """The object; of a file of the editor the camera of its window and the scene."""
     among = (source.document, source.document.get("camera"), source.document.get("scene"))
-    found = [each.get("object") for each in among if isinstance(each, dict)]
-    return [top for top in found if isinstance(top, dict) and isinstance(top.get("type"), str)]
+    objects = [each.get("object") for each in among if isinstance(each, dict)]
+    return [top for top in objects if isinstance(top, dict) and isinstance(top.get("type"), str)]
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    found = [camera for top in _tops(source) for camera in _cameras(top, np.eye(4), 0)]
-    if not found:
+    result = [camera for top in _tops(source) for camera in _cameras(top, np.eye(4), 0)]
+    if not result:
         raise InputError(f"{source.name} has no PerspectiveCamera: give a file with one")
     left_out, cameras = LeftOut(), []
-    for number, (item, matrix) in enumerate(found):
+    for number, (item, matrix) in enumerate(result):
         name = str(item.get("name") or f"camera {number + 1}")
         with left_out.unless_pinhole(name):
             if item.get("type") != "PerspectiveCamera":
-                not_a_pinhole(f"the camera {checks.shown(name)}", f"an {checks.shown(item.get('type'))}")
-            cameras.append(_camera(Record(item, f"the camera {checks.shown(name)}"), matrix, name, options))
-    return left_out.told(cameras)
+                not_a_pinhole(f"the camera {checks.quoted(name)}", f"an {checks.quoted(item.get('type'))}")
+            cameras.append(_camera(Record(item, f"the camera {checks.quoted(name)}"), matrix, name, options))
+    return left_out.with_notes(cameras)
 
 
 def _cameras(item: object, parent: np.ndarray, depth: int) -> Iterator[tuple[dict, np.ndarray]]:
@@ -55,7 +55,7 @@ def _cameras(item: object, parent: np.ndarray, depth: int) -> Iterator[tuple[dic
         return
     if depth > _DEEPEST:
         raise InputError(f"the scene is nested more than {_DEEPEST} objects deep: give the camera alone")
-    record = Record(item, f"the object {checks.shown(item.get('name'))}")
+    record = Record(item, f"the object {checks.quoted(item.get('name'))}")
     matrix = parent @ np.array(record.numbers("matrix", 16)).reshape(4, 4).T if "matrix" in record else parent
     if str(item.get("type", "")).endswith("Camera"):
         yield item, matrix

@@ -32,46 +32,46 @@ class Token(NamedTuple):
 
 def token(text: str, at: int) -> Token:
     """The first token from a place on."""
-    found = _TOKEN.match(text, at)
-    if found is None or (group := found.lastindex) is None:
+    match = _TOKEN.match(text, at)
+    if match is None or (group := match.lastindex) is None:
         return Token("", "", len(text), len(text))
-    return Token(("name", "number", "sign")[group - 1], found[group], found.start(group), found.end())
+    return Token(("name", "number", "sign")[group - 1], match[group], match.start(group), match.end())
 
 
 def words(text: str) -> tuple[list[str], list[int]]:
     """All tokens, each with its place."""
     texts, places = [], []
     known: dict[str, str] = {}  # each once: a program has few words and many of each
-    for found in _TOKEN.finditer(text):
-        if found.lastindex is not None:
-            word = found[found.lastindex]
+    for match in _TOKEN.finditer(text):
+        if match.lastindex is not None:
+            word = match[match.lastindex]
             texts.append(known.setdefault(word, word))
-            places.append(found.start(found.lastindex))
+            places.append(match.start(match.lastindex))
     return texts, places
 
 
 def number(word: str) -> float | None:
     """The value of a number as C, Python, JavaScript … write it, which may be infinite; None if it is none."""
-    found = _VALUE.fullmatch(word)
-    if found and found[1]:
-        return float(int(found[1], 16)) if len(found[1]) < 200 else math.inf
-    return float(found[2]) if found else None
+    match = _VALUE.fullmatch(word)
+    if match and match[1]:
+        return float(int(match[1], 16)) if len(match[1]) < 200 else math.inf
+    return float(match[2]) if match else None
 
 
 def string(text: str, at: int) -> tuple[str, int] | None:
     """The text between the quotes of which the first is at a place, and where it ends; None if its line has no second."""
-    found = _STRING[text[at]].match(text, at)
-    return (found[1], found.end()) if found and found[2] else None
+    match = _STRING[text[at]].match(text, at)
+    return (match[1], match.end()) if match and match[2] else None
 
 
 def outside_strings(text: str, at: int, end: int | None = None) -> Iterator[tuple[str, int]]:
     """The brackets, commas and semicolons that stand in no string, each with its place."""
     end = len(text) if end is None else end
     unclosed = dict.fromkeys(_STRING, at)  # up to where a quote is known to have no second one
-    while found := _OUTSIDE.search(text, at, end):
-        at = found.end()
-        if found[0] not in unclosed:
-            yield found[0], found.start()
-        elif unclosed[found[0]] <= found.start() and (quoted := _STRING[found[0]].match(text, found.start(), end)):
+    while match := _OUTSIDE.search(text, at, end):
+        at = match.end()
+        if match[0] not in unclosed:
+            yield match[0], match.start()
+        elif unclosed[match[0]] <= match.start() and (quoted := _STRING[match[0]].match(text, match.start(), end)):
             at = quoted.end() if quoted[2] else at
-            unclosed[found[0]] = quoted.end()
+            unclosed[match[0]] = quoted.end()

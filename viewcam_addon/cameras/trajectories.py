@@ -62,11 +62,11 @@ def read(source: Source, options: Options) -> list[Camera]:
         w_stands_last = kind == "TUM" and not _W_FIRST.search(source.text[:2000])
         quaternions = rows[:, [7, 4, 5, 6] if w_stands_last else [4, 5, 6, 7]]  # w x y z
         matrices[:, :3, :3], matrices[:, :3, 3] = axes.rotations_of(quaternions, whats), rows[:, 1:4]
-    found = axes.pinholes(axes.of_opencv(matrices @ mounted)[:, :3], [plane] * len(rows), whats)
+    placed = axes.pinholes(axes.of_opencv(matrices @ mounted)[:, :3], [plane] * len(rows), whats)
     digits = max(4, len(str(len(rows) - 1)))
     return [
         Camera(f"pose_{index:0{digits}d}", pinhole, stated, (*notes, *more), time=time, lens=lens)
-        for index, ((pinhole, more), time) in enumerate(zip(found, times.tolist(), strict=True))
+        for index, ((pinhole, more), time) in enumerate(zip(placed, times.tolist(), strict=True))
     ]
 
 
@@ -101,7 +101,7 @@ def _is_of_chan(row: list[float]) -> bool:
 
 def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | None, Lens | None, tuple[str, ...]]:
     """The pose of EuRoC's cam0 on the body, and how it sees."""
-    file = next((found for up in ("..", "../..") if (found := source.file(*up.split("/"), "cam0", "sensor.yaml"))), None)
+    file = next((path for up in ("..", "../..") if (path := source.file(*up.split("/"), "cam0", "sensor.yaml"))), None)
     if file is None:
         raise InputError(
             f"{source.name} has poses of the body, not of a camera: put it where ../cam0/sensor.yaml of the data set is found"

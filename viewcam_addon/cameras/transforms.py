@@ -147,10 +147,10 @@ def _picture(pinhole: Pinhole) -> dict[str, float]:
 
 def _files(source: Source) -> list[Source]:
     """The file itself; of a folder its transforms.json, or the original NeRF's transforms_train.json and its like."""
-    found = [source]
+    files = [source]
     if source.is_folder:
-        found = [file] if (file := source.file(FILE)) else [*source.files("transforms_*.json")]
-    return [file for file in found if _is_ours(file)]
+        files = [file] if (file := source.file(FILE)) else [*source.files("transforms_*.json")]
+    return [file for file in files if _is_ours(file)]
 
 
 def _is_ours(source: Source) -> bool:
@@ -163,7 +163,7 @@ def _cameras(source: Source, options: Options) -> list[Camera]:
     frames = top.records("frames", "frame")
     paths = [frame.text("file_path", f"frame {i}").replace("\\", "/") for i, frame in enumerate(frames)]
     undone = _applied(top) if options.original_world else None
-    told = () if options.original_world else _told_of_world(top)
+    world_notes = () if options.original_world else _told_of_world(top)
     planes: dict[object, tuple[ViewPlane, bool, distortion.Lens | None, tuple[str, ...]]] = {}
     left_out, cameras = LeftOut(), []
     for frame, path, name in zip(frames, paths, naming.distinct(paths), strict=True):
@@ -181,8 +181,8 @@ def _cameras(source: Source, options: Options) -> list[Camera]:
             image = path if naming.has_suffix(path) or "file_path" not in frame else f"{path}.png"
             time = frame.number("time") if "time" in frame else None
             image = image if "file_path" in frame else None
-            cameras.append(Camera(name, pinhole, stated, (*told, *notes, *more), image, time=time, lens=lens))
-    return left_out.told(cameras)
+            cameras.append(Camera(name, pinhole, stated, (*world_notes, *notes, *more), image, time=time, lens=lens))
+    return left_out.with_notes(cameras)
 
 
 def _merged(top: Record, frame: Record) -> Record:
@@ -190,11 +190,11 @@ def _merged(top: Record, frame: Record) -> Record:
     for key in (*_INTRINSICS, *_LENS, "distortion_params", "camera_model", "is_fisheye", *_OTHER_CAMERAS):
         if key in top and key in frame and top.get(key) != frame.get(key):
             raise InputError(
-                f"{key} is {checks.shown(top.get(key))} at the top of the file and {checks.shown(frame.get(key))} in "
+                f"{key} is {checks.quoted(top.get(key))} at the top of the file and {checks.quoted(frame.get(key))} in "
                 f"{frame.place}, and programs differ in which of them counts: take one out"
             )
-    said = {key: value for key, value in top.values.items() if key != "frames" and value is not None}
-    return Record(said | {key: value for key, value in frame.values.items() if value is not None}, frame.place)
+    shared = {key: value for key, value in top.values.items() if key != "frames" and value is not None}
+    return Record(shared | {key: value for key, value in frame.values.items() if value is not None}, frame.place)
 
 
 _FOCAL = {"x": ("fl_x", "x_fov", "camera_angle_x"), "y": ("fl_y", "y_fov", "camera_angle_y")}
@@ -208,7 +208,7 @@ def _plane(
     for key in ("camera_model", "camera_type"):
         model = both.values.get(key)
         if model is not None and str(model).upper() not in (*_PINHOLES, *_FISHEYES):
-            not_a_pinhole(both.place, f"of the {key.replace('_', ' ')} {checks.shown(model)}")
+            not_a_pinhole(both.place, f"of the {key.replace('_', ' ')} {checks.quoted(model)}")
     is_fisheye = any(str(both.values.get(key)).upper() in _FISHEYES for key in ("camera_model", "camera_type"))
     is_fisheye |= bool(both.values.get("is_fisheye"))
     if unread := next((key for key in both.values if key.lower() in _NOT_READ), None):
@@ -221,7 +221,7 @@ def _plane(
     convention = both.get("camera_convention")
     if convention is not None and str(convention).lower() not in _AXES:
         raise InputError(
-            f"{both.place} has the camera_convention {checks.shown(convention)}: write its matrices in opengl's axes"
+            f"{both.place} has the camera_convention {checks.quoted(convention)}: write its matrices in opengl's axes"
         )
     for key in _OTHER_AXES:
         if both.values.get(key):
@@ -263,19 +263,19 @@ def _size(both: Record, source: Source, path: str, options: Options) -> tuple[tu
 def _focal(both: Record, along: str, side: int) -> float | None:
     """The distance in pixels; all that say it must agree."""
     length, degrees, radians = _FOCAL[along]
-    found: dict[str, float] = {}
+    focal: dict[str, float] = {}
     if length in both:
-        found[length] = both.number(length, least=1e-9)
+        focal[length] = both.number(length, least=1e-9)
     for key, factor in ((degrees, math.pi / 180), (radians, 1.0)):
         if key in both:
             angle = both.number(key) * factor
             if not _LEAST_ANGLE < angle < math.pi:
                 raise InputError(f"{key} of {both.place} is {both.get(key)}: give an angle between 0 and half a turn")
-            found[key] = side / 2 / math.tan(angle / 2)
-    values = [*found.values()]
+            focal[key] = side / 2 / math.tan(angle / 2)
+    values = [*focal.values()]
     if values and max(values) > min(values) * (1 + _SAME_FOCAL):
-        said = " and ".join(f"{key} means {value:.6g} pixels" for key, value in found.items())
-        raise InputError(f"{both.place} contradicts itself: {said}; take the wrong one out, or give the right w and h")
+        sentence = " and ".join(f"{key} means {value:.6g} pixels" for key, value in focal.items())
+        raise InputError(f"{both.place} contradicts itself: {sentence}; take the wrong one out, or give the right w and h")
     return values[0] if values else None
 
 

@@ -23,7 +23,7 @@ from typing import Any, cast
 import numpy as np
 
 from .. import npy
-from ..errors import InputError
+from ..errors import InputError, several
 from ..files import read_bytes, written_whole
 from ..pinhole import ViewPlane
 from . import colmap, naming, transforms
@@ -86,12 +86,12 @@ def places(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> np.ndarray:
     middle = np.array([plane.principal_point[0], plane.height - plane.principal_point[1]])
     columns = (np.arange(cut.width) + 0.5 - cut.principal_point[0]) / cut.distance[0]
     down = (np.arange(cut.height) + 0.5 - (cut.height - cut.principal_point[1])) / cut.distance[1]
-    found = np.empty((cut.height, cut.width, 2))
+    pixels = np.empty((cut.height, cut.width, 2))
     for rows in _bands(cut):
         points = np.stack(np.meshgrid(columns, down[rows]), axis=-1)
-        found[rows] = lens.distort(points) * plane.distance + middle
-        found[rows][lens.folds(points)] = np.nan
-    return found
+        pixels[rows] = lens.distort(points) * plane.distance + middle
+        pixels[rows][lens.folds(points)] = np.nan
+    return pixels
 
 
 def _bands(cut: ViewPlane) -> list[slice]:
@@ -116,12 +116,12 @@ def st_maps(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> tuple[np.ndarray, n
     return _st(places(lens, plane, cut), plane), _st(back, cut)
 
 
-def _st(found: np.ndarray, other: ViewPlane) -> np.ndarray:
+def _st(pixels: np.ndarray, other: ViewPlane) -> np.ndarray:
     """A map of places in another picture, in its pixels from the top left."""
-    shares = found / (other.width, other.height)
+    shares = pixels / (other.width, other.height)
     with np.errstate(invalid="ignore"):
         within = (np.abs(shares - 0.5) <= 0.5 + 1 / np.array([other.width, other.height])).all(axis=-1)
-    result = np.zeros((*found.shape[:2], 4), np.float32)
+    result = np.zeros((*pixels.shape[:2], 4), np.float32)
     result[within, 0], result[within, 1], result[within, 3] = shares[within, 0], 1 - shares[within, 1], 1
     return result
 
@@ -171,9 +171,9 @@ def resampled(photograph: np.ndarray, lens: Lens, plane: ViewPlane, cut: ViewPla
     """
     picture = np.zeros((cut.height, cut.width, *photograph.shape[2:]), photograph.dtype)
     limits = np.array(photograph.shape[1::-1])
-    found = places(lens, plane, cut)
+    pixels = places(lens, plane, cut)
     for rows in _bands(cut):
-        at = found[rows] if nearest else found[rows] - 0.5
+        at = pixels[rows] if nearest else pixels[rows] - 0.5
         with np.errstate(invalid="ignore"):
             seen = ((at >= 0) & (at < limits if nearest else at <= limits - 1)).all(axis=-1)
         x, y = at[seen].T
@@ -216,7 +216,7 @@ def _save(cameras: Sequence[Camera], dataset: Path, out: Path, form: str, blank:
     beside = _beside(dataset, cameras)
     files = [naming.picture_of(camera, folder) for camera in cameras]
     if missing := [naming.image_of(camera) for camera, file in zip(cameras, files, strict=True) if file is None]:
-        raise InputError(f"{naming.several(missing)} can't be found beside {dataset} nor in images/: put the pictures there")
+        raise InputError(f"{several(missing)} can't be found beside {dataset} nor in images/: put the pictures there")
     written, frames = [], []
     for camera, pinhole, file, others in zip(cameras, straight(cameras, blank), files, beside, strict=True):
         name = naming.image_of(camera).removeprefix("images/")
@@ -261,7 +261,7 @@ def _beside(dataset: Path, cameras: Sequence[Camera]) -> list[dict[str, Path]]:
     folder = dataset if dataset.is_dir() else dataset.parent
     listed = _document(dataset).get("frames")
     frames = {str(frame.get("file_path")): frame for frame in listed or () if isinstance(frame, dict)}
-    found = []
+    result = []
     for camera in cameras:
         name = naming.inside(naming.image_of(camera))
         beside: dict[str, Path] = {}
@@ -274,8 +274,8 @@ def _beside(dataset: Path, cameras: Sequence[Camera]) -> list[dict[str, Path]]:
         masks = (naming.near(f"masks/{each}.png", folder) for each in (name, name.rpartition(".")[0]))
         if not frames and (mask := next(filter(None, masks), None)):
             beside["mask_path"] = mask
-        found.append(beside)
-    return found
+        result.append(beside)
+    return result
 
 
 def _convert(file: Path, target: Path, camera: Camera, cut: ViewPlane, nearest: bool) -> None:

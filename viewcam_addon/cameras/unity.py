@@ -17,7 +17,7 @@ from ..errors import InputError
 from . import axes
 from .camera import Camera, Options
 from .matrices import projection, view
-from .unreal import centred_field_of_view
+from .unreal import centered_field_of_view
 
 TITLE = "Unity cameras (JSON)"
 SUFFIX = ".json"
@@ -35,7 +35,7 @@ def _written(camera: Camera) -> dict:
     forward = tuple(-x for x in w)
     qw, qx, qy, qz = axes.quaternion([*zip(u, v, forward, strict=True)])
     try:
-        angle = {"fieldOfView": centred_field_of_view(camera, "Unity")[1]}
+        angle = {"fieldOfView": centered_field_of_view(camera, "Unity")[1]}
     except InputError:
         angle = {}
     return {

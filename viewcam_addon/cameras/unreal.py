@@ -46,13 +46,13 @@ def _line(camera: Camera, quaternion: axes.Quaternion) -> str:
     pinhole = camera.pinhole
     qw, qx, qy, qz = quaternion
     place = [_CENTIMETRES * part for part in (pinhole.eye[0], -pinhole.eye[1], pinhole.eye[2])]
-    fov = centred_field_of_view(camera, "Unreal")[0]
+    fov = centered_field_of_view(camera, "Unreal")[0]
     name = camera.name.replace('"', '""')
     name = f'"{name}"' if any(sign in name for sign in ',"\n\r') else name
     return ",".join([name, texts.listed([*place, qx, qy, qz, qw, fov, pinhole.width, pinhole.height], ",")])
 
 
-def centred_field_of_view(camera: Camera, engine: str) -> tuple[float, float]:
+def centered_field_of_view(camera: Camera, engine: str) -> tuple[float, float]:
     """Degrees of the width and of the height.
 
     Raises

@@ -43,24 +43,24 @@ def recognises(source: Source) -> bool:
 
 def read(source: Source, options: Options) -> list[Camera]:
     stage = _stage(source)
-    told = _told(stage)
-    left_out, found = LeftOut(InputError), []
+    notes = _notes(stage)
+    left_out, result = LeftOut(InputError), []
     for camera in stage["cameras"]:
         with left_out.unless_pinhole(camera["name"]):
             if "error" in camera:
-                raise InputError(f"camera {checks.shown(camera['name'])} can't be read ({camera['error']}): export it again")
-            found += [_camera(camera["name"], sample, options).noted(*told) for sample in camera["samples"]]
-    return left_out.told(found)
+                raise InputError(f"camera {checks.quoted(camera['name'])} can't be read ({camera['error']}): export it again")
+            result += [_camera(camera["name"], sample, options).noted(*notes) for sample in camera["samples"]]
+    return left_out.with_notes(result)
 
 
-def _told(stage: dict[str, Any]) -> tuple[str, ...]:
+def _notes(stage: dict[str, Any]) -> tuple[str, ...]:
     unit, notes = stage["metres_per_unit"], []
     if stage["y_up"] or unit != 1:
         turned = "y up was turned to z up" if stage["y_up"] else "its z points up"
-        scaled = f"one unit of it is {unit:g} m" if unit != 1 else "it counts in metres"
+        scaled = f"one unit of it is {unit:g} m" if unit != 1 else "it counts in meters"
         notes.append(f"The world was taken as the stage says it, as Blender's importer does: {turned}, {scaled}")
     if others := stage["left_out"]:
-        names = ", ".join(map(checks.shown, others[:_MOST_NAMED])) + (" …" if len(others) > _MOST_NAMED else "")
+        names = ", ".join(map(checks.quoted, others[:_MOST_NAMED])) + (" …" if len(others) > _MOST_NAMED else "")
         notes.append(f"Not read, since nothing but layers in the file's own folder is: {names}")
     return tuple(notes)
 
@@ -74,11 +74,12 @@ def in_world(source: Source, options: Options) -> Options:
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
     up = "Y" if options.axes == "y_up" else "Z"
-    blocks, taken = [], set()
+    blocks: list[str] = []
+    taken: set[str] = set()
     for camera in cameras:
         blocks.append(_prim(camera, _identifier(camera.name, taken)))
-    told = f'    doc = "{options.remembered}"\n' if options.remembered else ""
-    return f'#usda 1.0\n(\n{told}    metersPerUnit = 1\n    upAxis = "{up}"\n)\n\n' + "\n".join(blocks)
+    doc = f'    doc = "{options.remembered}"\n' if options.remembered else ""
+    return f'#usda 1.0\n(\n{doc}    metersPerUnit = 1\n    upAxis = "{up}"\n)\n\n' + "\n".join(blocks)
 
 
 def notes_in(source: Source) -> list[str]:
@@ -95,7 +96,7 @@ def _stage(source: Source) -> dict[str, Any]:
 
 def _camera(name: str, sample: dict[str, Any], options: Options) -> Camera:
     name = name if sample["time"] is None else f"{name} {sample['time']:g}"
-    what = f"camera {checks.shown(name)}"
+    what = f"camera {checks.quoted(name)}"
     values = Record(sample, what)
     if sample["Projection"] == "orthographic":
         not_a_pinhole(what, "orthographic")
@@ -125,19 +126,19 @@ def _camera(name: str, sample: dict[str, Any], options: Options) -> Camera:
     return Camera(name, pinhole, stated, (*notes, *more), time=sample["seconds"])
 
 
-def _size(said: object, what: str) -> tuple[int, int]:
-    if not isinstance(said, list) or len(said) != 2:
-        raise InputError(f"{_SIZE} of {what} is {checks.shown(said)}: it should be two numbers of pixels")
-    width, height = (pixels(f"{_SIZE} of {what}", side) for side in said)
+def _size(size: object, what: str) -> tuple[int, int]:
+    if not isinstance(size, list) or len(size) != 2:
+        raise InputError(f"{_SIZE} of {what} is {checks.quoted(size)}: it should be two numbers of pixels")
+    width, height = (pixels(f"{_SIZE} of {what}", side) for side in size)
     return width, height
 
 
 def _identifier(name: str, taken: set[str]) -> str:
-    found = re.sub(r"\W", "_", name, flags=re.ASCII)
-    found = f"_{found}" if not found or found[0].isdigit() else found
-    result, number = found, 1
+    identifier = re.sub(r"\W", "_", name, flags=re.ASCII)
+    identifier = f"_{identifier}" if not identifier or identifier[0].isdigit() else identifier
+    result, number = identifier, 1
     while result in taken:
-        result, number = f"{found}_{number}", number + 1
+        result, number = f"{identifier}_{number}", number + 1
     taken.add(result)
     return result
 

@@ -24,9 +24,9 @@ def read(text: str) -> dict[str, Any]:
         if (item := _ITEM.match(line)) and block is not None and len(item[1]) >= block[0]:
             block[1].append(_value(item[2].strip()))
             continue
-        if not (found := _key(line)):
+        if not (match := _key(line)):
             continue
-        indent, key, value = found
+        indent, key, value = match
         while indent <= stack[-1][0]:
             stack.pop()
         holder, block = stack[-1][1], None

@@ -1,5 +1,7 @@
-"""`viewcam audit`: what is wrong with a dataset's cameras, by points, depth maps, true cameras or the .blend that was
-rendered (cameras/audit.py)."""
+"""Tell what is wrong with a dataset's cameras, by its points or depth maps.
+
+By points, depth maps, true cameras or the .blend that was rendered (cameras/audit.py).
+"""
 
 import argparse
 import dataclasses
@@ -15,7 +17,7 @@ from ..cameras.evidence import depths, tracks
 from ..errors import InputError
 from ..terminal import say, silent_libraries
 from . import Result, blender_room
-from . import options as shared
+from . import _options as shared
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
@@ -32,11 +34,11 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
 
 
 def run(options: argparse.Namespace) -> Result:
-    taken = Options(size=options.size, original_world=True)
+    reading = Options(size=options.size, original_world=True)
     with silent_libraries():
-        found: Sequence[Camera] = cameras.read(options.dataset, options=taken)
-        found, evidence, by = _evidence(options, found, taken)
-    verdict = audit(found, evidence)
+        dataset: Sequence[Camera] = cameras.read(options.dataset, options=reading)
+        dataset, evidence, by = _evidence(options, dataset, reading)
+    verdict = audit(dataset, evidence)
     say(f"{options.dataset}: {verdict.sentence}")
     if verdict.kind != "unsure":
         say(f"Sure to e^{verdict.certainty:.0f} : 1 by {verdict.observations} observations of {by}")
@@ -45,26 +47,26 @@ def run(options: argparse.Namespace) -> Result:
 
 
 def _evidence(
-    options: argparse.Namespace, found: Sequence[Camera], taken: Options
+    options: argparse.Namespace, dataset: Sequence[Camera], reading: Options
 ) -> tuple[Sequence[Camera], Tracks | Depths, str]:
     """The cameras that there is evidence on, the evidence, and what it is."""
-    if given := options.against or options.blend:
+    if source := options.against or options.blend:
         if options.blend:
-            names = [_called(camera) for camera in found]
+            names = [_called(camera) for camera in dataset]
             read = blender_room("dataset_cameras").of_pictures(names, options.blend, options.trust)
             for note in read[0].notes:
                 options.events.tell("note", command=options.command, text=note)
         else:
-            read = cameras.read(options.against, options=taken)
+            read = cameras.read(options.against, options=reading)
         true = {_called(camera): camera for camera in read}
-        both = [camera for camera in found if _called(camera) in true]
+        both = [camera for camera in dataset if _called(camera) in true]
         if not both:
-            raise InputError(f"{given} names none of the pictures of {options.dataset}: give the same names")
-        return both, tracks_through([true[_called(camera)] for camera in both]), str(given)
-    if points := tracks(options.points or options.dataset, found):
-        return found, points, "points"
-    if options.points is None and (maps := depths(options.dataset, found)):
-        return found, maps, "depth maps"
+            raise InputError(f"{source} names none of the pictures of {options.dataset}: give the same names")
+        return both, tracks_through([true[_called(camera)] for camera in both]), str(source)
+    if points := tracks(options.points or options.dataset, dataset):
+        return dataset, points, "points"
+    if options.points is None and (maps := depths(options.dataset, dataset)):
+        return dataset, maps, "depth maps"
     raise InputError(
         f"{options.points or options.dataset} has no points with tracks and no depth maps: "
         "give a COLMAP model with --points, true cameras with --against, or the .blend that was rendered with --blend"

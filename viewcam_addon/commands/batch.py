@@ -1,4 +1,7 @@
-"""`viewcam batch`: what is asked for becomes jobs, and these are carried out (carry_out.py)."""
+"""Render many shots of one file: opened once, each written whole, and continued after whatever ended it.
+
+What is asked for becomes jobs, and these are carried out (_carry_out.py).
+"""
 
 import argparse
 import dataclasses
@@ -16,9 +19,9 @@ from ..jobs.job import ENGINES, LEVELS, Job
 from ..jobs.plan import Plan
 from ..labels import KINDS
 from . import Result
-from . import options as shared
+from . import _options as shared
+from ._carry_out import add_machines, carry_out
 from .camera import add_reading_options, options_of
-from .carry_out import add_machines, carry_out
 
 _EXAMPLES = """\
 examples:
@@ -69,14 +72,14 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
 
     add_reading_options(added.add_argument_group("how cameras of another program are taken"), size=False)
 
-    said = added.add_argument_group("what a shot does not say itself")
-    said.add_argument("--camera", metavar="NAME", help="of --orbit and --frames: the camera (default: the scene's)")
-    said.add_argument("--size", type=types.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
-    said.add_argument("--frame", type=int, metavar="N", help="the frame (default: the file's current one)")
-    said.add_argument("--engine", choices=ENGINES, help="who renders (default: the scene's)")
-    said.add_argument("--samples", type=types.positive, metavar="N", help="samples a pixel (default: the scene's)")
-    said.add_argument("--level", choices=LEVELS, help="how much VIEWCAM models (default: the scene's)")
-    said.add_argument("--seed", type=types.seed, metavar="N", help="another noise for another number (default: the scene's)")
+    group = added.add_argument_group("what a shot does not say itself")
+    group.add_argument("--camera", metavar="NAME", help="of --orbit and --frames: the camera (default: the scene's)")
+    group.add_argument("--size", type=types.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
+    group.add_argument("--frame", type=int, metavar="N", help="the frame (default: the file's current one)")
+    group.add_argument("--engine", choices=ENGINES, help="who renders (default: the scene's)")
+    group.add_argument("--samples", type=types.positive, metavar="N", help="samples a pixel (default: the scene's)")
+    group.add_argument("--level", choices=LEVELS, help="how much VIEWCAM models (default: the scene's)")
+    group.add_argument("--seed", type=types.seed, metavar="N", help="another noise for another number (default: the scene's)")
 
     written = added.add_argument_group("what is written")
     written.add_argument("--out", metavar="DIR", type=types.path, required=True, help="the folder of the pictures")
@@ -88,7 +91,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     words = f"ground truth beside each shot: all, or some of {','.join(KINDS)}"
     written.add_argument("--labels", type=types.names, metavar="LABELS", default=(), help=words)
     written.add_argument("--labels-only", action="store_true", help="no pictures: labels alone, and no engine renders")
-    words = "steps of the labels' 16-bit depth in a scene unit (default: 1000, millimetres of metres)"
+    words = "steps of the labels' 16-bit depth in a scene unit (default: 1000, millimeters of meters)"
     written.add_argument("--depth-steps", type=types.above_zero, metavar="N", default=1000.0, help=words)
     written.add_argument("--check", action="store_true", help="compare each shot's geometry with the reference tracer")
     written.add_argument(
@@ -123,8 +126,8 @@ def run(options: argparse.Namespace) -> Result:
 
 
 def _refuse_contradictions(options: argparse.Namespace) -> None:
-    given = {"SHOTS": options.shots, "--orbit": options.orbit, "--frames": options.frames, "--cameras": options.cameras}
-    sources = [name for name, value in given.items() if value is not None]
+    possible = {"SHOTS": options.shots, "--orbit": options.orbit, "--frames": options.frames, "--cameras": options.cameras}
+    sources = [name for name, value in possible.items() if value is not None]
     if not sources:
         raise InputError("which shots is not said: give a list, cameras of any program, --orbit, --frames or --cameras")
     if len(sources) > 1:
@@ -155,12 +158,12 @@ def _shots(options: argparse.Namespace, renderer: Any) -> Sequence[Job]:
     if options.shots is not None:
         if lists.is_list(options.shots):
             return lists.read(options.shots, renderer.cameras)
-        found = cameras.read(options.shots, options=options_of(options))
-        for note in dict.fromkeys(note for camera in found for note in camera.notes):
+        read = cameras.read(options.shots, options=options_of(options))
+        for note in dict.fromkeys(note for camera in read for note in camera.notes):
             options.events.tell("note", command=options.command, text=note)
-        for camera in found:
+        for camera in read:
             distortion.refuse(camera.lens, camera.pinhole.plane, camera.name, "a render")
-        return makers.from_pinholes((camera.name, camera.pinhole) for camera in found)
+        return makers.from_pinholes((camera.name, camera.pinhole) for camera in read)
     if options.cameras is not None:
         return makers.from_cameras(options.cameras, renderer.cameras, spaces=not options.transforms)
     if options.orbit is not None:

@@ -1,6 +1,6 @@
-"""`viewcam camera`: cameras of any program, a .blend among them, listed or written for another.
+"""List the cameras of another program's file, or write them for a third one.
 
-A file, a folder or, as "-", what stands on standard input; see cameras/.
+A .blend is such a file, too. A file, a folder or, as "-", what stands on standard input; see cameras/.
 """
 
 import argparse
@@ -10,10 +10,10 @@ from pathlib import Path
 
 from .. import argument_types as types
 from .. import cameras
-from ..cameras import Camera, Options, naming, transforms, undistortion
+from ..cameras import Camera, Options, transforms, undistortion
 from ..cameras.distortion import Lens
 from ..cameras.sidecar import record
-from ..errors import InputError
+from ..errors import InputError, several
 from ..files import folder_written_whole
 from ..jobs import makers
 from ..pinhole import ViewPlane
@@ -103,40 +103,40 @@ def run(options: argparse.Namespace) -> Result:
     if options.out and not options.to:
         raise InputError("--out says where to, but not in which format: give --to")
     with silent_libraries():  # Blender tells what it opens, USD all that a stage lacks
-        found = _found(options)
-    notes = list(dict.fromkeys(note for camera in found for note in camera.notes))
+        read = _read(options)
+    notes = list(dict.fromkeys(note for camera in read for note in camera.notes))
     for note in notes:
         options.events.tell("note", command=options.command, text=note)
-    result = {"cameras": [{"name": each.name, **_said(each)} for each in found], "notes": notes}
+    result = {"cameras": [{"name": each.name, **_to_json(each)} for each in read], "notes": notes}
     if options.to is None:
-        say(*(_line(camera) for camera in found))
+        say(*(_line(camera) for camera in read))
         return 0, result
     how = Options(axes=options.out_axes, scale=options.out_scale, pixel=options.pixel)
     if options.out is None:
-        content = cameras.write(found, options.to, how)
+        content = cameras.write(read, options.to, how)
         if not isinstance(content, str):
             raise InputError(f"{options.to} is {len(content)} files, {', '.join([*content][:3])}: give a folder with --out")
         say(*content.removesuffix("\n").split("\n"))
         return 0, result
-    written = cameras.save(found, options.out, options.to, how)
-    count = "1 camera" if len(found) == 1 else f"{len(found)} cameras"
+    written = cameras.save(read, options.out, options.to, how)
+    count = "1 camera" if len(read) == 1 else f"{len(read)} cameras"
     say(f"{count}, as {cameras.FORMATS[options.to].TITLE}: {options.out}")
     return 0, result | {"written": [str(path) for path in written]}
 
 
-def _found(options: argparse.Namespace) -> list[Camera]:
+def _read(options: argparse.Namespace) -> list[Camera]:
     if options.file.lower().endswith(".blend"):
         room = blender_room("dataset_cameras")
         if options.frames is not None:
             shots = [(job.name, job.frame) for job in makers.frames(options.frames)]
             return room.of_file(Path(options.file), shots, options.camera, options.trust)
-        found = room.of_file(Path(options.file), trust=options.trust)
+        read = room.of_file(Path(options.file), trust=options.trust)
     elif options.frames is not None:
         raise InputError(f"--frames are those of a .blend, and {options.file} is none: leave them out")
     else:
-        given = sys.stdin.read(_MOST_CHARACTERS) if options.file == "-" else Path(options.file)
-        found = cameras.read(given, format=options.format, options=options_of(options))
-    return found if options.camera is None else [cameras.choose(found, options.camera)]
+        source = sys.stdin.read(_MOST_CHARACTERS) if options.file == "-" else Path(options.file)
+        read = cameras.read(source, format=options.format, options=options_of(options))
+    return read if options.camera is None else [cameras.choose(read, options.camera)]
 
 
 def _undistort(options: argparse.Namespace) -> Result:
@@ -145,17 +145,17 @@ def _undistort(options: argparse.Namespace) -> Result:
         raise InputError("--undistort writes all of a data set into its folder: give the data set, and leave the others out")
     if options.axes != "as_is" or options.scale != 1 or options.original_world or options.up_from:
         raise InputError("--undistort leaves the world as it is, for its points' sake: turn and scale what it has written")
-    found = cameras.read(dataset, format=options.format, options=options_of(options))
+    read = cameras.read(dataset, format=options.format, options=options_of(options))
     form = options.to or ("transforms" if cameras.recognised(dataset) == "transforms" else "colmap")
     if form not in undistortion.FORMS:
         raise InputError(f"--undistort writes {' or '.join(undistortion.FORMS)}: give --to one of these")
-    for note in dict.fromkeys(note for camera in found for note in camera.notes):
+    for note in dict.fromkeys(note for camera in read for note in camera.notes):
         options.events.tell("note", command=options.command, text=note)
-    written = undistortion.save(found, dataset, options.undistort, form, options.blank)
+    written = undistortion.save(read, dataset, options.undistort, form, options.blank)
     sizes = ", ".join(dict.fromkeys(f"{each.pinhole.width} × {each.pinhole.height}" for each in written))
-    bent = sum(camera.lens is not None for camera in found)
+    bent = sum(camera.lens is not None for camera in read)
     say(f"{len(written)} pictures, {bent} of them undistorted ({sizes}): {options.undistort}")
-    return 0, {"cameras": [{"name": each.name, **_said(each)} for each in written]}
+    return 0, {"cameras": [{"name": each.name, **_to_json(each)} for each in written]}
 
 
 def _st_maps(options: argparse.Namespace) -> Result:
@@ -164,9 +164,9 @@ def _st_maps(options: argparse.Namespace) -> Result:
     if options.list or options.out or options.to or options.undistort:
         raise InputError("--st-maps writes maps and pinholes into its folder: leave --list, --to, --out and --undistort out")
     with silent_libraries():
-        found = _found(options)
+        read = _read(options)
     of_lenses: dict[tuple[Lens, ViewPlane], list[str]] = {}
-    for camera in found:
+    for camera in read:
         if camera.lens is not None:
             of_lenses.setdefault((camera.lens, camera.pinhole.plane), []).append(camera.name)
     if not of_lenses:
@@ -178,15 +178,15 @@ def _st_maps(options: argparse.Namespace) -> Result:
             for what, pixels in zip(("undistort", "distort"), undistortion.st_maps(lens, plane, cut), strict=True):
                 image.write_rgba(temporary / f"lens_{number}.{what}.exr", pixels)
             sizes = f"{plane.width} × {plane.height} with the lens, {cut.width} × {cut.height} without"
-            lines.append(f"lens_{number}: {sizes}, of {naming.several(names)}")
-        cameras.save(undistortion.straight(found, options.blank), temporary / transforms.FILE, "transforms")
-    say(*lines, f"{len(of_lenses)} lenses and {len(found)} pinholes: {options.st_maps}")
+            lines.append(f"lens_{number}: {sizes}, of {several(names)}")
+        cameras.save(undistortion.straight(read, options.blank), temporary / transforms.FILE, "transforms")
+    say(*lines, f"{len(of_lenses)} lenses and {len(read)} pinholes: {options.st_maps}")
     return 0, {"lenses": [{"name": f"lens_{i}", "cameras": names} for i, names in enumerate(of_lenses.values(), start=1)]}
 
 
-def _said(camera: Camera) -> dict:
-    said = dataclasses.asdict(camera)
-    kept = {key: said[key] for key in ("size_stated", "image", "time", "notes")}
+def _to_json(camera: Camera) -> dict:
+    values = dataclasses.asdict(camera)
+    kept = {key: values[key] for key in ("size_stated", "image", "time", "notes")}
     return {**kept, "camera": record(camera.pinhole)["camera"]}
 
 

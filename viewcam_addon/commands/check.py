@@ -1,8 +1,8 @@
-"""`viewcam check`: export, trace, render and compare, of one picture, or of many as a batch without pictures.
+"""Export, trace, render with Cycles or another engine and compare, all in one go.
 
-What Blender does (export, Cycles) and what OpenEXR does (the tracer's pictures, the comparison) never share a process, because
-Blender brings a copy of OpenEXR of its own: the first is done where Blender is and the second in the tracer's process
-(jobs/tracing.py), in the shell and inside Blender alike.
+Many pictures are a batch without pictures. What Blender does (export, Cycles) and what OpenEXR does (the tracer's pictures, the
+comparison) never share a process, because Blender brings a copy of OpenEXR of its own: the first is done where Blender is and
+the second in the tracer's process (jobs/tracing.py), in the shell and inside Blender alike.
 """
 
 import argparse
@@ -14,8 +14,8 @@ from typing import Any
 from ..errors import InputError
 from ..files import temporary_folder
 from ..terminal import say, silent_libraries
-from . import Result, carry_out
-from . import options as shared
+from . import Result, _carry_out
+from . import _options as shared
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
@@ -31,7 +31,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     kept = many.add_mutually_exclusive_group()
     kept.add_argument("--resume", action="store_true", help="keep the results that are there from the same settings")
     kept.add_argument("--overwrite", action="store_true", help="check all of them anew")
-    carry_out.add_machines(added)
+    _carry_out.add_machines(added)
 
 
 def run(options: argparse.Namespace) -> Result:
@@ -63,16 +63,16 @@ def check_one(
     reference = str(Path(report, "reference.exr")) if report else None
     written = Written(report, difference, sides, reference, command)
     plan = Plan(Path(), blend=Path(job.blend) if job.blend else None, trust=job.trust)
-    with silent_libraries(), carry_out.opened(plan, options.events) as renderer:
-        found = renderer.check(job, has_picture=False, written=written, keep=Path(report) if report else None)
-    if "reason" in found:
-        say(f"level {found['level']} is enough. {found['reason']}")
-    seconds, (width, height) = found["seconds"], found["result"]["size"]
+    with silent_libraries(), _carry_out.opened(plan, options.events) as renderer:
+        result = renderer.check(job, has_picture=False, written=written, keep=Path(report) if report else None)
+    if "reason" in result:
+        say(f"level {result['level']} is enough. {result['reason']}")
+    seconds, (width, height) = result["seconds"], result["result"]["size"]
     engine = (job.engine or "Cycles").capitalize()
     say(f"exported and rendered with {engine} in {seconds['rendered']:.1f} s")
     say(f"traced {width} × {height} pixels in {seconds['traced']:.2f} s")
-    say(*shared.ledger_lines(found["result"]["ledger"]), *found["lines"])
-    return exit_status(found["answer"], job.strict), found["result"]
+    say(*shared.ledger_lines(result["result"]["ledger"]), *result["lines"])
+    return exit_status(result["answer"], job.strict), result["result"]
 
 
 def _check_many(options: argparse.Namespace, job: Any) -> Result:
@@ -107,7 +107,7 @@ def _check_many(options: argparse.Namespace, job: Any) -> Result:
             scheduler=options.scheduler,
             command="check",
         )
-        summary = carry_out.carry_out(plan, jobs_of, options.events, complete)
+        summary = _carry_out.carry_out(plan, jobs_of, options.events, complete)
     status = summary.exit_status or (3 if options.strict and summary.counts["not_all_modelled"] else 0)
     return status, {**summary.to_json(), "exit_status": status, "strict": options.strict}
 

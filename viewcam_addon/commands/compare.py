@@ -1,11 +1,11 @@
-"""`viewcam compare`: EXRs of one camera, compared against derived tolerances and noise."""
+"""Compare EXRs of one camera against derived tolerances and noise."""
 
 import argparse
 
 from .. import argument_types as types
 from ..terminal import say
 from . import Result
-from . import options as shared
+from . import _options as shared
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
@@ -27,6 +27,6 @@ def run(options: argparse.Namespace) -> Result:
     report, difference = (path and str(path) for path in (options.report, options.difference))
     written = Written(report, difference, command=f"viewcam {options.words}")
     channels = dict(options.channels) if options.channels else None
-    found = compare_files(options.reference, options.tests, options.scene, options.threads, channels, written)
-    say(*shared.ledger_lines(found["result"]["ledger"]), *found["lines"])
-    return exit_status(found["answer"], options.strict), found["result"]
+    result = compare_files(options.reference, options.tests, options.scene, options.threads, channels, written)
+    say(*shared.ledger_lines(result["result"]["ledger"]), *result["lines"])
+    return exit_status(result["answer"], options.strict), result["result"]

@@ -1,11 +1,11 @@
-"""`viewcam cycles`: a .blend rendered with Cycles so that it can be compared, and every setting given back."""
+"""Render a .blend with Cycles so that it can be compared, and give every setting back."""
 
 import argparse
 
 from .. import argument_types as types
 from ..terminal import say, silent_libraries
 from . import Result, blender_room
-from . import options as shared
+from . import _options as shared
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:

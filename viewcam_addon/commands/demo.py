@@ -1,4 +1,4 @@
-"""`viewcam demo`: the check of the studio still that comes with the project."""
+"""Check the studio still that comes with the project, and write the report."""
 
 import argparse
 from pathlib import Path
@@ -7,7 +7,7 @@ from .. import argument_types as types
 from ..errors import InputError
 from ..terminal import say
 from . import Result
-from . import options as shared
+from . import _options as shared
 from .check import check_one
 
 SCENE = Path(__file__).parents[2] / "sample_scenes" / "studio.blend"

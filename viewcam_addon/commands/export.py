@@ -1,11 +1,11 @@
-"""`viewcam export`: the scene of a .blend as the tracer reads it."""
+"""Write the scene of a .blend as the tracer reads it."""
 
 import argparse
 
 from .. import argument_types as types
 from ..terminal import say, silent_libraries
 from . import Result, blender_room
-from . import options as shared
+from . import _options as shared
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:

@@ -1,4 +1,4 @@
-"""`viewcam labels`: the labels of many pictures as a dataset: one file, or a folder."""
+"""Make a dataset of the labels of a folder's pictures."""
 
 import argparse
 import functools

@@ -1,4 +1,7 @@
-"""`viewcam render`: a scene file traced into an EXR, and its ground truth beside it."""
+"""Trace a scene file into an EXR.
+
+The ground truth is written beside it.
+"""
 
 import argparse
 import dataclasses
@@ -10,7 +13,7 @@ from ..errors import InputError
 from ..terminal import say
 from ..tracer.scene.film import SAMPLES
 from . import Result
-from . import options as shared
+from . import _options as shared
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
@@ -27,7 +30,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     for other in ("previous", "next"):
         words = f"the {other} frame, for --labels flow"
         added.add_argument(f"--{other}", metavar="SCENE.json", type=types.path, help=words)
-    words = "steps of the labels' 16-bit depth in a scene unit (default: 1000, millimetres of metres)"
+    words = "steps of the labels' 16-bit depth in a scene unit (default: 1000, millimeters of meters)"
     added.add_argument("--depth-steps", type=types.above_zero, metavar="N", default=1000.0, help=words)
 
 

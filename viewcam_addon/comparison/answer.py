@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import several
+
 SAME, SAME_BUT, DIFFERENT = "same", "same_but", "different"
 ANSWERS = (SAME, SAME_BUT, DIFFERENT)
 
 COLORS = {SAME: "green", SAME_BUT: "amber", DIFFERENT: "red"}
-
-_MOST_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class NotModelled:
 
     def sorted_by(self, in_one_place: Sequence[str], seen_otherwise: Sequence[str]) -> "NotModelled":
         """A copy that tells which of its objects are modeled."""
-        one_place, otherwise = (tuple(name for name in self.names if name in some) for some in (in_one_place, seen_otherwise))
+        one_place, otherwise = (tuple(name for name in self.names if name in group) for group in (in_one_place, seen_otherwise))
         return replace(self, in_one_place=one_place, seen_otherwise=otherwise)
 
     def to_json(self) -> dict[str, Any]:
@@ -113,19 +113,19 @@ def answered(same: bool, headline: str, text: str, not_modelled: NotModelled) ->
 
 
 def in_the_picture(
-    names: Sequence[str], shown: Mapping[str, NDArray[np.bool_]], changed: NDArray[np.bool_] | None, is_lit: bool
+    names: Sequence[str], surfaces: Mapping[str, NDArray[np.bool_]], changed: NDArray[np.bool_] | None, is_lit: bool
 ) -> NotModelled:
     """The part of a picture that is not modeled.
 
-    names : of the objects that are not. shown : name → (height, width), the pixels that show it, of those that are surfaces
+    names : of the objects that are not. surfaces : name → (height, width), the pixels that show it, of those that are surfaces
     in the scene. changed : (height, width), those where the picture with everything is another than the one with stand-ins;
     None where there is none. is_lit : whether light is compared, so that what is not seen may still light what is.
     """
     if changed is not None and not is_lit:  # bits tell what a stand-in changes, where there is no noise
-        shown = {name: pixels & changed for name, pixels in shown.items()}
-    seen = [name for name in names if name in shown and shown[name].any()]
-    pixels = np.logical_or.reduce([shown[name] for name in seen]) if seen else np.False_
-    unseen = [name for name in names if name not in seen and (is_lit or name not in shown)]
+        surfaces = {name: pixels & changed for name, pixels in surfaces.items()}
+    seen = [name for name in names if name in surfaces and surfaces[name].any()]
+    pixels = np.logical_or.reduce([surfaces[name] for name in seen]) if seen else np.False_
+    unseen = [name for name in names if name not in seen and (is_lit or name not in surfaces)]
     share = float(np.mean(pixels))
     if changed is None:
         return NotModelled((*seen, *unseen), None if unseen else share, share)
@@ -135,7 +135,7 @@ def in_the_picture(
 
 
 def but_for(not_modelled: Mapping[str, Any]) -> str:
-    """but for 2 objects that are not modelled and 1 shadow that not all rays see
+    """but for 2 objects that are not modeled and 1 shadow that not all rays see
 
     not_modelled : as of NotModelled.to_json.
     """
@@ -146,12 +146,14 @@ def but_for(not_modelled: Mapping[str, Any]) -> str:
             [name for name in not_modelled["names"] if name not in modelled],
             "object that is not",
             "objects that are not",
-            " modelled",
+            " modeled",
         ),
         (one_place, "object", "objects", " with surfaces in one place"),
         (otherwise, "shadow", "shadows", " that not all rays see"),
     ]
-    parts = [f"{len(names):,} {one if len(names) == 1 else several}{rest}" for names, one, several, rest in kinds if names]
+    parts = [
+        f"{len(names):,} {singular if len(names) == 1 else plural}{rest}" for names, singular, plural, rest in kinds if names
+    ]
     return f"but for {' and '.join(parts)}"
 
 
@@ -164,8 +166,7 @@ def percent_of(share: float) -> str:
 
 
 def _named(not_modelled: NotModelled) -> str:
-    names = not_modelled.names
-    named = ", ".join(names[:_MOST_NAMED]) + (f" and {len(names) - _MOST_NAMED:,} more" if len(names) > _MOST_NAMED else "")
+    named = several(not_modelled.names)
     if not_modelled.share is None:
         return f"{named}; on how much of the picture was not measured"
     return f"{named}; {percent_of(not_modelled.share)} of the picture"

@@ -93,13 +93,13 @@ def conversion_error(stated: Pinhole, read_back: Pinhole, depths: Array) -> Conv
 
 
 def systematic_error(
-    pinhole: Pinhole, pixels: NDArray, off_x: Array, off_y: Array, one_rounding: Array, centre: float = FILTER_BIAS
+    pinhole: Pinhole, pixels: NDArray, off_x: Array, off_y: Array, one_rounding: Array, center: float = FILTER_BIAS
 ) -> Systematic:
     """Shift, zoom and roll that explain the displacements best.
 
     pixels : (n,) int, row after row. off_x, off_y : (n,) displacements there, pixels to the right and upwards.
     one_rounding : (n,) `position_shift`. A pixel weighs as much as it is certain, so that a few slender triangles do not hide
-        what all the others share. The mean of the errors can't exceed their typical size. centre : pixels that the renderer's
+        what all the others share. The mean of the errors can't exceed their typical size. center : pixels that the renderer's
         rays are beside the pixels' centers by design.
     """
     row, column = np.divmod(pixels, pinhole.width)
@@ -112,7 +112,7 @@ def systematic_error(
     aspect = pinhole.distance[0] / pinhole.distance[1]
     roll = np.arctan2(shear_y * aspect - shear_x / aspect, 2.0 + zoom_x + zoom_y)
     mean_x, mean_y, typical = (np.average(values, weights=weight**2) for values in (off_x, off_y, one_rounding))
-    figures = (shift_x, shift_y, zoom_x, zoom_y, roll, np.hypot(mean_x, mean_y), ROUNDINGS[0] * typical + centre)
+    figures = (shift_x, shift_y, zoom_x, zoom_y, roll, np.hypot(mean_x, mean_y), ROUNDINGS[0] * typical + center)
     return Systematic(*(float(figure) for figure in figures))
 
 

@@ -63,7 +63,7 @@ def write_sides(
     if isinstance(comparison, RadianceComparison):
         light |= {"reference": reference["Combined"][..., :3], "test": comparison.test}
     else:
-        for name, picture in zip(SIDES, shown(comparison, reference, tests), strict=False):
+        for name, picture in zip(SIDES, on_screen(comparison, reference, tests), strict=False):
             _write(picture, Path(folder) / f"{name}.png")
     for name, values in light.items():
         with written_whole(Path(folder) / f"{name}.npy") as temporary, open(temporary, "wb") as file:
@@ -71,7 +71,7 @@ def write_sides(
 
 
 @np.errstate(all="ignore")
-def shown(
+def on_screen(
     comparison: GeometryComparison | RadianceComparison, reference: Image, tests: Sequence[Image]
 ) -> tuple[pictures.Picture, pictures.Picture]:
     """Reference and test as an eye can compare them: light tone-mapped alike, geometry shaded."""
@@ -116,7 +116,7 @@ def _of_geometry(comparison: GeometryComparison) -> tuple[pictures.Picture, str,
 def _of_light(comparison: RadianceComparison) -> tuple[pictures.Picture, str, dict[str, Any]]:
     values = comparison.maps["Combined: difference"]
     limit = spread(values)
-    words = f"Orange where Cycles is brighter, by {figure(limit)} at the full colour, blue where it is darker"
+    words = f"Orange where Cycles is brighter, by {figure(limit)} at the full color, blue where it is darker"
     scale = {"kind": "signed", "low": -limit, "high": limit, "unit": "of light"}
     return _painted(pictures.signed(values, limit), pictures.signed_scale()), words, scale
 

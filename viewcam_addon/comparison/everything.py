@@ -25,7 +25,7 @@ _ALL_BUT_NORMALS = ("Depth", "Position", "UV", "Object Index", "Material Index")
 
 def not_modelled(
     names: Sequence[str],
-    shown: Mapping[str, NDArray[np.bool_]],
+    pixels: Mapping[str, NDArray[np.bool_]],
     reference: Image,
     tests: Sequence[Image],
     everything: Image | None = None,
@@ -33,7 +33,7 @@ def not_modelled(
 ) -> NotModelled:
     """The part of a picture that is not modeled.
 
-    names : of the objects that are not. shown : name → (height, width), the pixels that show it, of those that are surfaces in
+    names : of the objects that are not. pixels : name → (height, width), the pixels that show it, of those that are surfaces in
     the scene. reference, tests : what was compared. everything : Cycles' picture of the seed of the first test, with as many
     samples, or None where there is none. pinhole : the camera where light was compared, None where geometry was.
     """
@@ -43,9 +43,9 @@ def not_modelled(
     if everything is not None and pinhole is not None:
         changed = _changed_light(reference, tests, everything, pinhole)
     elif everything is not None:
-        surfaces = np.logical_or.reduce([*shown.values(), np.zeros(reference["Depth"].shape[:2], bool)])
+        surfaces = np.logical_or.reduce([*pixels.values(), np.zeros(reference["Depth"].shape[:2], bool)])
         changed = _changed_geometry(tests[0], everything, surfaces)
-    return in_the_picture(names, shown, changed, is_lit=pinhole is not None)
+    return in_the_picture(names, pixels, changed, is_lit=pinhole is not None)
 
 
 def _changed_geometry(test: Image, everything: Image, surfaces: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -82,4 +82,4 @@ def _changed_light(reference: Image, tests: Sequence[Image], everything: Image, 
     tiles = [test for test in asked if test.size != hypothesis_tests.CONTOURS]
     pixels, *larger = (hypothesis_tests.over_pixels(test.failing, broken.shape, test.size) for test in tiles)
     changed = pixels | broken
-    return next((changed | found for found in larger if (changed | found).any()), changed)
+    return next((changed | differs for differs in larger if (changed | differs).any()), changed)

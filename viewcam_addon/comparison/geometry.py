@@ -88,7 +88,7 @@ def compare(
     # At an edge the ray may meet either surface, so a re-traced one is judged by the steepest slope around.
     steepest = {name: largest_around(slope.reshape(size)).ravel() for name, slope in agreement.slopes.items()}
     # Where an edge has moved, a pixel shows the surface's plane beyond it: as far as edges move, and its slope's worth.
-    beyond = replace(renderer, centre=renderer.centre + renderer.edges)
+    beyond = replace(renderer, center=renderer.center + renderer.edges)
     around = replace(agreement, slopes=steepest, renderer=beyond)
     reach = reach_of(shift.reshape(size)).ravel() + renderer.edges
     mismatches = _mismatches(kinds, seen, reach, around, surfaces_at)
@@ -106,7 +106,7 @@ def compare(
         errors = {"Position": errors["Position"], "Position depth": along_errors} | errors
         if len(chosen):
             off = off_x[chosen], off_y[chosen]
-            systematic = systematic_error(pinhole, chosen, *off, errors["Position"][1], renderer.centre)
+            systematic = systematic_error(pinhole, chosen, *off, errors["Position"][1], renderer.center)
     else:
         del errors["Position"]
     if "Depth" not in measured:
@@ -172,16 +172,16 @@ def _slopes(expected: Seen, hit: NDArray, size: tuple[int, int]) -> dict[str, Ar
 def _mismatches(
     kinds: NDArray, seen: Seen, reach: Array, agreement: SurfaceAgreement, surfaces_at: SurfacesAt | None
 ) -> Mismatches:
-    found = np.flatnonzero(kinds >= 0)
-    columns, rows = found % agreement.pinhole.width, found // agreement.pinhole.width
-    shifts, retraced = np.full(len(found), np.nan), 0
+    pixels = np.flatnonzero(kinds >= 0)
+    columns, rows = pixels % agreement.pinhole.width, pixels // agreement.pinhole.width
+    shifts, retraced = np.full(len(pixels), np.nan), 0
     if surfaces_at is not None:
-        numbers = kinds[found] != KINDS.index("not a number")
-        traced = found[numbers]
+        numbers = kinds[pixels] != KINDS.index("not a number")
+        traced = pixels[numbers]
         shifts[numbers], retraced = explain(
             columns[numbers], rows[numbers], at(seen, traced), reach[traced], agreement.at(traced), surfaces_at
         )
-    return Mismatches(columns, rows, kinds[found], shifts, reach[found], retraced)
+    return Mismatches(columns, rows, kinds[pixels], shifts, reach[pixels], retraced)
 
 
 def _check_figures(source: str, expected: Seen, pinhole: Pinhole) -> None:
@@ -205,22 +205,24 @@ def _check_figures(source: str, expected: Seen, pinhole: Pinhole) -> None:
         )
 
 
-def _check_reference(source: str, expected: Seen, found: NDArray, agreement: SurfaceAgreement, surfaces_at: SurfacesAt) -> None:
+def _check_reference(
+    source: str, expected: Seen, pixels: NDArray, agreement: SurfaceAgreement, surfaces_at: SurfacesAt
+) -> None:
     """Refuse a reference that its own scene does not show, where it differs from the test.
 
     Else rays would be sent for each of its pixels, as far as its figures say that they may be off. One of an older version of
     the scene, or a damaged one, is not the same for most of them; a true one is for all.
 
-    found : pixels that see another surface.
+    pixels : pixels that see another surface.
     """
-    found = found[:: max(len(found) // _ASKED_OF_THE_REFERENCE, 1)]
-    rows, columns = np.divmod(found, agreement.pinhole.width)
+    pixels = pixels[:: max(len(pixels) // _ASKED_OF_THE_REFERENCE, 1)]
+    rows, columns = np.divmod(pixels, agreement.pinhole.width)
     rays, _, traced = surfaces_at(columns, rows, 0.5, 0.5)
-    traced, shown = at(traced, np.searchsorted(rays, np.arange(len(found)))), at(expected, found)
-    same = agreement.at(found).same_place(traced, shown) | ~(
-        tolerances.is_hit(traced) | tolerances.is_hit(shown) | np.isnan(shown["Depth"][:, 0])
+    traced, stated = at(traced, np.searchsorted(rays, np.arange(len(pixels)))), at(expected, pixels)
+    same = agreement.at(pixels).same_place(traced, stated) | ~(
+        tolerances.is_hit(traced) | tolerances.is_hit(stated) | np.isnan(stated["Depth"][:, 0])
     )
-    if len(found) and not same.mean() >= 0.5:
+    if len(pixels) and not same.mean() >= 0.5:
         raise InputError(f"{source} is not what the tracer sees in the scene: trace it again, or give the scene that it shows")
 
 

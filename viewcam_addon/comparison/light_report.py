@@ -38,9 +38,9 @@ def write_report(
     InputError
         if the folder can't be written, or there is no Jinja2.
     """
-    shown = difference.shown(comparison, reference, tests)
+    on_screen = difference.on_screen(comparison, reference, tests)
     mean_of = f" Cycles' is the mean of {len(tests)} pictures with other seeds." if len(tests) > 1 else ""
-    sides = dict(zip(("reference", "test"), map(pictures.png_uri, shown), strict=True))
+    sides = dict(zip(("reference", "test"), map(pictures.png_uri, on_screen), strict=True))
     combined = page.Tab("picture", "Combined", f"{page.SWAP} Both under one exposure.{mean_of}", sides)
     asked = comparison.rows[0].hypothesis_tests
     if comparison.is_noisy:
@@ -56,7 +56,7 @@ def write_report(
         "place_text": place_text,
         "samples_text": samples_text,
         "chart": chart,
-        "crops": _crops(comparison, shown),
+        "crops": _crops(comparison, on_screen),
     }
     return page.write(folder, "report_light.html", values)
 
@@ -94,17 +94,17 @@ def _maker(image: Image) -> str:
     return software or Path(image.source).name
 
 
-def _crops(comparison: RadianceComparison, shown: tuple) -> list[page.Crop]:
+def _crops(comparison: RadianceComparison, on_screen: tuple) -> list[page.Crop]:
     asked = [(row, test) for row in comparison.rows for test in row.hypothesis_tests]
     failed = [(row, test) for row, test in asked if not test.ok and test.size not in (CONTOURS, WHOLE)]
-    return [_crop(comparison, shown, row, test) for row, test in failed[:_MOST_CROPS]]
+    return [_crop(comparison, on_screen, row, test) for row, test in failed[:_MOST_CROPS]]
 
 
-def _crop(comparison: RadianceComparison, shown: tuple, row: LightRow, test: HypothesisTest) -> page.Crop:
+def _crop(comparison: RadianceComparison, on_screen: tuple, row: LightRow, test: HypothesisTest) -> page.Crop:
     place, size = test.worst, (comparison.pinhole.width, comparison.pinhole.height)
     column, line = (sum(ends) // 2 for ends in (place.columns, place.rows))
     words = (
         f"{row.name}{f' ({place.channel})' if place.channel else ''} {place_text(place, test.size)}: "
         f"{change_text(place.reference, place.test)}, {abs(place.errors):.1f} standard errors of {test.limit:.1f} allowed"
     )
-    return page.crop(shown, size, column, line, words, max(15, 2 * test.size + 1))
+    return page.crop(on_screen, size, column, line, words, max(15, 2 * test.size + 1))

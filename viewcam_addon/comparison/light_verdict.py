@@ -82,7 +82,7 @@ class LightRow:
 
 @dataclass(frozen=True)
 class Search:
-    """How far a comparison in rounds is that searches for a bias (sequential.py).
+    """The state of a comparison in rounds that searches for a bias (sequential.py).
 
     find : the bias, a share of the light. least : that which would be found in 99 of 100 cases so far, if it is everywhere;
     least_in_blocks : if it is in a typical block of 32 × 32 pixels alone; both 0 without noise.

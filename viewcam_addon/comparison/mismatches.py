@@ -48,7 +48,7 @@ _DIRECTIONS = 16
 _RIM = 0.03
 _BATCH = 1_000
 # Pixels whose centers are traced again at a time.
-_CENTRES = 50_000
+_CENTERS = 50_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,25 +160,25 @@ class SurfaceAgreement:
 
 
 def _position_errors(agreement: SurfaceAgreement, expected: Seen, _seen: Seen) -> Errors:
-    return agreement.across, tolerances.position_shift(agreement.pinhole, expected), agreement.renderer.centre
+    return agreement.across, tolerances.position_shift(agreement.pinhole, expected), agreement.renderer.center
 
 
 def _depth_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Errors:
     depth, renderer = expected["Depth"][..., 0].astype(np.float64), agreement.renderer
-    floor = renderer.depth_storage(depth) + renderer.centre * tolerances.depth_slope(agreement.pinhole, expected)
+    floor = renderer.depth_storage(depth) + renderer.center * tolerances.depth_slope(agreement.pinhole, expected)
     return np.abs(seen["Depth"][..., 0] - depth) / depth, tolerances.depth_error(agreement.pinhole, expected), floor
 
 
 def _normal_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Errors:
     slope, renderer = agreement.slope(expected, "Normal"), agreement.renderer
     one_rounding = tolerances.normal_error(agreement.pinhole, expected, slope)
-    return tolerances.angle_between(expected["Normal"], seen["Normal"]), one_rounding, renderer.normal + renderer.centre * slope
+    return tolerances.angle_between(expected["Normal"], seen["Normal"]), one_rounding, renderer.normal + renderer.center * slope
 
 
 def _uv_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Errors:
     slope = agreement.slope(expected, "UV")
     apart = np.abs(expected["UV"][..., :2].astype(np.float64) - seen["UV"][..., :2]).max(axis=-1)
-    floor = tolerances.uv_storage(expected) + agreement.renderer.centre * slope
+    floor = tolerances.uv_storage(expected) + agreement.renderer.center * slope
     return apart, tolerances.uv_error(agreement.pinhole, expected, slope), floor
 
 
@@ -283,15 +283,15 @@ def settle(
     kinds, expected = kinds.copy(), {name: values.copy() for name, values in expected.items()}
     agreement = replace(agreement, slopes={name: slope.copy() for name, slope in agreement.slopes.items()})
     pixels, objects = [NOWHERE.columns], [NOWHERE.objects]
-    for start in range(0, len(asked), _CENTRES):
-        batch = asked[start : start + _CENTRES]
+    for start in range(0, len(asked), _CENTERS):
+        batch = asked[start : start + _CENTERS]
         rays, names, traced = surfaces_at(batch % width, batch // width, *np.full((2, len(batch)), 0.5))
         nearest, pixel = np.searchsorted(rays, np.arange(len(batch))), batch[rays]
         here = agreement.at(pixel)
-        shown = at(seen, pixel)
-        agrees = here.same_surface(traced, shown) & in_one_place(agreement, rays, traced) & (differs | doubtful)[pixel]
+        rendered = at(seen, pixel)
+        agrees = here.same_surface(traced, rendered) & in_one_place(agreement, rays, traced) & (differs | doubtful)[pixel]
         right = np.flatnonzero(agrees)
-        steps = np.ceil(here.roundings(traced, shown)[right] / tolerances.ROUNDINGS[0])  # as good as half of all pixels: one
+        steps = np.ceil(here.roundings(traced, rendered)[right] / tolerances.ROUNDINGS[0])  # as good as half of all pixels: one
         right = right[np.lexsort((right, steps, rays[right]))]
         right = right[np.unique(rays[right], return_index=True)[1]]  # the nearest of those that agree best
         kinds[pixel[right]] = -1
@@ -317,7 +317,7 @@ def in_one_place(agreement: SurfaceAgreement, rays: NDArray, traced: Seen) -> ND
     """
     nearest = np.searchsorted(rays, rays)
     depth, renderer = traced["Depth"][:, 0].astype(np.float64), agreement.renderer
-    shift = tolerances.ROUNDINGS[-1] * tolerances.ray_shift(agreement.pinhole, traced) + renderer.centre
+    shift = tolerances.ROUNDINGS[-1] * tolerances.ray_shift(agreement.pinhole, traced) + renderer.center
     slope, storage = tolerances.depth_slope(agreement.pinhole, traced), renderer.depth_storage(depth) + np.zeros(len(depth))
     allowed = (shift + shift[nearest]) * np.minimum(slope, slope[nearest]) + storage + storage[nearest]
     return ~(depth - depth[nearest] > allowed * depth[nearest])
@@ -339,11 +339,11 @@ def explain(
         pending = batch
         for ring in _RINGS:
             radius = reach[pending] * (ring / _RINGS[-1])
-            found = _explained_by(
+            explained = _explained_by(
                 columns[pending], rows[pending], at(seen, pending), radius, agreement.at(pending), surfaces_at
             )
-            shifts[pending[found]] = radius[found]
-            pending = pending[~found]
+            shifts[pending[explained]] = radius[explained]
+            pending = pending[~explained]
             if not len(pending):
                 break
         if len(pending) > len(batch) / 2:
@@ -360,7 +360,7 @@ def _explained_by(
     px = 0.5 + np.outer(radius, np.cos(angles)).ravel()
     py = 0.5 + np.outer(radius, np.sin(angles)).ravel()
     rays, _, traced = surfaces_at(columns[each], rows[each], px, py)
-    shown, here = at(seen, each[rays]), agreement.at(each[rays])
+    rendered, here = at(seen, each[rays]), agreement.at(each[rays])
     counts = in_one_place(agreement, rays, traced)
     nearest = np.searchsorted(rays, np.arange(len(each)))
     grazed = (tolerances.facing(agreement.pinhole, traced) < _RIM)[nearest].reshape(-1, _DIRECTIONS)
@@ -369,9 +369,9 @@ def _explained_by(
     same_surface, same_place, continues = (
         np.logical_or.reduceat(same & counts, nearest).reshape(-1, _DIRECTIONS)
         for same in (
-            here.same_surface(traced, shown),
-            here.same_place(traced, shown),
-            here.same_place(traced, shown, aside),
+            here.same_surface(traced, rendered),
+            here.same_place(traced, rendered),
+            here.same_place(traced, rendered, aside),
         )
     )
     on_silhouette = grazed.any(axis=1) | ~continues.all(axis=1)

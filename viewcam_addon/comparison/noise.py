@@ -146,7 +146,7 @@ def _nonzero(values: Array) -> Array:
 
 def _log_beta(a: Array) -> Array:
     """ln B(a, ½)."""
-    return np.vectorize(lambda one: math.lgamma(one) + math.lgamma(0.5) - math.lgamma(one + 0.5))(a)
+    return np.vectorize(lambda x: math.lgamma(x) + math.lgamma(0.5) - math.lgamma(x + 0.5))(a)
 
 
 def _bisected(too_low: Callable[[float], bool], low: float, high: float) -> float:

@@ -72,14 +72,14 @@ class Allowance:
     shift: Array
 
     @property
-    def one(self) -> Array:
+    def one_rounding(self) -> Array:
         """The change that one rounding of everything causes."""
         return self.moved + self.value
 
     @property
     def most(self) -> Array:
         """The bound that no pixel may go beyond."""
-        return tolerances.ROUNDINGS[-1] * self.one + self.floor
+        return tolerances.ROUNDINGS[-1] * self.one_rounding + self.floor
 
 
 class Rounding:
@@ -147,9 +147,9 @@ def compare(sides: Sides, allowed: Allowance, belongs: NDArray) -> tuple[PassErr
     size = np.abs(sides.reference).max(axis=-1)
     scale = np.maximum(size, max(_DARK * float(size.mean()), np.finfo(float).tiny))
     row = measure(
-        sides.name, "relative", (error / scale)[judged], (allowed.one / scale)[judged], (allowed.floor / scale)[judged]
+        sides.name, "relative", (error / scale)[judged], (allowed.one_rounding / scale)[judged], (allowed.floor / scale)[judged]
     )
-    return row, edges, np.minimum(error / np.maximum(allowed.one, np.finfo(float).tiny), _BEYOND_COUNTING)
+    return row, edges, np.minimum(error / np.maximum(allowed.one_rounding, np.finfo(float).tiny), _BEYOND_COUNTING)
 
 
 def _on_edge(values: Array, belongs: NDArray, most: Array) -> NDArray[np.bool_]:
@@ -169,8 +169,8 @@ def _on_edge(values: Array, belongs: NDArray, most: Array) -> NDArray[np.bool_]:
 
 def _blender_of(image: Image) -> tuple[int, ...]:
     """The version of Blender that wrote a picture, as its file tells from 5.0 on."""
-    told = re.match(r"Blender (\d+)\.(\d+)", image.attributes.get("Software", ""))
-    return tuple(map(int, told.groups())) if told else ()
+    version = re.match(r"Blender (\d+)\.(\d+)", image.attributes.get("Software", ""))
+    return tuple(map(int, version.groups())) if version else ()
 
 
 def _ray_shift(pinhole: Pinhole, reference: Image) -> Array:

@@ -162,7 +162,7 @@ def crop(
 
 def with_powers(text: str) -> str:
     """The shell's 1.6e-04 as 1.6·10⁻⁴."""
-    return re.sub(r"\d\.\d+e[+-]\d+", lambda found: figure(float(found[0])), text)
+    return re.sub(r"\d\.\d+e[+-]\d+", lambda match: figure(float(match[0])), text)
 
 
 def _strip(scale: NDArray[np.uint8] | None = None) -> str:
@@ -179,7 +179,7 @@ def _camera(pinhole: Pinhole, stated: Pinhole | None, origin: Sequence[float]) -
             *([("as typed", stated, _as_typed)] if stated else []),
             ("as read back from Blender" if stated else "", pinhole, "{:.9g}".format),
         ],
-        "centre": ", ".join(f"{c:.9g}" for c in pinhole.principal_point),
+        "center": ", ".join(f"{c:.9g}" for c in pinhole.principal_point),
         "field_of_view": " × ".join(f"{math.degrees(angle):.4g}°" for angle in pinhole.field_of_view()[:2]),
         "angle_to_up": "exactly along up: canonical axes" if pinhole.is_singular else angle,
     }
@@ -191,7 +191,7 @@ def _as_typed(value: float) -> str:
 
 
 def _facts(reference: Image, test: Image, renderer: str) -> dict[str, str]:
-    told = {TRACER: reference.source, renderer: test.source}
+    facts = {TRACER: reference.source, renderer: test.source}
     for side, image in ((TRACER, reference), (renderer, test)):
-        told |= {f"{key} ({side})": value for key, value in sorted(image.attributes.items())}
-    return told | {"Compared with": f"Python {platform.python_version()}, NumPy {np.__version__}"}
+        facts |= {f"{key} ({side})": value for key, value in sorted(image.attributes.items())}
+    return facts | {"Compared with": f"Python {platform.python_version()}, NumPy {np.__version__}"}

@@ -49,6 +49,6 @@ def flip(reference: Array, test: Array) -> tuple[float | None, NDArray[np.float3
     except ImportError:
         return None, None
     bright = pictures.brightness(reference)
-    shown = [pictures.on_screen(side, bright).astype(np.float32) for side in (reference, test)]
-    by_pixel, mean, _ = flip_evaluator.evaluate(*shown, "LDR", applyMagma=False)
+    on_screen = [pictures.on_screen(side, bright).astype(np.float32) for side in (reference, test)]
+    by_pixel, mean, _ = flip_evaluator.evaluate(*on_screen, "LDR", applyMagma=False)
     return float(mean), by_pixel[..., 0]

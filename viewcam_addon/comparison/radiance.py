@@ -127,11 +127,11 @@ def compare_quantities(
 ) -> QuantityComparison:
     """`compare` without what decides nothing. rest : what is compared where light is a renderer's choice. anew : the reference
     with several other seeds."""
-    found = list(all_sides(reference, tests, anew))
+    quantities = list(all_sides(reference, tests, anew))
     if rest is not None:
-        found = [rest.of(sides) for sides in found]
-    combined, equal = found[0], tuple(sides.name for sides in found[1:] if sides.are_equal)
-    unequal = [sides for sides in found if sides.name not in equal]
+        quantities = [rest.of(sides) for sides in quantities]
+    combined, equal = quantities[0], tuple(sides.name for sides in quantities[1:] if sides.are_equal)
+    unequal = [sides for sides in quantities if sides.name not in equal]
     samples, seeds = (samples_of(reference), test_samples or samples_of(tests[0])), len(tests)
     is_noisy = not quiet(combined.reference, combined.variance).all()
     # Where things shine as brightly as what is behind them, only the other passes have any.
@@ -178,18 +178,18 @@ def _noise_free(sides: Sides, rounding: noise_free.Rounding) -> tuple[LightRow, 
 def _noisy(
     sides: Sides, rounding: noise_free.Rounding, freedom: tuple[int, int], level: float
 ) -> tuple[LightRow, dict[str, Array]]:
-    given = (rounding.of(sides), freedom, level)
-    asked = hypothesis_tests.run(sides, *given)
+    settings = (rounding.of(sides), freedom, level)
+    tests = hypothesis_tests.run(sides, *settings)
     errors = sides.difference - sides.difference.mean(axis=(0, 1))
     # Channels share their samples, so that each pixel's sum over them is one error; but each channel is asked by itself.
     ratio_error = _relative(np.sqrt((errors.sum(axis=-1) ** 2).sum()), sides.reference.sum())
     by_channel = map(_relative, np.sqrt((errors**2).sum(axis=(0, 1))), sides.reference.sum(axis=(0, 1)))
-    visible = asked[-1].limit * min(by_channel)
-    row = LightRow(*_means(sides), ratio_error, visible, int(sides.broken.sum()), asked)
+    visible = tests[-1].limit * min(by_channel)
+    row = LightRow(*_means(sides), ratio_error, visible, int(sides.broken.sum()), tests)
     if not row.ok:
-        scaled_passes = _factor(sides, lambda scaled: all(q.ok for q in hypothesis_tests.run(scaled, *given)))
+        scaled_passes = _factor(sides, lambda scaled: all(q.ok for q in hypothesis_tests.run(scaled, *settings)))
         row = replace(row, factor=scaled_passes)
-    pixels, tiles = asked[0], asked[1]
+    pixels, tiles = tests[0], tests[1]
     spread = hypothesis_tests.over_pixels(hypothesis_tests.worst_channel(tiles.errors), sides.broken.shape, tiles.size)
     drawn = {"difference": sides.difference.mean(axis=-1), "tiles": spread}
     if pixels.errors.any():

@@ -35,12 +35,12 @@ MARK = "viewcam"
 class Renderer:
     """The deviations of a renderer by design, beside its roundings.
 
-    centre : pixels that its rays are beside the pixels' centers. edges : pixels that its edges are beside the scene's. normal :
+    center : pixels that its rays are beside the pixels' centers. edges : pixels that its edges are beside the scene's. normal :
     radians that its storage turns a normal by. near : of the depth buffer that its depths come from, world units; or None.
     """
 
     name: str
-    centre: float = tolerances.FILTER_BIAS
+    center: float = tolerances.FILTER_BIAS
     edges: float = 0.0
     normal: float = tolerances.NORMAL_STORAGE
     near: float | None = None

@@ -34,7 +34,7 @@ def write_report(
     InputError
         if the folder can't be written, or there is no Jinja2.
     """
-    shades = difference.shown(comparison, reference, [test])
+    shades = difference.on_screen(comparison, reference, [test])
     far = comparison.far_from_origin
     values = {
         **page.common(comparison, reference, test, ledger, command, comparison.origin),

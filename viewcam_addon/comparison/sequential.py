@@ -73,7 +73,7 @@ class Rounds:
 
 
 def search(comparison: RadianceComparison, find: float, rounds: Rounds) -> Search:
-    """How far a search for a bias of this size is. It ends where it would take more samples than there are rounds for."""
+    """The state of a search for a bias of this size. It ends where it would take more samples than there are rounds for."""
     least, in_blocks = _least(comparison)
     fewest = max(_FEWEST_OF_ALL, _FEWEST / find if comparison.is_noisy else 0)
     expected = max(rounds.samples * (least / find) ** 2, fewest)

@@ -66,12 +66,12 @@ class Sides:
 
 def samples_of(image: Image) -> int | None:
     """Samples a pixel, as the file tells: the tracer's own attribute, or the one that Cycles writes for each view layer."""
-    told = [
+    counts = [
         value
         for name, value in image.attributes.items()
         if name == "samples" or (name.startswith("cycles.") and name.endswith(".samples"))
     ]
-    return _whole(told[0]) if told else None
+    return _whole(counts[0]) if counts else None
 
 
 def seed_of(image: Image) -> int:

@@ -195,8 +195,8 @@ def _agreement(comparison: GeometryComparison) -> str:
     first = comparison.rows[0]
     count = len(comparison.mismatches.kinds)
     edges = f"; {count:,} on edges, {_explained(comparison)}" if count else ""
-    if shown := len(comparison.in_one_place.columns):
-        edges += f"; {shown:,} {in_one_place_text(comparison.in_one_place)}"
+    if coincident := len(comparison.in_one_place.columns):
+        edges += f"; {coincident:,} {in_one_place_text(comparison.in_one_place)}"
     median, nearly_all = (first.values[PERCENTILES.index(p)] for p in (50.0, 99.9))
     unit = first.unit if first.name == "Position" else "of the depth"
     return (

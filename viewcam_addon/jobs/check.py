@@ -80,8 +80,8 @@ def check(
         command=f"viewcam {job.check_words()}",
     )
     with ServedRenderer(Path(blend).absolute(), job.trust) as renderer:
-        found = renderer.check(job, has_picture=False, written=written, keep=folder)
-    return _check_of(found, job.strict)
+        result = renderer.check(job, has_picture=False, written=written, keep=folder)
+    return _check_of(result, job.strict)
 
 
 def compare(
@@ -110,7 +110,7 @@ def compare(
         named = dict(argument_type(argument_types.channels, text) for text in texts)
     files = {name: str(path) for name, path in (("report", report), ("difference", difference)) if path}
     with Tracing() as tracing:
-        found = tracing.compare_files(
+        result = tracing.compare_files(
             Path(reference),
             [Path(path) for path in tests],
             scene=scene and str(scene),
@@ -118,7 +118,7 @@ def compare(
             channels=named and dict(named),
             written={**files, "command": "viewcam compare"},
         )
-    return _check_of(found, strict)
+    return _check_of(result, strict)
 
 
 def argument_type(parse: Any, text: str) -> Any:
@@ -129,8 +129,8 @@ def argument_type(parse: Any, text: str) -> Any:
         raise InputError(str(error)) from error
 
 
-def _check_of(found: Mapping[str, Any], strict: bool) -> Check:
-    result = found["result"]
+def _check_of(answer: Mapping[str, Any], strict: bool) -> Check:
+    result = answer["result"]
     status = exit_status(result["answer"], strict)
     return Check(status == 0, result["sentence"], {"exit_status": status, **result})
 

@@ -258,7 +258,7 @@ class _Flight:
         """The outcome of the shot; None if it flies on."""
         with _scheduler_asked():
             try:
-                said = future.result(timeout=_ANSWER_WITHIN)
+                answer = future.result(timeout=_ANSWER_WITHIN)
             except TimeoutError:  # the worker died with the result, and another one renders the shot again
                 future.add_done_callback(self._finished.put)
                 return None
@@ -266,11 +266,11 @@ class _Flight:
                 raise
             except Exception as error:  # worker.render raises none
                 return self._refused(error, future, shot)
-        if "full" in said:
-            return FullDiskError(said["full"])
-        if "failed" in said:
-            return InputError(said["failed"])
-        unfit = said.get("unfit")
+        if "full" in answer:
+            return FullDiskError(answer["full"])
+        if "failed" in answer:
+            return InputError(answer["failed"])
+        unfit = answer.get("unfit")
         if unfit is None:
             record = self._seen(shot)
             if record is not None:

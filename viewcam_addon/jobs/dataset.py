@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras import Camera, colmap, save, transforms
-from ..cameras.naming import several
-from ..errors import InputError
+from ..errors import InputError, several
 from ..files import check_writable, written_whole
 from ..labels import colmap as labels
 from ..labels import files as label_files

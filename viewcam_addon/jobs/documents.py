@@ -32,7 +32,7 @@ def read_document(text: str, problems: Problems) -> Iterator[Row]:
     if isinstance(document, _Object):
         for key, count in Counter(document.keys_as_written).items():
             if key not in ("shots", "defaults"):
-                problems.add(f"key {checks.shown(key)} is unknown: the keys beside the list of shots are shots and defaults")
+                problems.add(f"key {checks.quoted(key)} is unknown: the keys beside the list of shots are shots and defaults")
             elif count > 1:
                 problems.add(f"key {key} is there twice: take one out")
         defaults = _cells("defaults", document.get("defaults", _Object([])), problems)
@@ -43,11 +43,11 @@ def read_document(text: str, problems: Problems) -> Iterator[Row]:
         raise InputError('this is no list of shots: write [{"name": …}, …] or {"shots": [{"name": …}, …]}')
     for number, value in enumerate(document, start=1):
         name = value.get("name") if isinstance(value, _Object) else None
-        place = f"shot {number} ({checks.shown(name)})" if isinstance(name, str) else f"shot {number}"
+        place = f"shot {number} ({checks.quoted(name)})" if isinstance(name, str) else f"shot {number}"
         if isinstance(value, _Object):
             yield Row(place, "key", rows.with_defaults(_cells(place, value, problems), defaults))
         else:
-            problems.add(f"{place} is {checks.shown(value)}: give an object with keys")
+            problems.add(f"{place} is {checks.quoted(value)}: give an object with keys")
 
 
 def read_lines(text: str, problems: Problems) -> Iterator[Row]:
@@ -64,17 +64,19 @@ def read_lines(text: str, problems: Problems) -> Iterator[Row]:
         if isinstance(value, _Object):
             yield Row(place, "key", _cells(place, value, problems))
         else:
-            problems.add(f"{place} is {checks.shown(value)}: give an object with keys")
+            problems.add(f"{place} is {checks.quoted(value)}: give an object with keys")
 
 
 def _cells(place: str, value: object, problems: Problems) -> dict[str, Cell]:
     """The cells of an object; null says nothing."""
     if not isinstance(value, _Object):
-        problems.add(f"{place} is {checks.shown(value)}: give an object with keys")
+        problems.add(f"{place} is {checks.quoted(value)}: give an object with keys")
         return {}
     for key, sentence in rows.unusable_columns(value.keys_as_written):
-        problems.add(f"{place}, key {checks.shown(key)} {sentence}")
-    return {key: Cell(f"{place}, key {key}", said) for key, said in value.items() if key in rows.COLUMNS and said is not None}
+        problems.add(f"{place}, key {checks.quoted(key)} {sentence}")
+    return {
+        key: Cell(f"{place}, key {key}", entry) for key, entry in value.items() if key in rows.COLUMNS and entry is not None
+    }
 
 
 def _parsed(text: str, line: int = 1) -> object:

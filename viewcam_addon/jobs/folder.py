@@ -79,10 +79,10 @@ class Folder:
         endings = ["json", *(("exr", "png") if outputs.picture else ()), *(("html", SIDES["test"]) if outputs.report else ())]
         if outputs.labels:
             endings += endings_of_labels([each for kind in outputs.labels for each in PASSES[kind]])
-        ours = {self.summary.name, self.contact_sheet.name, *(f"{shot}.{ending}" for shot in shots for ending in endings)}
+        file_names = {self.summary.name, self.contact_sheet.name, *(f"{shot}.{ending}" for shot in shots for ending in endings)}
         with os.scandir(self.path) as entries:
             for entry in entries:
-                if entry.name in ours and os.path.exists(entry.path) and not entry.is_file():
+                if entry.name in file_names and os.path.exists(entry.path) and not entry.is_file():
                     what = "a folder" if entry.is_dir() else "no file"
                     raise InputError(
                         f"{Path(entry.path)} is {what}, and a file is to be written there: move it, or choose another folder"
@@ -93,7 +93,7 @@ class Folder:
 
         outputs : what it must tell of; by default the picture alone.
         """
-        outputs, record = outputs or Outputs(), self.told(name)
+        outputs, record = outputs or Outputs(), self.record(name)
         try:
             if record is None or record.get("settings") != settings or record.get("bytes") != self._sizes(name, record):
                 return None
@@ -109,7 +109,7 @@ class Folder:
         )
         return record if is_all else None
 
-    def told(self, name: str) -> dict[str, Any] | None:
+    def record(self, name: str) -> dict[str, Any] | None:
         """The sidecar of the shot, whatever it was made from; None where it is missing, or somebody else's."""
         try:
             record = json.loads(read_bytes(self.sidecar(name)).decode("utf-8"))
@@ -139,12 +139,12 @@ class Folder:
 
         shots : names of the shots whose leftovers they may be; those of the batch's own files go as well.
         """
-        ours = {*shots, self.summary.stem, self.contact_sheet.stem}
+        stems = {*shots, self.summary.stem, self.contact_sheet.stem}
         for path in self.path.iterdir():
-            found = _TEMPORARY.fullmatch(path.name)
-            if found and found[1] in ours and path.is_dir():
+            match = _TEMPORARY.fullmatch(path.name)
+            if match and match[1] in stems and path.is_dir():
                 shutil.rmtree(path, ignore_errors=True)
-            elif found and found[1] in ours:
+            elif match and match[1] in stems:
                 path.unlink(missing_ok=True)
 
 
@@ -170,21 +170,21 @@ def _is_sidecar(record: Any, name: str) -> bool:
     )
 
 
-def _are_labels(told: Any, name: str) -> bool:
+def _are_labels(labels: Any, name: str) -> bool:
     """True if a sidecar's labels are files of its shot, which no other folder has."""
     return (
-        isinstance(told, dict)
-        and isinstance(told.get("depth_steps"), int | float)
-        and isinstance(told.get("kinds"), list)
-        and all(isinstance(each, str) for each in told["kinds"])
-        and _are_files(told.get("files"), name)
+        isinstance(labels, dict)
+        and isinstance(labels.get("depth_steps"), int | float)
+        and isinstance(labels.get("kinds"), list)
+        and all(isinstance(each, str) for each in labels["kinds"])
+        and _are_files(labels.get("files"), name)
     )
 
 
-def _are_files(told: Any, name: str) -> bool:
+def _are_files(names: Any, name: str) -> bool:
     """True if a list of a sidecar is of files of its shot, which no other folder has."""
-    return isinstance(told, list) and all(
-        isinstance(file, str) and file.startswith(f"{name}.") and _is_file_name(file) for file in told
+    return isinstance(names, list) and all(
+        isinstance(file, str) and file.startswith(f"{name}.") and _is_file_name(file) for file in names
     )
 
 

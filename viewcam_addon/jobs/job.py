@@ -38,7 +38,7 @@ _THREADS = (1, 1024)
 _ASPECTS = (1 / 200, 200.0)
 _LARGEST_FLOAT32, _SMALLEST_FLOAT32 = (2.0 - 2.0**-23) * 2.0**127, 2.0**-126
 
-_STRICT = "exit with 3 if anything is not modelled: of the picture where one is compared, else of the file"
+_STRICT = "exit with 3 if anything is not modeled: of the picture where one is compared, else of the file"
 _FIND = (
     "for light, in place of --samples: as many of them as it takes to find a bias of that size in 99 of 100 cases, as 0.5%%; "
     "what differs by more is found sooner"
@@ -129,7 +129,7 @@ class Job:
             if getattr(self, field) is not None and (field, getattr(self, field)) != ("name", ""):
                 object.__setattr__(self, field, check(field, getattr(self, field)))
         for fields, sentence in conflicts({field: value for field in FIELDS if (value := getattr(self, field)) is not None}):
-            of = f" of the shot {checks.shown(self.name)}" if self.name else ""
+            of = f" of the shot {checks.quoted(self.name)}" if self.name else ""
             raise InputError(f"{', '.join(fields)}{of}: {sentence}")
 
     @property
@@ -198,46 +198,46 @@ def conflicts(values: Mapping[str, object], in_list: bool = False) -> list[tuple
     result = []
     if "name" not in values and in_list:
         result.append((("name",), "missing, give each shot a name of its own for its files"))
-    given = tuple(field for field in (*FOUR_VALUES, *BESIDE_THEM) if field in values)
+    stated = tuple(field for field in (*FOUR_VALUES, *BESIDE_THEM) if field in values)
     missing = tuple(field for field in FOUR_VALUES if field not in values)
-    if "camera" in values and given:
-        result.append((("camera", *given), "a shot has either a camera of the file or the four values, leave one of them out"))
-    elif "camera" not in values and missing and (given or in_list):
+    if "camera" in values and stated:
+        result.append((("camera", *stated), "a shot has either a camera of the file or the four values, leave one of them out"))
+    elif "camera" not in values and missing and (stated or in_list):
         result.append((missing, "missing, give eye, look_at, up and d, or the name of a camera of the file"))
     if "principal_point" in values and "width" not in values:
         result.append((("width", "height"), "missing, the principal point counts pixels of a picture: give its size"))
     if values.get("eye") is not None and values.get("eye") == values.get("look_at"):
         result.append((("eye", "look_at"), "they are the same point, and the view has no direction: move one of them"))
-    for one, other in (("width", "height"), ("height", "width")):
-        if one in values and other not in values:
-            result.append(((other,), f"missing, give {one} and {other}, or neither"))
+    for side, other in (("width", "height"), ("height", "width")):
+        if side in values and other not in values:
+            result.append(((other,), f"missing, give {side} and {other}, or neither"))
     return result
 
 
 def _text(place: str, value: object) -> str:
     if not isinstance(value, str) or not value:
-        raise InputError(f"{place} is {checks.shown(value)}: give a text")
+        raise InputError(f"{place} is {checks.quoted(value)}: give a text")
     if any("\udc80" <= character <= "\udcff" for character in value):
-        raise InputError(f"{place} is {checks.shown(value)}, which holds bytes that are not UTF-8: save the file as UTF-8")
+        raise InputError(f"{place} is {checks.quoted(value)}, which holds bytes that are not UTF-8: save the file as UTF-8")
     return value
 
 
 def _path(place: str, value: object) -> str:
     if not isinstance(value, str | os.PathLike):
-        raise InputError(f"{place} is {checks.shown(value)}: give the path of a file")
+        raise InputError(f"{place} is {checks.quoted(value)}: give the path of a file")
     return os.fspath(value)
 
 
 def _above_zero(place: str, value: object) -> float:
     number = checks.number(place, value)
     if number <= 0:
-        raise InputError(f"{place} is {checks.shown(value)}: give a number above 0")
+        raise InputError(f"{place} is {checks.quoted(value)}: give a number above 0")
     return number
 
 
 def _percentage(place: str, value: object) -> str:
     try:
-        return argument_types.percentage(value if isinstance(value, str) else checks.shown(value))
+        return argument_types.percentage(value if isinstance(value, str) else checks.quoted(value))
     except argparse.ArgumentTypeError as error:
         raise InputError(f"{place}: {error}") from error
 
@@ -249,7 +249,7 @@ def _name(place: str, value: object) -> str:
 
 def _choice(place: str, value: object, *, among: tuple[str, ...]) -> str:
     if not isinstance(value, str) or value not in among:
-        raise InputError(f"{place} is {checks.shown(value)}: give one of {', '.join(among)}")
+        raise InputError(f"{place} is {checks.quoted(value)}: give one of {', '.join(among)}")
     return value
 
 
@@ -292,7 +292,7 @@ def _truth(place: str, value: object) -> bool:
 def _whole(place: str, value: object, *, limits: tuple[int, int]) -> int:
     number = checks.number(place, value)
     if not number.is_integer() or not limits[0] <= number <= limits[1]:
-        raise InputError(f"{place} is {checks.shown(value)}: give a whole number from {limits[0]} to {limits[1]}")
+        raise InputError(f"{place} is {checks.quoted(value)}: give a whole number from {limits[0]} to {limits[1]}")
     return math.trunc(number)
 
 

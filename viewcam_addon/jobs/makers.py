@@ -72,10 +72,10 @@ def frames(text: str, camera: str | None = None) -> Sequence[Job]:
     InputError
         if the text is none, runs backwards or beyond Blender's frames, or has more than a million.
     """
-    found = _RANGE.fullmatch(text.strip())
-    if not found:
-        raise InputError(f"frames {checks.shown(text)} are no range: write 1..250")
-    first, last = int(found[1]), int(found[2])
+    match = _RANGE.fullmatch(text.strip())
+    if not match:
+        raise InputError(f"frames {checks.quoted(text)} are no range: write 1..250")
+    first, last = int(match[1]), int(match[2])
     if first > last:
         raise InputError(f"frames {text} run backwards: write {last}..{first}")
     _count(last - first + 1)
@@ -104,8 +104,8 @@ def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> l
     cameras = sorted(cameras)
     chosen = [name for name in cameras if fnmatch.fnmatchcase(name, pattern)]
     if not chosen:
-        raise InputError(f"no camera is called {checks.shown(pattern)}: the file has {', '.join(cameras[:8]) or 'none'}")
-    problems = Problems(f"the cameras {checks.shown(pattern)}")
+        raise InputError(f"no camera is called {checks.quoted(pattern)}: the file has {', '.join(cameras[:8]) or 'none'}")
+    problems = Problems(f"the cameras {checks.quoted(pattern)}")
     files: dict[str, str] = {}  # one_file(name of the shot) → camera
     shots = {}
     for camera in chosen:
@@ -114,7 +114,7 @@ def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> l
             names.check("a camera", name)
         other = files.setdefault(names.one_file(name), camera)
         if camera in shots or other != camera:
-            both = f"{checks.shown(other)} and {checks.shown(camera)}"
+            both = f"{checks.quoted(other)} and {checks.quoted(camera)}"
             problems.add(
                 f"the cameras {both} would have one file, here or on another system: rename one, or list shots in a file"
             )
@@ -136,11 +136,11 @@ def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Job]:
     problems = Problems("the cameras")
     files: dict[str, str] = {}
     shots = []
-    for given, pinhole in pinholes:
-        name = names.made_fit(given)
-        other = files.setdefault(names.one_file(name), given)
-        if other != given or len(files) <= len(shots):
-            problems.add(f"the cameras {checks.shown(other)} and {checks.shown(given)} would have one file: rename one")
+    for camera, pinhole in pinholes:
+        name = names.made_fit(camera)
+        other = files.setdefault(names.one_file(name), camera)
+        if other != camera or len(files) <= len(shots):
+            problems.add(f"the cameras {checks.quoted(other)} and {checks.quoted(camera)} would have one file: rename one")
             continue
         (d_x, d_y), (width, height) = pinhole.distance, (pinhole.width, pinhole.height)
         middle = (width / 2, height / 2)

@@ -40,7 +40,7 @@ def check(place: str, name: str) -> None:
         that says why.
     """
     if problem := _problem(name):
-        raise InputError(f"{place} is {checks.shown(name)}, which {problem}")
+        raise InputError(f"{place} is {checks.quoted(name)}, which {problem}")
 
 
 def made_fit(name: str) -> str:

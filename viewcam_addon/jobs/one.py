@@ -94,7 +94,7 @@ def render_one(shot: Job, folder: Folder, renderer: Renderer, settings: str, out
     """
     started = time.monotonic()
     image, preview, sidecar = folder.image(shot.name), folder.preview(shot.name), folder.sidecar(shot.name)
-    former = folder.told(shot.name) or {}
+    former = folder.record(shot.name) or {}
     kept = folder.finished(shot.name, settings, Outputs(picture=False)) or {}
     is_kept = "image" in kept and ("check" in kept or not outputs.check)
     kinds = [kind for kind in KINDS if kind in {*outputs.labels, *kept.get("labels", {}).get("kinds", ())}]
@@ -103,9 +103,9 @@ def render_one(shot: Job, folder: Folder, renderer: Renderer, settings: str, out
         new_image = new_preview = None
         if outputs.picture and not is_kept:
             new_preview, new_image = (files.enter_context(written_whole(path)) for path in (preview, image))
-        said = renderer.render(shot, new_image, new_preview)
+        rendered = renderer.render(shot, new_image, new_preview)
         if is_kept:
-            said = {key: kept[key] for key in said if key in kept}
+            rendered = {key: kept[key] for key in rendered if key in kept}
         sizes = {}
         if outputs.picture or is_kept:
             sizes = {"image": (new_image or image).stat().st_size, "preview": (new_preview or preview).stat().st_size}
@@ -127,7 +127,7 @@ def render_one(shot: Job, folder: Folder, renderer: Renderer, settings: str, out
         "settings": settings,
         **({"image": image.name, "preview": preview.name} if "image" in sizes else {}),
         "bytes": sizes,
-        **said,
+        **rendered,
         **labels,
         **verdict,
         "timing": {
@@ -142,12 +142,12 @@ def render_one(shot: Job, folder: Folder, renderer: Renderer, settings: str, out
 def _checked(job: Job, renderer: Renderer, has_picture: bool, folder: Path | None) -> dict[str, Any]:
     """The part of a check that a sidecar keeps. folder : receives its page and a thumbnail, NAME.html and NAME.test.png."""
     if folder is None:
-        found = renderer.check(job, has_picture)
-        return {"check": {key: found[key] for key in _KEPT if key in found}}
-    found = renderer.check(job, has_picture, Written(report=str(folder), sides=str(folder), command=job.check_words()))
+        result = renderer.check(job, has_picture)
+        return {"check": {key: result[key] for key in _KEPT if key in result}}
+    result = renderer.check(job, has_picture, Written(report=str(folder), sides=str(folder), command=job.check_words()))
     names = [f"{job.name}.html", f"{job.name}.{SIDES['test']}"]
-    for name, made in zip(names, (PAGE, SIDES["test"]), strict=True):
-        (folder / made).rename(folder / name)
+    for name, file in zip(names, (PAGE, SIDES["test"]), strict=True):
+        (folder / file).rename(folder / name)
     for side in ("reference", "everything"):
         (folder / SIDES[side]).unlink(missing_ok=True)
-    return {"check": {key: found[key] for key in _KEPT if key in found}, "report": names}
+    return {"check": {key: result[key] for key in _KEPT if key in result}, "report": names}

@@ -64,8 +64,8 @@ class ServedRenderer:
         return self._ask(self._rendering)
 
     def label(self, shot: Job, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
-        said = {"picture": str(picture), "kinds": list(kinds), "depth_steps": depth_steps}
-        return self._ask(self._rendering, {"label": {"shot": shot.to_json(), **said}})
+        request = {"picture": str(picture), "kinds": list(kinds), "depth_steps": depth_steps}
+        return self._ask(self._rendering, {"label": {"shot": shot.to_json(), **request}})
 
     def check(
         self, job: Job, has_picture: bool = True, written: Written | None = None, keep: Path | None = None
@@ -89,8 +89,8 @@ class ServedRenderer:
         return self._ask({"made_from": {}})
 
     def problems(self, shots: Iterable[Job], outputs: Outputs | None = None) -> tuple[str, ...]:
-        said = [shot.to_json() for shot in shots]
-        return tuple(self._ask({"problems": {"shots": said, "outputs": dataclasses.asdict(outputs or Outputs())}}))
+        records = [shot.to_json() for shot in shots]
+        return tuple(self._ask({"problems": {"shots": records, "outputs": dataclasses.asdict(outputs or Outputs())}}))
 
     def close(self) -> None:
         """End the Blender."""

@@ -77,9 +77,9 @@ def unusable_columns(columns: Sequence[str]) -> list[tuple[str, str]]:
 
 def missing_fields(columns: Iterable[str]) -> list[str]:
     """The fields that every row needs, and which are none of these columns."""
-    given = {_FIELD_OF.get(column) for column in columns}
-    needed = ("name",) if "camera" in given else ("name", "eye", "look_at", "up", "d")
-    return [name for name in needed if name not in given]
+    stated = {_FIELD_OF.get(column) for column in columns}
+    needed = ("name",) if "camera" in stated else ("name", "eye", "look_at", "up", "d")
+    return [name for name in needed if name not in stated]
 
 
 def missing_parts(columns: Collection[str]) -> list[str]:
@@ -90,12 +90,12 @@ def missing_parts(columns: Collection[str]) -> list[str]:
 
 def with_defaults(row: Mapping[str, Cell], defaults: Mapping[str, Cell]) -> dict[str, Cell]:
     """A row's cells, and the defaults of the fields that it does not have; its kind of camera displaces the other kind."""
-    said = {_FIELD_OF[column] for column in row}
-    if "camera" in said:
-        said |= {*VECTORS, "d", *BESIDE_THEM}
-    elif said & {*VECTORS, "d"}:
-        said.add("camera")
-    return {column: cell for column, cell in defaults.items() if _FIELD_OF[column] not in said} | dict(row)
+    stated = {_FIELD_OF[column] for column in row}
+    if "camera" in stated:
+        stated |= {*VECTORS, "d", *BESIDE_THEM}
+    elif stated & {*VECTORS, "d"}:
+        stated.add("camera")
+    return {column: cell for column, cell in defaults.items() if _FIELD_OF[column] not in stated} | dict(row)
 
 
 def shots_of(rows: Iterable[Row], problems: Problems, cameras: Collection[str] | None) -> list[Job]:
@@ -116,7 +116,7 @@ def shots_of(rows: Iterable[Row], problems: Problems, cameras: Collection[str] |
         if cameras is not None and (camera := values.get("camera")) is not None and camera not in known:
             guesses -= 1  # a guess looks at every camera, and nobody reads those behind the problems that are shown
             close = ", ".join(difflib.get_close_matches(camera, cameras)) if guesses >= 0 else ""
-            problems.add(f"{row.cells['camera'].place}: the file has no camera {checks.shown(camera)}, but {close or first}")
+            problems.add(f"{row.cells['camera'].place}: the file has no camera {checks.quoted(camera)}, but {close or first}")
         if None not in values.values() and not refused:
             shots.append(Job(**values))
     return shots
@@ -157,5 +157,5 @@ def _check_name(row: Row, values: Mapping[str, object], taken: dict[str, tuple[s
         return
     before, place = taken.setdefault(names.one_file(name), (name, row.place))
     if place != row.place:
-        same = "" if before == name else f" as {checks.shown(before)}, which is the same file on Windows and macOS"
-        problems.add(f"{row.place_of(['name'])} is {checks.shown(name)}: {place} has this name already{same}, give another")
+        same = "" if before == name else f" as {checks.quoted(before)}, which is the same file on Windows and macOS"
+        problems.add(f"{row.place_of(['name'])} is {checks.quoted(name)}: {place} has this name already{same}, give another")

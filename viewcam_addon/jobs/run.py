@@ -9,7 +9,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 
-from ..errors import FullDiskError, InputError, told
+from ..errors import FullDiskError, InputError, message_of
 from ..events import Events
 from . import sheet, summary
 from .folder import Folder, Outputs, write_json
@@ -89,7 +89,7 @@ class _Batch:
             )
         if overwrite:
             for name in present:
-                self._folder.remove_former(name, self._folder.told(name) or {}, of_labels_only=self._outputs.picture)
+                self._folder.remove_former(name, self._folder.record(name) or {}, of_labels_only=self._outputs.picture)
         self._todo.extend(shot for shot in self._shots if not self._is_there(shot))
         self._kept = len(self._shots) - len(self._todo)
         self._events.tell("batch_started", shots=len(self._shots), kept=self._kept, folder=self._folder.path)
@@ -124,7 +124,7 @@ class _Batch:
     def note(self, shot: Job, outcome: dict | Exception) -> None:
         """Count a shot that was rendered or failed."""
         if isinstance(outcome, Exception):
-            error = told(outcome)
+            error = message_of(outcome)
             self._full = self._full or isinstance(outcome, FullDiskError)
             self._errors[shot.name] = error
             self._events.tell("shot_failed", shot=shot.name, error=error)

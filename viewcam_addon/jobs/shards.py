@@ -23,8 +23,8 @@ def shard(items: Sequence[Item], text: str) -> list[Item]:
     InputError
         if the text is none with 1 ≤ I ≤ N.
     """
-    found = _SHARD.fullmatch(text.strip())
-    if not found or not 1 <= int(found[1]) <= int(found[2]):
-        raise InputError(f"shard {checks.shown(text)} is none: write 1/8 to 8/8 for the parts of eight")
-    number, count = int(found[1]), int(found[2])
+    match = _SHARD.fullmatch(text.strip())
+    if not match or not 1 <= int(match[1]) <= int(match[2]):
+        raise InputError(f"shard {checks.quoted(text)} is none: write 1/8 to 8/8 for the parts of eight")
+    number, count = int(match[1]), int(match[2])
     return list(items[number - 1 :: count])

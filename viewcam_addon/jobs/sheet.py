@@ -24,7 +24,7 @@ _WORDS = {
     "failed": "failed",
     "left": "left to render",
     "checks_failed": "not what the reference tracer sees",
-    "not_all_modelled": "the same but for objects that are not modelled",
+    "not_all_modelled": "the same but for objects that are not modeled",
 }
 
 
@@ -42,14 +42,14 @@ def picture(result: Result) -> str:
 def facts(record: Mapping[str, Any]) -> list[str]:
     """The facts of a shot's sidecar, a few words each: file, camera, frame, size, lens and angle of view."""
     rendered, camera, blender = (_part(record, name) for name in ("rendered", "camera", "blender"))
-    told = [str(rendered["file"])] if rendered.get("file") else []
+    parts = [str(rendered["file"])] if rendered.get("file") else []
     name = rendered.get("camera")
-    told += [str(name)] if name else []
+    parts += [str(name)] if name else []
     frame, width, height = (rendered.get(key) for key in ("frame", "width", "height"))
-    told += [f"frame {frame}"] if isinstance(frame, int) else []
-    told += [f"{width} × {height}"] if isinstance(width, int) and isinstance(height, int) else []
+    parts += [f"frame {frame}"] if isinstance(frame, int) else []
+    parts += [f"{width} × {height}"] if isinstance(width, int) and isinstance(height, int) else []
     lens, distance, across = blender.get("lens"), camera.get("distance"), camera.get("width")
-    told += [f"{lens:.4g} mm"] if isinstance(lens, float) else []
+    parts += [f"{lens:.4g} mm"] if isinstance(lens, float) else []
     if (
         isinstance(distance, list)
         and distance
@@ -57,8 +57,8 @@ def facts(record: Mapping[str, Any]) -> list[str]:
         and distance[0] > 0
         and isinstance(across, int)
     ):
-        told.append(f"{math.degrees(2 * math.atan2(across / 2, distance[0])):.3g}° across")
-    return told
+        parts.append(f"{math.degrees(2 * math.atan2(across / 2, distance[0])):.3g}° across")
+    return parts
 
 
 def verdict(result: Result) -> str:
@@ -81,8 +81,8 @@ def verdict(result: Result) -> str:
 
 
 def _part(record: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    found = record.get(name)
-    return found if isinstance(found, dict) else {}
+    part = record.get(name)
+    return part if isinstance(part, dict) else {}
 
 
 def write(path: Path, pictures: Sequence[str], counts: Mapping[str, int]) -> None:
@@ -116,6 +116,6 @@ def _answer(counts: Mapping[str, int]) -> str | None:
 
 
 def _intro(counts: Mapping[str, int]) -> str:
-    told = ["All are there" if counts["done"] == counts["shots"] else f"{counts['done']:,} are there"]
-    told += [f"{counts[state]:,} {words}" for state, words in _WORDS.items() if counts[state]]
-    return ", ".join(told) + "."
+    parts = ["All are there" if counts["done"] == counts["shots"] else f"{counts['done']:,} are there"]
+    parts += [f"{counts[state]:,} {words}" for state, words in _WORDS.items() if counts[state]]
+    return ", ".join(parts) + "."

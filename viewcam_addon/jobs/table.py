@@ -60,12 +60,12 @@ def read(text: str, problems: Problems) -> Iterator[Row]:
             continue
         if any(cell and not column for column, cell in zip(columns, cells, strict=True)):
             problems.add(f"{line.place} has a cell under no column: take it out, or name its column")
-        said = {
+        values = {
             column: Cell(f"{line.place}, column {column}", _value(column, cell))
             for column, cell in zip(columns, cells, strict=True)
             if cell and column in known
         }
-        yield Row(line.place, "column", said, known, excused)
+        yield Row(line.place, "column", values, known, excused)
 
 
 def _header(line: _Line, separator: str, problems: Problems) -> list[str] | None:
@@ -75,7 +75,7 @@ def _header(line: _Line, separator: str, problems: Problems) -> list[str] | None
         return None
     named = max((number for number, column in enumerate(columns, start=1) if column), default=0)
     for column, sentence in rows.unusable_columns(columns[:named]):
-        problems.add(f"{line.place}, column {checks.shown(column)} {sentence}")
+        problems.add(f"{line.place}, column {checks.quoted(column)} {sentence}")
     return columns
 
 

@@ -183,9 +183,9 @@ def compare_files(
     from ..comparison import radiance, renderers
 
     image.check_same_frames([reference, *tests])
-    shown = image.read(reference)
+    reference_image = image.read(reference)
     if channels:
-        if radiance.carries_light(shown):
+        if radiance.carries_light(reference_image):
             raise InputError(f"--channels are of geometry, and {reference} shows light: trace it at level geometry")
         if not {"Depth", "Distance", "Position"} & channels.keys():
             raise InputError("--channels tells nothing of where things are: name depth, distance or position")
@@ -194,10 +194,10 @@ def compare_files(
         pictures, (renderer, *_) = map(list, zip(*map(renderers.read, tests), strict=True))
     read = api.read_scene(scene) if scene else None
     partial = bool(channels) or renderer is not renderers.CYCLES
-    comparison = api.compare(shown, pictures, read, threads, renderer=renderer, partial=partial)
+    comparison = api.compare(reference_image, pictures, read, threads, renderer=renderer, partial=partial)
     if partial:
         pictures = [renderers.completed(picture, comparison.pinhole) for picture in pictures]
-    return _told(comparison, shown, pictures, read.ledger if read else (), written or Written())
+    return _to_json(comparison, reference_image, pictures, read.ledger if read else (), written or Written())
 
 
 class _Server:
@@ -243,8 +243,10 @@ class _Server:
 
         wanted, files, seen = Job.from_json(job), Written(**written), self._scene(scene)
         if camera and clip:
-            given = stated and Pinhole(**stated)
-            seen = dataclasses.replace(seen, camera=Pinhole(**camera), clip=(clip[0], clip[1]), stated_camera=given or None)
+            stated_camera = stated and Pinhole(**stated)
+            seen = dataclasses.replace(
+                seen, camera=Pinhole(**camera), clip=(clip[0], clip[1]), stated_camera=stated_camera or None
+            )
         elif wanted.size:
             seen = dataclasses.replace(seen, camera=seen.camera.resized(*wanted.size))
         entries = tuple(LedgerEntry(**entry) for entry in ledger)
@@ -285,8 +287,8 @@ class _Server:
             image.write(files.reference, reference)
         if partial:
             pictures = [renderers.completed(picture, comparison.pinhole) for picture in pictures]
-        told = _told(comparison, reference, pictures, entries, files, whole)
-        return {**told, "seconds": seconds}
+        result = _to_json(comparison, reference, pictures, entries, files, whole)
+        return {**result, "seconds": seconds}
 
     def _label(
         self,
@@ -317,7 +319,7 @@ class _Server:
         return self._files[path]
 
 
-def _told(
+def _to_json(
     comparison: "GeometryComparison | RadianceComparison",
     reference: "Image",
     tests: "Sequence[Image]",
@@ -345,8 +347,8 @@ def _told(
         result["difference"] = difference.write(comparison, written.difference)
     if written.sides:
         difference.write_sides(comparison, reference, tests, written.sides, whole)
-    told = {**comparison.answer.to_json(), "lines": lines}
-    return {**told, "result": checks.for_json(result), "figures": checks.for_json(figures)}
+    record = {**comparison.answer.to_json(), "lines": lines}
+    return {**record, "result": checks.for_json(result), "figures": checks.for_json(figures)}
 
 
 def _geometry_figures(comparison: "GeometryComparison") -> dict[str, Any]:

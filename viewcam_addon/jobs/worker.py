@@ -11,7 +11,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from ..errors import FullDiskError, InputError, told
+from ..errors import FullDiskError, InputError, message_of
 from .folder import Folder, Outputs
 from .job import Job
 from .one import render_one
@@ -65,13 +65,13 @@ def render(scene: dict[str, Any], folder: str, shot: dict[str, Any], settings: s
                 raise InputError(f"{folder} is not there: share the folder of the pictures among the machines")
             renderer = _blender.renderer(scene)
         except Exception as error:
-            return {"unfit": told(error)}
+            return {"unfit": message_of(error)}
         try:
             render_one(Job.from_json(shot), Folder(Path(folder)), renderer, settings, Outputs(**outputs))
         except FullDiskError as error:
             return {"full": str(error)}
         except Exception as error:  # told as the shot's, and the next one is tried
-            return {"failed": told(error)}
+            return {"failed": message_of(error)}
     return {}
 
 

@@ -34,7 +34,7 @@ from ..files import folder_written_whole
 from ..pinhole import Pinhole
 from ..png import encoded
 from . import files, masks
-from .coco import Document, category, found, with_mask
+from .coco import Document, category, read_pictures, with_mask
 
 _SCENE = ("scene_camera", "scene_gt", "scene_gt_info")
 _FILES = ("depth", "mask", "mask_visib", "objects.json", *(f"{name}.json" for name in _SCENE))
@@ -63,7 +63,7 @@ def write(
         if there are no label files, one lacks something or can't be read, or the folder can't be written.
     """
     progress(0.0)
-    pictures, _ = found(folder)
+    pictures, _ = read_pictures(folder)
     objects = _Objects(pictures)
     scene: dict[str, dict[str, Any]] = {name: {} for name in _SCENE}
 
@@ -73,30 +73,30 @@ def write(
     with folder_written_whole(output, may_replace) as temporary, ThreadPoolExecutor(machine.cores()) as threads:
         for kind in ("depth", "mask", "mask_visib"):
             (temporary / kind).mkdir()
-        for number, (path, told) in enumerate(pictures):
+        for number, (path, document) in enumerate(pictures):
             with files.understood(path):
-                values = _picture(path, told, objects, temporary, number, threads)
+                values = _picture(path, document, objects, temporary, number, threads)
             for name, each in zip(scene, values, strict=True):
                 scene[name][str(number)] = each
             progress((number + 1) / len(pictures))
-        for name, values in {**scene, "objects": objects.told()}.items():
+        for name, values in {**scene, "objects": objects.to_json()}.items():
             (temporary / f"{name}.json").write_text(_lines(values), encoding="utf-8", newline="\n")
-        shown = sum(_copy_rgb(path, told, temporary, number) for number, (path, told) in enumerate(pictures))
+        copied = sum(_copy_rgb(path, document, temporary, number) for number, (path, document) in enumerate(pictures))
     count = sum(len(poses) for poses in scene["scene_gt"].values())
-    return {"images": len(pictures), "instances": count, "objects": len(objects.told()), "rgb": shown}
+    return {"images": len(pictures), "instances": count, "objects": len(objects.to_json()), "rgb": copied}
 
 
 def _picture(
-    path: Path, told: Document, objects: "_Objects", output: Path, number: int, threads: ThreadPoolExecutor
+    path: Path, document: Document, objects: "_Objects", output: Path, number: int, threads: ThreadPoolExecutor
 ) -> tuple[Any, Any, Any]:
     """The entries of a picture in the three files; its depth and masks are written."""
-    depth = files.passes(path, told, ("Depth",))
+    depth = files.passes(path, document, ("Depth",))
     if not depth:
         raise InputError(f"{path} has no depth: render it with --labels depth")
-    with_mask("visible", path, told)
-    levels = files.depth_levels(depth["Depth"][..., 0], told["depth_png_steps"])
+    with_mask("visible", path, document)
+    levels = files.depth_levels(depth["Depth"][..., 0], document["depth_png_steps"])
     (output / "depth" / f"{number:06d}.png").write_bytes(encoded(levels))
-    instances = with_mask("amodal", path, told)
+    instances = with_mask("amodal", path, document)
     nothing = encoded(np.zeros(levels.shape, np.uint8))
 
     def write_masks(place: int) -> int:
@@ -121,7 +121,7 @@ def _picture(
         for each, turn, matrix in zip(instances, turns, matrices, strict=True)
     ]
     seen = [_seen(each, pixels) for each, pixels in zip(instances, valid, strict=True)]
-    return {**_camera(told), "depth_scale": _MILLIMETRES / told["depth_png_steps"]}, poses, seen
+    return {**_camera(document), "depth_scale": _MILLIMETRES / document["depth_png_steps"]}, poses, seen
 
 
 class _Objects:
@@ -130,9 +130,9 @@ class _Objects:
     def __init__(self, pictures: list[tuple[Path, Document]]) -> None:
         alike: dict[str, list[_Object]] = {}
         self._object_of: dict[tuple[Any, ...], _Object] = {}
-        for path, told in pictures:
+        for path, document in pictures:
             with files.understood(path):
-                for each in told["instances"]:
+                for each in document["instances"]:
                     if (key := self._key(each)) not in self._object_of:
                         self._object_of[key] = _object_of(each, alike.setdefault(category(each["name"]), []))
         self._every = [(name, each) for name in sorted(alike) for each in alike[name]]
@@ -141,7 +141,7 @@ class _Objects:
     def number(self, instance: Document) -> int:
         return self._numbers[id(self._object_of[self._key(instance)])]
 
-    def told(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         return {
             str(number): {"name": name, "box": each.box, "object_to_model": (_MILLIMETRES * each.stretch).tolist()}
             for number, (name, each) in enumerate(self._every, start=1)
@@ -206,14 +206,14 @@ def _box(mask: Document | None) -> list[int]:
     return [x, y, width - 1, height - 1]
 
 
-def _camera(told: Document) -> Document:
-    camera = cameras.Camera(told["picture"], Pinhole(**told["camera"]), image=told["picture"])
+def _camera(document: Document) -> Document:
+    camera = cameras.Camera(document["picture"], Pinhole(**document["camera"]), image=document["picture"])
     return json.loads(cameras.write([camera], "bop", cameras.Options(scale=1 / _MILLIMETRES)))["0"]
 
 
-def _copy_rgb(path: Path, told: Document, output: Path, number: int) -> bool:
+def _copy_rgb(path: Path, document: Document, output: Path, number: int) -> bool:
     """True if there is a picture."""
-    picture = files.photograph(path, told)
+    picture = files.photograph(path, document)
     if picture is None:
         return False
     (output / "rgb").mkdir(exist_ok=True)

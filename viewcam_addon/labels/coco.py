@@ -18,13 +18,13 @@ Document = dict[str, Any]
 def instances(folder: Path, amodal: bool = False) -> Document:
     """COCO's instances, as in instances_train2017.json. amodal : masks and boxes of whole objects, not of what is visible.
 
-    folder : of label files; `file_name` is the picture's that they belong to. Raises InputError as `found` does.
+    folder : of label files; `file_name` is the picture's that they belong to. Raises InputError as `read_pictures` does.
     """
-    pictures, categories = found(folder)
+    pictures, categories = read_pictures(folder)
     kind = "amodal" if amodal else "visible"
     annotations: list[Document] = []
-    for number, (path, told) in enumerate(pictures, start=1):
-        for each in with_mask(kind, path, told):
+    for number, (path, document) in enumerate(pictures, start=1):
+        for each in with_mask(kind, path, document):
             annotations.append(
                 {
                     "id": len(annotations) + 1,
@@ -40,10 +40,10 @@ def instances(folder: Path, amodal: bool = False) -> Document:
 
 
 def panoptic(folder: Path) -> Document:
-    """COCO's panoptic segments, of the instances.png beside each label file. Raises InputError as `found` does."""
-    pictures, categories = found(folder)
+    """COCO's panoptic segments, of the instances.png beside each label file. Raises InputError as `read_pictures` does."""
+    pictures, categories = read_pictures(folder)
     annotations = []
-    for number, (path, told) in enumerate(pictures, start=1):
+    for number, (path, document) in enumerate(pictures, start=1):
         segments = [
             {
                 "id": each["id"],
@@ -52,9 +52,9 @@ def panoptic(folder: Path) -> Document:
                 "bbox": each["visible"]["bbox"],
                 "iscrowd": 0,
             }
-            for each in with_mask("visible", path, told)
+            for each in with_mask("visible", path, document)
         ]
-        file_name = files.of_picture(Path(told["picture"]), "instances.png").name
+        file_name = files.of_picture(Path(document["picture"]), "instances.png").name
         annotations.append({"image_id": number, "file_name": file_name, "segments_info": segments})
     things = [{**each, "isthing": 1, "color": _colour(each["id"])} for each in _categories(categories)]
     return {"images": _images(pictures), "annotations": annotations, "categories": things}
@@ -65,7 +65,7 @@ def category(name: str) -> str:
     return re.sub(r"\.\d{3,}$", "", name)
 
 
-def found(folder: Path) -> tuple[list[tuple[Path, Document]], dict[str, int]]:
+def read_pictures(folder: Path) -> tuple[list[tuple[Path, Document]], dict[str, int]]:
     """The label files of a folder in the order of their names, and the categories, numbered from 1 in the order of theirs.
 
     Raises
@@ -77,27 +77,27 @@ def found(folder: Path) -> tuple[list[tuple[Path, Document]], dict[str, int]]:
     if not paths:
         raise InputError(f"{folder} has no label files, *.labels.json: write some with viewcam render --labels masks")
     pictures = [(path, files.read(path)) for path in paths]
-    names = sorted({category(each["name"]) for _, told in pictures for each in told["instances"]})
+    names = sorted({category(each["name"]) for _, document in pictures for each in document["instances"]})
     return pictures, {name: number for number, name in enumerate(names, start=1)}
 
 
-def with_mask(kind: str, path: Path, told: Document) -> Sequence[Document]:
+def with_mask(kind: str, path: Path, document: Document) -> Sequence[Document]:
     """The instances that have such a mask."""
     label = "masks" if kind == "visible" else kind
-    if any(kind not in each for each in told["instances"]):
+    if any(kind not in each for each in document["instances"]):
         raise InputError(f"{path} has no {kind} masks: render it with --labels {label}")
-    return [each for each in told["instances"] if each[kind] is not None]
+    return [each for each in document["instances"] if each[kind] is not None]
 
 
 def _images(pictures: list[tuple[Path, Document]]) -> list[Document]:
     return [
         {
             "id": number,
-            "width": told["camera"]["width"],
-            "height": told["camera"]["height"],
-            "file_name": files.picture(path, told),
+            "width": document["camera"]["width"],
+            "height": document["camera"]["height"],
+            "file_name": files.picture(path, document),
         }
-        for number, (path, told) in enumerate(pictures, start=1)
+        for number, (path, document) in enumerate(pictures, start=1)
     ]
 
 

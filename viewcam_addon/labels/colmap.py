@@ -32,7 +32,7 @@ from ..image import BACKGROUND_DEPTH
 from ..pinhole import Pinhole
 from ..png import decoded
 from . import files
-from .coco import Document, found
+from .coco import Document, read_pictures
 
 Array = NDArray[np.float64]
 
@@ -77,24 +77,24 @@ def write(folder: Path, output: Path, points: int = POINTS, overwrite: bool = Fa
         if there are no label files, one lacks something or can't be read, a camera or picture is none that COLMAP can name, or
         the folder can't be written.
     """
-    pictures, _ = found(folder)
+    pictures, _ = read_pictures(folder)
 
     def may_replace(there: Path) -> bool:
         return _has_no_points(there) or (overwrite and files.holds(there, colmap.TEXTS, (*colmap.TEXTS, PLY)))
 
     with folder_written_whole(output, may_replace) as temporary:
         views = []
-        for path, told in pictures:
+        for path, document in pictures:
             with files.understood(path):
-                name = files.picture(path, told)
-                views.append(cameras.Camera(name, Pinhole(**told["camera"]), image=name))
+                name = files.picture(path, document)
+                views.append(cameras.Camera(name, Pinhole(**document["camera"]), image=name))
         tracks = tracks_of(pictures, views, points)
         for file, content in contents(views, tracks).items():
             (temporary / file).write_bytes(content)
     return {
         "images": len(views),
         "points": len(tracks.positions),
-        "observations": sum(len(which) for which, _ in tracks.shown),
+        "observations": sum(len(which) for which, _ in tracks.observations),
     }
 
 
@@ -107,35 +107,35 @@ def tracks_of(
     pictures that see a point its track has at most, all if None. Raises InputError if one lacks something or can't be read.
     """
     states: dict[str, int] = {}
-    pieces, shown = [], []
-    for number, (view, (path, told)) in enumerate(zip(views, pictures, strict=True)):
+    pieces, visible = [], []
+    for number, (view, (path, document)) in enumerate(zip(views, pictures, strict=True)):
         with files.understood(path):
-            depth, state, ids = _planes(path, told, states)
-            pieces.append(_sampled(number, view.pinhole, depth, state, _colours(path, told, ids), points))
+            depth, state, ids = _planes(path, document, states)
+            pieces.append(_sampled(number, view.pinhole, depth, state, _colours(path, document, ids), points))
     sampled = _Sampled(*map(np.concatenate, zip(*pieces, strict=True)))
-    for number, (view, (path, told)) in enumerate(zip(views, pictures, strict=True)):
-        shown.append(_shown(sampled, number, view.pinhole, *_planes(path, told, states)[:2]))
+    for number, (view, (path, document)) in enumerate(zip(views, pictures, strict=True)):
+        visible.append(_visible(sampled, number, view.pinhole, *_planes(path, document, states)[:2]))
     if longest is not None:
-        shown = _shortened(shown, longest)
-    often = np.bincount(np.concatenate([which for which, _ in shown]), minlength=len(sampled.source)) > 1
+        visible = _shortened(visible, longest)
+    often = np.bincount(np.concatenate([which for which, _ in visible]), minlength=len(sampled.source)) > 1
     new = np.cumsum(often) - 1
     return colmap.Tracks(
         sampled.positions[often],
         sampled.colours[often],
-        [(new[which[often[which]]], places[often[which]]) for which, places in shown],
+        [(new[which[often[which]]], places[often[which]]) for which, places in visible],
     )
 
 
-def _shortened(shown: list[tuple[NDArray[np.intp], Array]], longest: int) -> list[tuple[NDArray[np.intp], Array]]:
+def _shortened(visible: list[tuple[NDArray[np.intp], Array]], longest: int) -> list[tuple[NDArray[np.intp], Array]]:
     """The places in each picture, of each point those in `longest` pictures at most, spread over those that see it."""
-    point = np.concatenate([which for which, _ in shown])
-    picture = np.repeat(np.arange(len(shown)), [len(which) for which, _ in shown])
+    point = np.concatenate([which for which, _ in visible])
+    picture = np.repeat(np.arange(len(visible)), [len(which) for which, _ in visible])
     order = np.lexsort(((picture * _EVENLY[0] + point * _EVENLY[1]) % 1.0, point))
     first = np.flatnonzero(np.diff(point[order], prepend=-1))
     kept = np.zeros(len(point), bool)
     kept[order] = np.arange(len(point)) - np.repeat(first, np.diff(first, append=len(point))) < longest
-    parts = np.split(kept, np.cumsum([len(which) for which, _ in shown])[:-1])
-    return [(which[part], places[part]) for (which, places), part in zip(shown, parts, strict=True)]
+    parts = np.split(kept, np.cumsum([len(which) for which, _ in visible])[:-1])
+    return [(which[part], places[part]) for (which, places), part in zip(visible, parts, strict=True)]
 
 
 def contents(views: Sequence[cameras.Camera], tracks: colmap.Tracks) -> dict[str, bytes]:
@@ -162,9 +162,9 @@ def _ply(tracks: colmap.Tracks) -> bytes:
     )
 
 
-def _colours(path: Path, told: Document, ids: NDArray[np.float32]) -> NDArray[np.uint8]:
+def _colours(path: Path, document: Document, ids: NDArray[np.float32]) -> NDArray[np.uint8]:
     """(height, width, 3): the picture beside a label file, if it is a PNG, or else its ids."""
-    picture = files.photograph(path, told)
+    picture = files.photograph(path, document)
     if picture is None or picture.suffix != ".png":
         return files.id_colours(ids)
     try:
@@ -175,12 +175,12 @@ def _colours(path: Path, told: Document, ids: NDArray[np.float32]) -> NDArray[np
     return (colours >> 8 * (colours.dtype.itemsize - 1)).astype(np.uint8)
 
 
-def _planes(path: Path, told: Document, states: dict[str, int]) -> tuple[Array, NDArray[np.int64], NDArray[np.float32]]:
+def _planes(path: Path, document: Document, states: dict[str, int]) -> tuple[Array, NDArray[np.int64], NDArray[np.float32]]:
     """(height, width) each, rows from the top: depth; which instance in which state, −1 where nothing is; its id.
 
     states : of all pictures, numbered as they are met; an instance's matrix and box are its state.
     """
-    passes = files.passes(path, told, ("Depth", "Instance"))
+    passes = files.passes(path, document, ("Depth", "Instance"))
     if len(passes) < 2:
         missing = "depth" if "Depth" not in passes else "masks"
         raise InputError(f"{path} has no {missing}: render it with --labels depth,masks")
@@ -188,7 +188,7 @@ def _planes(path: Path, told: Document, states: dict[str, int]) -> tuple[Array, 
     known, places = np.unique(ids, return_inverse=True)
     of_ids = {
         each["id"]: states.setdefault(f"{each['id']} {each['object_to_world']} {each['box']}", len(states))
-        for each in told["instances"]
+        for each in document["instances"]
     }
     numbers = np.array([of_ids[each] if each else -1 for each in known.astype(int).tolist()])
     state = np.where(depth < BACKGROUND_DEPTH, numbers[places.reshape(ids.shape)], -1)
@@ -217,7 +217,7 @@ def _sampled(
     return _Sampled(positions, np.full(len(z), number), z, state[rows, columns], colours[rows, columns])
 
 
-def _shown(
+def _visible(
     sampled: _Sampled, number: int, camera: Pinhole, depth: Array, state: NDArray[np.int64]
 ) -> tuple[NDArray[np.intp], Array]:
     """The points that a picture shows, and their places: (n, 2), x to the right and y **down** from the picture's corner."""

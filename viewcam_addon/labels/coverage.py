@@ -51,10 +51,10 @@ def coverage(surfaces: Surfaces) -> Coverage:
     first = np.flatnonzero(np.diff(pixels, prepend=-1))
     ranks = np.arange(len(pixels)) - np.repeat(first, np.diff(first, append=len(pixels)))
     layers = max(int(ranks.max(initial=0)) // 2 + 1, 1)
-    found = np.zeros((at_samples.shape[1], layers, 4), np.float32)
-    found[pixels, ranks // 2, ranks % 2 * 2] = marks[owners]
-    found[pixels, ranks // 2, ranks % 2 * 2 + 1] = counts / SAMPLES
-    passes = {name: found[:, i].reshape(*shape, 4) for i, name in enumerate(COVERAGE_PASSES[:layers])}
+    ranked = np.zeros((at_samples.shape[1], layers, 4), np.float32)
+    ranked[pixels, ranks // 2, ranks % 2 * 2] = marks[owners]
+    ranked[pixels, ranks // 2, ranks % 2 * 2 + 1] = counts / SAMPLES
+    passes = {name: ranked[:, i].reshape(*shape, 4) for i, name in enumerate(COVERAGE_PASSES[:layers])}
     areas = np.bincount(owners, counts, len(names)) / SAMPLES
     manifest = {name: _hex(mark) for name, mark, area in zip(names, marks, areas, strict=True) if area}
     return Coverage(passes, names, areas, _header(manifest))
@@ -70,9 +70,9 @@ def soft_mask(image: Image, name: str) -> NDArray[np.float32]:
     return result
 
 
-def told(found: Coverage, number: int) -> dict[str, Any] | None:
+def entry(covered: Coverage, number: int) -> dict[str, Any] | None:
     """The entry of a label file about an instance's coverage; None where it has none."""
-    return {"name": found.names[number], "area": float(found.areas[number])} if found.areas[number] else None
+    return {"name": covered.names[number], "area": float(covered.areas[number])} if covered.areas[number] else None
 
 
 def _places() -> list[tuple[float, float]]:
@@ -93,10 +93,10 @@ def _counted(at_samples: NDArray[np.int32]) -> tuple[NDArray[np.intp], NDArray[n
     starts = np.flatnonzero(np.diff(several, axis=1, prepend=-2))
     counts = np.diff(starts, append=several.size)
     owners, pixels = several.ravel()[starts], mixed[starts // SAMPLES]
-    some = owners >= 0
-    pixels = np.concatenate([whole, pixels[some]])
-    owners = np.concatenate([first[whole], owners[some]])
-    counts = np.concatenate([np.full(len(whole), SAMPLES), counts[some]])
+    is_covered = owners >= 0
+    pixels = np.concatenate([whole, pixels[is_covered]])
+    owners = np.concatenate([first[whole], owners[is_covered]])
+    counts = np.concatenate([np.full(len(whole), SAMPLES), counts[is_covered]])
     order = np.lexsort((owners, -counts, pixels))
     return pixels[order], owners[order], counts[order]
 

@@ -75,8 +75,8 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
         with written_whole(each) as temporary:
             temporary.write_bytes(content)
     with written_whole(told_in) as temporary:
-        told = _told(path, labels, [each.name for each in others], depth_steps)
-        temporary.write_text(json.dumps(told, allow_nan=False) + "\n", encoding="utf-8", newline="\n")
+        document = _document(path, labels, [each.name for each in others], depth_steps)
+        temporary.write_text(json.dumps(document, allow_nan=False) + "\n", encoding="utf-8", newline="\n")
     return [*others, told_in]
 
 
@@ -115,17 +115,17 @@ def _refused(constant: str) -> Never:
     raise ValueError(f"{constant} is no number of JSON")
 
 
-def _check(told: dict[str, Any]) -> None:
+def _check(document: dict[str, Any]) -> None:
     """Raise ValueError, LookupError, TypeError or AttributeError for what the writers of datasets could not use.
 
     So that they ask for no more memory than the picture has pixels, and write no file that nobody can read.
     """
-    camera = Pinhole(**told["camera"])
+    camera = Pinhole(**document["camera"])
     size = camera.height, camera.width
-    texts = [told["picture"], *told.get("passes", ())]
-    if len({each["id"] for each in told["instances"]}) < len(told["instances"]):
+    texts = [document["picture"], *document.get("passes", ())]
+    if len({each["id"] for each in document["instances"]}) < len(document["instances"]):
         raise ValueError("two instances have one id")
-    for each in told["instances"]:
+    for each in document["instances"]:
         texts.append(each["name"])
         if type(each["id"]) is not int or not 0 < each["id"] <= _LARGEST_ID:
             raise ValueError("an id is none")
@@ -137,8 +137,8 @@ def _check(told: dict[str, Any]) -> None:
         for kind in ("visible", "amodal"):
             if (mask := each.get(kind)) is not None:
                 _check_mask(mask, size)
-    _check_numbers(steps := told["depth_png_steps"], ())
-    if steps <= 0 or told["picture"] != Path(told["picture"]).name:
+    _check_numbers(steps := document["depth_png_steps"], ())
+    if steps <= 0 or document["picture"] != Path(document["picture"]).name:
         raise ValueError("steps of depth are above 0, and the picture is beside its labels")
     for text in texts:
         text.encode("utf-8")
@@ -177,7 +177,7 @@ def name(path: Path) -> str:
     return path.name.removesuffix(".labels.json")
 
 
-def photograph(path: Path, told: dict[str, Any]) -> Path | None:
+def photograph(path: Path, document: dict[str, Any]) -> Path | None:
     """The PNG or JPEG of what a label file tells of, if one stands beside it.
 
     Raises
@@ -185,21 +185,21 @@ def photograph(path: Path, told: dict[str, Any]) -> Path | None:
     InputError
         if it has another size.
     """
-    found = (path.with_name(f"{name(path)}{suffix}") for suffix in (".png", ".jpg", ".jpeg"))
-    for picture, size in ((each, image_size(each)) for each in found):
-        if size == (told["camera"]["width"], told["camera"]["height"]):
+    candidates = (path.with_name(f"{name(path)}{suffix}") for suffix in (".png", ".jpg", ".jpeg"))
+    for picture, size in ((each, image_size(each)) for each in candidates):
+        if size == (document["camera"]["width"], document["camera"]["height"]):
             return picture
         if size:
             raise InputError(f"{picture} has {size[0]} × {size[1]} pixels and its labels have others: render both anew")
     return None
 
 
-def picture(path: Path, told: dict[str, Any]) -> str:
+def picture(path: Path, document: dict[str, Any]) -> str:
     """The name of the picture that a label file tells of: of the PNG or JPEG beside it, or else of the EXR."""
-    return (photograph(path, told) or Path(told["picture"])).name
+    return (photograph(path, document) or Path(document["picture"])).name
 
 
-def passes(path: Path, told: dict[str, Any], wanted: Sequence[str]) -> dict[str, NDArray[np.float32]]:
+def passes(path: Path, document: dict[str, Any], wanted: Sequence[str]) -> dict[str, NDArray[np.float32]]:
     """The passes of a label file's EXR that it has, of those wanted: (height, width, channels), rows from the **top**.
 
     Raises
@@ -207,19 +207,19 @@ def passes(path: Path, told: dict[str, Any], wanted: Sequence[str]) -> dict[str,
     InputError
         if they can't be read, or are of another picture.
     """
-    chosen = [each for each in wanted if each in told.get("passes", ())]
+    chosen = [each for each in wanted if each in document.get("passes", ())]
     if not chosen:
         return {}
-    found = image.read(path.with_name(f"{name(path)}.labels.exr"), chosen)
-    if found.size != (told["camera"]["width"], told["camera"]["height"]):
-        raise InputError(f"{path} is of another picture than {found.source}: write both again with viewcam render --labels")
+    read = image.read(path.with_name(f"{name(path)}.labels.exr"), chosen)
+    if read.size != (document["camera"]["width"], document["camera"]["height"]):
+        raise InputError(f"{path} is of another picture than {read.source}: write both again with viewcam render --labels")
     for each, is_one in _ARE_VALUES.items():
-        if each in chosen and not is_one(found[each]).all():
-            raise InputError(f"{found.source} has numbers in {each} that are none of it: write it with viewcam render --labels")
-    return {each: found[each][::-1] for each in chosen}
+        if each in chosen and not is_one(read[each]).all():
+            raise InputError(f"{read.source} has numbers in {each} that are none of it: write it with viewcam render --labels")
+    return {each: read[each][::-1] for each in chosen}
 
 
-def _told(path: Path, labels: Labels, names: list[str], depth_steps: float) -> dict[str, Any]:
+def _document(path: Path, labels: Labels, names: list[str], depth_steps: float) -> dict[str, Any]:
     return {
         "format": _FORMAT,
         "version": _VERSION,

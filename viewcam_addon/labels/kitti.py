@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..files import folder_written_whole
 from ..png import encoded
 from . import files
-from .coco import found
+from .coco import read_pictures
 
 DEPTH_STEPS = 256.0
 """In a meter."""
@@ -37,15 +37,15 @@ def write(folder: Path, output: Path, overwrite: bool = False) -> dict[str, int]
     InputError
         if there are no label files, one has neither, or can't be read, or the folder can't be written.
     """
-    pictures, _ = found(folder)
+    pictures, _ = read_pictures(folder)
     counts = {"depth": 0, "flow": 0}
 
     def may_replace(there: Path) -> bool:
         return overwrite and files.holds(there, (), ("depth", "flow_occ", "flow_noc"))
 
     with folder_written_whole(output, may_replace) as temporary:
-        for path, told in pictures:
-            planes = _planes(files.passes(path, told, ("Depth", "Forward Flow", "Forward Hidden")))
+        for path, document in pictures:
+            planes = _planes(files.passes(path, document, ("Depth", "Forward Flow", "Forward Hidden")))
             if not planes:
                 raise InputError(f"{path} has neither depth nor forward flow: render it with --labels depth,flow --next")
             for kind, pixels in planes.items():

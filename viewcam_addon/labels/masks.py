@@ -21,10 +21,10 @@ pixel."""
 def of_picture(instance: NDArray[np.int64], count: int) -> Masks:
     """The masks of what each pixel shows. instance : (height, width) numbers below `count`, −1 for none, rows from the
     bottom."""
-    shown = instance[::-1].T.ravel()
-    starts = np.flatnonzero(np.diff(shown, prepend=-2))
-    ends = np.append(starts[1:], shown.size)
-    owners = shown[starts]
+    owner = instance[::-1].T.ravel()
+    starts = np.flatnonzero(np.diff(owner, prepend=-2))
+    ends = np.append(starts[1:], owner.size)
+    owners = owner[starts]
     order = np.argsort(owners, kind="stable")
     order = order[np.searchsorted(owners[order], 0) :]
     return _described(owners[order], starts[order], ends[order], instance.shape, count)
@@ -101,8 +101,8 @@ def _described(
     boxes = np.stack([left, top, right - left + 1, bottom - top + 1], axis=1).tolist()
     areas = np.add.reduceat(ends - starts, first).tolist()
     rests = (height * width - ends[last]).tolist()
-    told = zip(owners[first].tolist(), areas, boxes, rests, first.tolist(), last.tolist(), strict=True)
-    for owner, area, box, rest, begin, end in told:
+    rows = zip(owners[first].tolist(), areas, boxes, rests, first.tolist(), last.tolist(), strict=True)
+    for owner, area, box, rest, begin, end in rows:
         runs = counts[2 * begin : 2 * end + 2] + [rest] * (rest > 0)  # of zeros first: 0 where the first pixel is set
         result[owner] = {"area": area, "bbox": box, "segmentation": {"size": [height, width], "counts": runs}}
     return result

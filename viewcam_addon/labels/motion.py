@@ -50,7 +50,7 @@ def motion(here: Surfaces, there: Surfaces) -> Motion:
     others = {instance.key: (number, instance) for number, instance in enumerate(there.instances)}
     points, owners = here.points.reshape(-1, 3), np.full(here.instance.size, -1)
     moved, lost = np.full_like(points, np.nan), {}
-    for instance, pixels in here.shown:
+    for instance, pixels in here.visible:
         number, other = others.get(instance.key, (-1, None))
         if other is None or not _is_alike(_geometry(here, instance), _geometry(there, other)):
             lost[instance.key[0]] = None
@@ -70,13 +70,13 @@ def _geometry(surfaces: Surfaces, instance: Instance) -> Mesh | Spheres:
     return surfaces.scene.geometries[instance.placed.geometry]
 
 
-def _is_alike(one: Mesh | Spheres, other: Mesh | Spheres) -> bool:
+def _is_alike(first: Mesh | Spheres, second: Mesh | Spheres) -> bool:
     """True if the primitives of two geometries are the same ones, wherever they stand."""
-    if one is other:
+    if first is second:
         return True
-    if isinstance(one, Mesh) and isinstance(other, Mesh):
-        return np.array_equal(one.triangles, other.triangles)
-    return isinstance(one, Spheres) and isinstance(other, Spheres) and len(one.radii) == len(other.radii)
+    if isinstance(first, Mesh) and isinstance(second, Mesh):
+        return np.array_equal(first.triangles, second.triangles)
+    return isinstance(first, Spheres) and isinstance(second, Spheres) and len(first.radii) == len(second.radii)
 
 
 def _carried(here: Surfaces, there: Surfaces, instance: Instance, other: Instance, pixels: NDArray[np.intp]) -> Array:

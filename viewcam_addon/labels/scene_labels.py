@@ -57,7 +57,7 @@ def label(
         passes |= {"Normal": normals, "Camera Normal": normals @ np.stack([right, -up, forward], axis=1)}
     if "position" in kinds:
         local = np.zeros_like(surfaces.points)
-        for instance, pixels in surfaces.shown:
+        for instance, pixels in surfaces.visible:
             local.reshape(-1, 3)[pixels] = surfaces.local_points(instance, pixels)
         passes |= {"Position": surfaces.points, "Object Position": local}
     if "masks" in kinds:
@@ -68,15 +68,15 @@ def label(
     if "flow" in kinds:
         for name, other in others.items():
             if other is not None:
-                found = motion(surfaces, Surfaces(other, threads, keepers.of(other)))
-                passes |= _motions(name, found)
-                lost[name.lower()] = list(found.lost)
+                moved = motion(surfaces, Surfaces(other, threads, keepers.of(other)))
+                passes |= _motions(name, moved)
+                lost[name.lower()] = list(moved.lost)
     if covered:
         passes |= covered.passes
     planes = {name: np.asarray(values, np.float32).reshape(*shape, -1) for name, values in passes.items()}
-    told = _instances(surfaces, covered, with_masks="masks" in kinds, with_amodal="amodal" in kinds)
+    records = _instances(surfaces, covered, with_masks="masks" in kinds, with_amodal="amodal" in kinds)
     header = {"software": "Virtual Pinhole", **(covered.header if covered else {})}
-    return Labels(Image(planes, scene.camera, header), told, lost)
+    return Labels(Image(planes, scene.camera, header), records, lost)
 
 
 def _depths(surfaces: Surfaces) -> dict[str, NDArray[Any]]:
@@ -90,8 +90,8 @@ def _depths(surfaces: Surfaces) -> dict[str, NDArray[Any]]:
     }
 
 
-def _motions(name: str, found: Motion) -> dict[str, NDArray[Any]]:
-    return {f"{name} Flow": found.flow, f"{name} Motion": found.displacement, f"{name} Hidden": found.hidden}
+def _motions(name: str, motion: Motion) -> dict[str, NDArray[Any]]:
+    return {f"{name} Flow": motion.flow, f"{name} Motion": motion.displacement, f"{name} Hidden": motion.hidden}
 
 
 def _instances(
@@ -109,7 +109,7 @@ def _instances(
     in_world, in_camera = matrices.tolist(), (to_camera @ matrices).tolist()
     result = []
     for number, (instance, seen, whole) in enumerate(zip(all_of_them, visible, amodal, strict=True)):
-        share = coverage.told(covered, number) if covered else None
+        share = coverage.entry(covered, number) if covered else None
         if whole is None and share is None:
             continue
         least, greatest = surfaces.keeper.box(instance.placed.geometry)

@@ -162,12 +162,12 @@ class Surfaces:
         return self._hits[3]
 
     @cached_property
-    def shown(self) -> list[tuple[Instance, NDArray[np.intp]]]:
+    def visible(self) -> list[tuple[Instance, NDArray[np.intp]]]:
         """Each instance that any pixel shows, and its pixels, by their numbers row by row."""
-        return [(self.instances[number], pixels) for number, pixels in self.shown_numbers]
+        return [(self.instances[number], pixels) for number, pixels in self.visible_numbers]
 
     @cached_property
-    def shown_numbers(self) -> list[tuple[int, NDArray[np.intp]]]:
+    def visible_numbers(self) -> list[tuple[int, NDArray[np.intp]]]:
         """The pixels that show each instance, by the instances' numbers."""
         order = np.argsort(self.instance, axis=None, kind="stable")
         numbers = self.instance.ravel()[order]
@@ -227,7 +227,7 @@ class Silhouettes:
         surfaces = self._surfaces
         if not surfaces.instances:
             return []
-        shown = dict(surfaces.shown_numbers)
+        visible = dict(surfaces.visible_numbers)
         camera, clip = surfaces.camera, surfaces.scene.clip
         matrices, inverses = (np.array([getattr(each, name) for each in surfaces.instances]) for name in ("matrix", "inverse"))
         is_flat = np.linalg.det(matrices[:, :3, :3]) == 0
@@ -235,7 +235,7 @@ class Silhouettes:
         eyes = (inverses[:, :3, :3] @ (np.array(camera.eye) - matrices[:, :3, 3])[..., None])[..., 0]
         axes = camera.picture_axes() @ inverses[:, :3, :3].swapaxes(1, 2)
         reaches = self._reaches()
-        for number, pixels in shown.items():  # rounding may have left out a box that begins where the clip range does
+        for number, pixels in visible.items():  # rounding may have left out a box that begins where the clip range does
             rows, columns = np.divmod(pixels, camera.width)
             first = np.minimum(reaches[number, :2], [columns.min(), rows.min()])
             last = np.maximum(reaches[number, :2] + reaches[number, 2:], [columns.max() + 1, rows.max() + 1])
@@ -246,8 +246,8 @@ class Silhouettes:
             for number in numbers.tolist():
                 window = reaches[number].tolist()
                 covered = cores[number].silhouette(camera, clip, eyes[number], axes[number], window)
-                if number in shown:
-                    rows, columns = np.divmod(shown[number], camera.width)
+                if number in visible:
+                    rows, columns = np.divmod(visible[number], camera.width)
                     covered[rows - window[1], columns - window[0]] = True
                 result[number] = window[0], window[1], covered
 
@@ -269,11 +269,11 @@ class Silhouettes:
         camera, near = self._surfaces.camera, self._surfaces.scene.clip[0]
         corners = np.stack([self._keeper.corners(each) for each in self._surfaces.instances])
         depth = (corners - np.array(camera.eye)) @ camera.picture_axes()[2]
-        one, other = _EDGES
+        start, end = _EDGES
         is_beyond = depth >= near
-        is_cut = is_beyond[:, one] != is_beyond[:, other]
-        share = np.where(is_cut, near - depth[:, one], 0.0) / np.where(is_cut, depth[:, other] - depth[:, one], 1.0)
-        cut = corners[:, one] + share[..., None] * (corners[:, other] - corners[:, one])
+        is_cut = is_beyond[:, start] != is_beyond[:, end]
+        share = np.where(is_cut, near - depth[:, start], 0.0) / np.where(is_cut, depth[:, end] - depth[:, start], 1.0)
+        cut = corners[:, start] + share[..., None] * (corners[:, end] - corners[:, start])
         places = np.stack(camera.project(np.concatenate([corners, cut], axis=1))[:2], axis=-1)
         is_seen = np.concatenate([is_beyond, is_cut], axis=1)
         is_known = (np.isfinite(places).all(axis=-1) | ~is_seen).all(axis=1)[:, None]

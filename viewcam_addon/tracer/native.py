@@ -35,7 +35,7 @@ from .scene.value_nodes import IES, OWN
 from .tiles import Passes
 
 LIGHT = (*LIGHT_PASSES, "Sample Count")
-"""The passes of light, as capi_light.h has them."""
+"""The passes of light, as core/film/film.h has them."""
 NO_HIT = 0xFFFFFFFF
 """In place of the number of what is met, where nothing is."""
 TILE = 32
@@ -143,10 +143,6 @@ class _LightSettings(Structure):
     ]
 
 
-class _LightPasses(Structure):
-    _fields_ = [(name, c_void_p) for name in LIGHT]
-
-
 def _function(result: Any, *arguments: Any) -> Any:
     return ctypes.CFUNCTYPE(result, *arguments)
 
@@ -184,7 +180,7 @@ class _Core(Structure):
         ("light_create", _function(c_int, c_void_p, POINTER(_LightSettings), POINTER(c_void_p))),
         ("light_free", _function(None, c_void_p)),
         ("light_pairs", _function(c_size_t, c_void_p, c_size_t, c_void_p, c_void_p)),
-        ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, c_uint32, POINTER(_LightPasses), c_void_p)),
+        ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, c_uint32, c_void_p, c_void_p)),
         (
             "probe_sobol",
             _function(c_int, c_uint32, c_uint32, c_int, c_size_t, c_void_p, c_void_p, c_int, c_int, c_void_p),
@@ -212,12 +208,12 @@ def core(name: str | None = None) -> _Core:
     library = _library()
     library.viewcam_core.restype, library.viewcam_core.argtypes = POINTER(_Core), [c_char_p]
     name = name or os.environ.get("VIEWCAM_ISA") or None
-    found = library.viewcam_core(None if name is None else name.encode())
-    if not found:
+    interface = library.viewcam_core(None if name is None else name.encode())
+    if not interface:
         raise InputError(f"this processor has no core for the instruction set {name!r}: unset VIEWCAM_ISA")
-    if found.contents.size != ctypes.sizeof(_Core):
+    if interface.contents.size != ctypes.sizeof(_Core):
         raise InputError("the tracer's core that is installed is of another version: install this one's (pip install)")
-    return found.contents
+    return interface.contents
 
 
 @functools.cache
@@ -263,11 +259,11 @@ class _Links:
 
     def receiving(self, name: str) -> int:
         """`Object::lit_by` of an object."""
-        return sum(1 << bit for bit, some in enumerate(self._receivers) if name in some)
+        return sum(1 << bit for bit, names in enumerate(self._receivers) if name in names)
 
     def blocking(self, name: str) -> int:
         """Bits of `visible` above _SHADOW_LINKED."""
-        return sum(2 * _SHADOW_LINKED << bit for bit, some in enumerate(self._blockers) if name in some)
+        return sum(2 * _SHADOW_LINKED << bit for bit, names in enumerate(self._blockers) if name in names)
 
     def receivers(self, light: Lamp | Object) -> int:
         return _ALL if light.receivers is None else 1 << self._receivers.index(light.receivers)
@@ -363,8 +359,8 @@ class CoreScene:
         if placed.random is not None or placed.color != (1.0,) * 4:
             info = np.empty((len(placed.matrices), 5), np.float32)
             info[:, :4], info[:, 4] = placed.color, 0.0 if placed.random is None else placed.random
-        given = _Object(*shared, _address(indices), _address(numbers), *links, self._keep(info, np.float32, (None, 5)))
-        self.check(self.core.add_objects(self.handle, given))
+        record = _Object(*shared, _address(indices), _address(numbers), *links, self._keep(info, np.float32, (None, 5)))
+        self.check(self.core.add_objects(self.handle, record))
 
     def serves(self, scene: Scene) -> bool:
         """True if its hierarchies are those of another scene: the same things in the same places, near the same origin."""
@@ -538,10 +534,10 @@ class CoreScene:
         as n.
         """
         rays = array(rays, np.float64, (None, 8))
-        t, found = np.empty(len(rays)), np.empty((2, len(rays)), np.uint32)
-        addresses = _address(t), _address(found[0]), _address(found[1])
+        t, hits = np.empty(len(rays)), np.empty((2, len(rays)), np.uint32)
+        addresses = _address(t), _address(hits[0]), _address(hits[1])
         self.check(self.core.closest(self.handle, len(rays), _address(rays), _KINDS[kind], packets, *addresses))
-        objects, primitives = np.where(found == NO_HIT, -1, found.astype(np.int64))
+        objects, primitives = np.where(hits == NO_HIT, -1, hits.astype(np.int64))
         return t, objects, primitives
 
     def occluded(self, rays: NDArray, packets: bool = True) -> NDArray[np.bool_]:
@@ -558,10 +554,10 @@ class CoreScene:
         directions : (n, 3), unit. distances : of the lights, which face the rays. nan where nothing is met.
         """
         rays = array(rays, np.float64, (None, 8))
-        lights, found = np.ones((len(rays), 5)), np.empty((len(rays), 11))
+        lights, rows = np.ones((len(rays), 5)), np.empty((len(rays), 11))
         lights[:, :3], lights[:, 3] = directions, distances
-        self.check(self.core.probe_leaving(self.handle, len(rays), _address(rays), _address(lights), _address(found)))
-        return found[:, :3], found[:, 3:6], found[:, 6], found[:, 7:10], found[:, 10]
+        self.check(self.core.probe_leaving(self.handle, len(rays), _address(rays), _address(lights), _address(rows)))
+        return rows[:, :3], rows[:, 3:6], rows[:, 6], rows[:, 7:10], rows[:, 10]
 
     def values(self, rows: NDArray) -> tuple[NDArray, NDArray]:
         """The values that the last node makes on a floor, z up: n colors or vectors (n, 3), and the numbers (n,) that they
@@ -570,9 +566,9 @@ class CoreScene:
         rows : (n, 6), the unit way that a path came along, u, v, and whether the floor is met from behind.
         """
         rows = array(rows, np.float64, (None, 6))
-        found = np.empty((len(rows), 4))
-        self.check(self.core.probe_nodes(self.handle, len(rows), _address(rows), _address(found)))
-        return found[:, :3], found[:, 3]
+        results = np.empty((len(rows), 4))
+        self.check(self.core.probe_nodes(self.handle, len(rows), _address(rows), _address(results)))
+        return results[:, :3], results[:, 3]
 
     @property
     def bytes(self) -> int:
@@ -602,7 +598,7 @@ class CoreLight:
     def __init__(
         self,
         scene: CoreScene,
-        given: Scene,
+        described: Scene,
         level: str,
         samples: int,
         seed: int,
@@ -610,8 +606,8 @@ class CoreLight:
         coincident: float = 0.0,
     ) -> None:
         self._scene, self._handle = scene, c_void_p()
-        scene.illuminate(given)
-        bounces = given.bounces if level == "path" else given.bounces.none
+        scene.illuminate(described)
+        bounces = described.bounces if level == "path" else described.bounces.none
         settings = _LightSettings(seed=seed & 0xFFFFFFFF, samples=samples, error=error or 0.0, coincident=coincident)
         settings.bounces[:] = astuple(bounces)
         scene.check(scene.core.light_create(scene.handle, settings, ctypes.byref(self._handle)))
@@ -625,7 +621,7 @@ class CoreLight:
 
         samples : that its pixels have then: all, or fewer, to which the next call adds.
         """
-        addresses = _LightPasses(*(_address(passes.get(name)) for name in LIGHT))
+        addresses = (c_void_p * len(LIGHT))(*(_address(passes.get(name)) for name in LIGHT))
         self._scene.check(self._scene.core.trace_light(self._handle, row, column, samples, addresses, stop))
 
     def pairs(self) -> list[tuple[int, int | None, int]]:
@@ -635,8 +631,8 @@ class CoreLight:
         after the objects.
         """
         objects, counts = np.empty((1000, 2), np.uint32), np.empty(1000, np.uint64)
-        found = min(self._scene.core.light_pairs(self._handle, len(counts), _address(objects), _address(counts)), len(counts))
-        order = np.argsort(-counts[:found].astype(np.float64), kind="stable")
+        count = min(self._scene.core.light_pairs(self._handle, len(counts), _address(objects), _address(counts)), len(counts))
+        order = np.argsort(-counts[:count].astype(np.float64), kind="stable")
         none = np.iinfo(np.uint32).max
         return [
             (int(objects[i, 0]), None if objects[i, 1] == none else int(objects[i, 1]), int(counts[i])) for i in order.tolist()
@@ -657,11 +653,21 @@ class StopFlag:
 def sobol(seed: int, samples: int, pixels: NDArray, numbers: NDArray, first: int, dimensions: int) -> NDArray[np.float64]:
     """(n, dimensions): the sampler's numbers, from dimension `first` on, of samples of n pixels; for tests and benchmarks."""
     pixels, numbers = array(pixels, np.uint32, (None,)), array(numbers, np.uint32, (len(pixels),))
-    found = np.empty((len(pixels), dimensions))
-    given = seed & 0xFFFFFFFF, samples, 3, len(pixels), _address(pixels), _address(numbers), first, dimensions, _address(found)
-    if core().probe_sobol(*given):
+    points = np.empty((len(pixels), dimensions))
+    arguments = (
+        seed & 0xFFFFFFFF,
+        samples,
+        3,
+        len(pixels),
+        _address(pixels),
+        _address(numbers),
+        first,
+        dimensions,
+        _address(points),
+    )
+    if core().probe_sobol(*arguments):
         raise MemoryError
-    return found
+    return points
 
 
 def _filter_width(scene: Scene) -> float:

@@ -30,12 +30,12 @@ def import_(path, **options):
     return bpy.ops.viewcam.import_cameras(filepath=str(path), **options)
 
 
-def assert_same(found, wanted, points=((0, 0, 0), (1, 2, 1), (-2, 1, 2))):
+def assert_same(actual, wanted, points=((0, 0, 0), (1, 2, 1), (-2, 1, 2))):
     """The picture of both, within what float32 makes of a pose, a lens and a shift."""
-    assert (found.width, found.height, found.mirrored) == (wanted.width, wanted.height, wanted.mirrored)
-    ours, theirs = (np.array(each.project(np.array(points, dtype=float)))[:2] for each in (found, wanted))
+    assert (actual.width, actual.height, actual.mirrored) == (wanted.width, wanted.height, wanted.mirrored)
+    projected, expected = (np.array(each.project(np.array(points, dtype=float)))[:2] for each in (actual, wanted))
     # 24 bits of coordinates up to 10 seen from 5, times a distance of 600 pixels, a few roundings.
-    assert np.abs(ours - theirs).max() < 16 * 600 * 2.0**-24 * 2
+    assert np.abs(projected - expected).max() < 16 * 600 * 2.0**-24 * 2
 
 
 def write_picture(path, size=(8, 4)):
@@ -56,13 +56,13 @@ def counts():
 
 
 def test_a_folder_of_cameras_becomes_one_collection_and_each_sees_what_the_file_says(scene, tmp_path):
-    made = around(7)
-    formats.save(made, tmp_path / "sparse", "colmap")
+    cameras_around = around(7)
+    formats.save(cameras_around, tmp_path / "sparse", "colmap")
     assert import_(tmp_path / "sparse", set_size=True) == {"FINISHED"}
     objects = imported("sparse")
-    assert [each.name for each in objects] == [camera.name for camera in made]
+    assert [each.name for each in objects] == [camera.name for camera in cameras_around]
     assert (scene.render.resolution_x, scene.render.resolution_y) == (640, 360)
-    for block, camera in zip(objects, made, strict=True):
+    for block, camera in zip(objects, cameras_around, strict=True):
         assert block.virtual_pinhole.enabled
         assert_same(cameras.read(block, scene), camera.pinhole)
     assert scene.camera == objects[0]
@@ -93,10 +93,10 @@ def test_without_being_asked_the_scene_keeps_size_and_camera_and_is_told_what_di
 def test_a_mirrored_camera_has_a_negative_scale_unless_it_is_left(scene, tmp_path, capfd):
     formats.save(around(1, mirrored=True), tmp_path / "one.json", "text")
     import_(tmp_path / "one.json", set_size=True)
-    found = scene.camera
-    assert found.scale[0] < 0 and cameras.read(found, scene).mirrored
+    camera_object = scene.camera
+    assert camera_object.scale[0] < 0 and cameras.read(camera_object, scene).mirrored
     import_(tmp_path / "one.json", unmirrored=True)
-    (other,) = [each for each in bpy.data.objects if each != found]
+    (other,) = [each for each in bpy.data.objects if each != camera_object]
     assert not cameras.read(other, scene).mirrored
     assert "is mirrored, and was taken without that" in capfd.readouterr().out
 
@@ -107,8 +107,8 @@ def test_pictures_are_backgrounds_where_they_are_found_and_told_where_not(scene,
     for i in (0, 2):
         write_picture(tmp_path / "images" / f"view_{i:03}.png")
     import_(tmp_path / "sparse" / "0")
-    shown = [[each.image.name for each in block.data.background_images] for block in imported("0")]
-    assert shown == [["view_000.png"], [], ["view_002.png"]]
+    image_names = [[each.image.name for each in block.data.background_images] for block in imported("0")]
+    assert image_names == [["view_000.png"], [], ["view_002.png"]]
     assert "1 of 3 pictures were not found" in capfd.readouterr().out
 
 
@@ -129,8 +129,8 @@ def test_polycams_picture_is_found_from_whichever_folder_is_imported(tmp_path):
     (folder / "123.jpg").touch()
     (camera,) = around(1)
     camera = Camera(camera.name, camera.pinhole, image="keyframes/images/123.jpg")
-    for given in (tmp_path, tmp_path / "keyframes", tmp_path / "keyframes" / "cameras"):
-        assert naming.picture_of(camera, given) == folder / "123.jpg"
+    for path in (tmp_path, tmp_path / "keyframes", tmp_path / "keyframes" / "cameras"):
+        assert naming.picture_of(camera, path) == folder / "123.jpg"
 
 
 def test_an_fspy_project_brings_its_picture(scene, tmp_path):
@@ -145,9 +145,9 @@ def test_an_fspy_project_brings_its_picture(scene, tmp_path):
     block = bpy.data.objects["house"]
     (background,) = block.data.background_images
     assert tuple(background.image.size) == (8, 4) and background.image.packed_file and block.data.show_background_images
-    found = cameras.read(block, scene)
-    assert found.distance == pytest.approx((6, 6), rel=2.0**-22) and found.eye == pytest.approx((0, -5, 2))
-    assert found.principal_point == pytest.approx((4.4, 1.8), abs=1e-5)
+    pinhole = cameras.read(block, scene)
+    assert pinhole.distance == pytest.approx((6, 6), rel=2.0**-22) and pinhole.eye == pytest.approx((0, -5, 2))
+    assert pinhole.principal_point == pytest.approx((4.4, 1.8), abs=1e-5)
 
 
 @pytest.fixture
@@ -168,10 +168,10 @@ def test_a_trajectory_is_one_camera_that_flies_at_its_times(scene, trajectory):
     plane = formats.camera.ViewPlane((700, 700), (frame[0] / 2, frame[1] / 2), *frame)
     for at, wanted in zip((1, 13, 49), formats.read(trajectory, options=Options(view_plane=plane)), strict=True):
         scene.frame_set(at)
-        found = cameras.read(block, scene)
-        assert np.subtract(found.basis(), wanted.pinhole.basis()) == pytest.approx(0, abs=2.0**-21)
-        assert found.eye == pytest.approx(wanted.pinhole.eye, abs=2.0**-22)
-        assert found.distance == pytest.approx((700, 700), rel=2.0**-22)
+        pinhole = cameras.read(block, scene)
+        assert np.subtract(pinhole.basis(), wanted.pinhole.basis()) == pytest.approx(0, abs=2.0**-21)
+        assert pinhole.eye == pytest.approx(wanted.pinhole.eye, abs=2.0**-22)
+        assert pinhole.distance == pytest.approx((700, 700), rel=2.0**-22)
 
 
 def test_a_trajectory_without_a_lens_sees_as_the_scenes_camera_or_asks(posed_camera, scene, trajectory, capfd):
@@ -201,8 +201,8 @@ def test_what_can_not_be_imported_is_one_sentence_and_leaves_nothing(scene, tmp_
 
 
 def test_a_camera_beyond_blenders_numbers_leaves_nothing_of_the_others(scene, tmp_path):
-    made = [*around(2), Camera("far", Pinhole((1e39, 0, 0), (0, 0, 0), (0, 0, 1), 600, 640, 360))]
-    formats.save(made, tmp_path / "some", "sidecar")
+    cameras_around = [*around(2), Camera("far", Pinhole((1e39, 0, 0), (0, 0, 0), (0, 0, 1), 600, 640, 360))]
+    formats.save(cameras_around, tmp_path / "some", "sidecar")
     before = counts(), scene.camera, scene.render.resolution_x
     with pytest.raises(RuntimeError, match=r"(?i)camera 'far'.*beyond Blender"):
         import_(tmp_path / "some", set_size=True)
@@ -211,11 +211,13 @@ def test_a_camera_beyond_blenders_numbers_leaves_nothing_of_the_others(scene, tm
 
 @pytest.mark.parametrize("format", ["transforms", "colmap", "colmap_binary", "sidecar", "gltf", "opencv", "pbrt"])
 def test_what_is_exported_is_imported_as_the_same_cameras(scene, add_camera, tmp_path, format):
-    made = around(1 if format in ("opencv", "pbrt") else 3)
+    cameras_around = around(1 if format in ("opencv", "pbrt") else 3)
     if format == "gltf":  # it has no shift
-        made = [Camera(each.name, Pinhole(each.pinhole.eye, (0, 0, 1), (0, 0, 1), 600, 640, 360)) for each in made]
+        cameras_around = [
+            Camera(each.name, Pinhole(each.pinhole.eye, (0, 0, 1), (0, 0, 1), 600, 640, 360)) for each in cameras_around
+        ]
     scene.render.resolution_x, scene.render.resolution_y = 640, 360
-    for camera in made:
+    for camera in cameras_around:
         cameras.apply(add_camera(camera.name), camera.pinhole, scene)
     before = list(bpy.data.objects)
     path = tmp_path / "written"
@@ -223,8 +225,8 @@ def test_what_is_exported_is_imported_as_the_same_cameras(scene, add_camera, tmp
     (written,) = tmp_path.iterdir()
     import_(written, axes="y_up", scale=0.01)
     objects = [each for each in bpy.data.objects if each not in before and each.type == "CAMERA"]
-    assert len(objects) == len(made)
-    for block, camera in zip(objects, made, strict=True):
+    assert len(objects) == len(cameras_around)
+    for block, camera in zip(objects, cameras_around, strict=True):
         assert_same(cameras.read(block, scene), camera.pinhole)
 
 
@@ -282,10 +284,10 @@ def test_a_photograph_is_shown_without_its_lens_and_fits_the_scene_to_its_corner
     assert import_(tmp_path, set_size=True) == {"FINISHED"}
     (block,) = bpy.data.collections[tmp_path.name].objects
     (background,) = block.data.background_images
-    shown = background.image
-    width, height = shown.size
-    assert width / height == pytest.approx(640 / 360, rel=1e-4) and shown.packed_file
-    pixels = np.array(shown.pixels[:]).reshape(height, width, 4)[::-1, :, 0]
+    background_image = background.image
+    width, height = background_image.size
+    assert width / height == pytest.approx(640 / 360, rel=1e-4) and background_image.packed_file
+    pixels = np.array(background_image.pixels[:]).reshape(height, width, 4)[::-1, :, 0]
     across, down = np.meshgrid((np.arange(width) + 0.5) * 640 / width, (np.arange(height) + 0.5) * 360 / height)
     errors = []
     for x, y in zip(column, row, strict=True):

@@ -102,9 +102,9 @@ def test_copying_a_camera_that_is_not_in_use_changes_nothing(camera_object, scen
 
 def test_copying_says_what_it_copied(posed_camera, capfd):
     assert bpy.ops.viewcam.copy_camera() == {"FINISHED"}
-    said = capfd.readouterr().out.split("Copied ", 1)[1].splitlines()[0]
+    output = capfd.readouterr().out.split("Copied ", 1)[1].splitlines()[0]
     values = {"eye": [7, -6, 5], "look_at": [0, 0, 1], "up": [0, 0, 1], "distance": 1500}
-    assert json.loads(said) == values | {"width": 1920, "height": 1080}
+    assert json.loads(output) == values | {"width": 1920, "height": 1080}
 
 
 def test_a_held_roll_is_copied_as_the_up_of_the_same_picture(posed_camera, add_camera, scene):
@@ -148,23 +148,23 @@ SHIFTED += '"principal_point": [300, 200], "mirrored": true}'
 
 def test_a_pasted_camera_replaces_shift_and_mirror_of_the_old_one(posed_camera, scene):
     paste(SHIFTED)
-    found = cameras.read(posed_camera, scene)
+    pinhole = cameras.read(posed_camera, scene)
     # The scene's picture is three times as large; lens and shift are float32.
-    assert found.mirrored and found.principal_point == pytest.approx((900, 600), abs=1e-3)
-    assert found.distance == pytest.approx((1800, 1800), rel=2.0**-22)
+    assert pinhole.mirrored and pinhole.principal_point == pytest.approx((900, 600), abs=1e-3)
+    assert pinhole.distance == pytest.approx((1800, 1800), rel=2.0**-22)
     paste("eye=7,-6,5 look_at=0,0,1 up=0,0,1 d=900")
-    found = cameras.read(posed_camera, scene)
-    assert not found.mirrored and found.principal_point == (960, 540)
+    pinhole = cameras.read(posed_camera, scene)
+    assert not pinhole.mirrored and pinhole.principal_point == (960, 540)
 
 
 def test_a_paste_can_leave_the_mirror_and_set_the_scenes_size(posed_camera, scene, capfd):
     paste(SHIFTED.replace('"height": 360', '"height": 480'))
     assert "The camera is for 640 × 480 pixels and the scene renders 1920 × 1080" in capfd.readouterr().out
     paste(SHIFTED.replace('"distance": 600', '"distance": [600, 450]'), set_size=True, unmirrored=True)
-    found = cameras.read(posed_camera, scene)
-    assert (found.width, found.height, found.mirrored) == (640, 360, False)
-    assert found.distance == pytest.approx((600, 450), rel=2.0**-22)
-    assert found.principal_point == pytest.approx((340, 200), abs=1e-3)
+    pinhole = cameras.read(posed_camera, scene)
+    assert (pinhole.width, pinhole.height, pinhole.mirrored) == (640, 360, False)
+    assert pinhole.distance == pytest.approx((600, 450), rel=2.0**-22)
+    assert pinhole.principal_point == pytest.approx((340, 200), abs=1e-3)
 
 
 def test_a_text_with_several_cameras_asks_which(posed_camera):
@@ -279,11 +279,11 @@ def test_what_a_format_can_not_say_is_one_sentence(posed_camera):
 def test_pixels_of_another_aspect_are_told_and_set_if_that_is_asked_for(posed_camera, scene, capfd):
     text = SHIFTED.replace('"distance": 600', '"distance": [600, 450]').replace("640", "1920").replace("360", "1080")
     paste(text)
-    said = "The camera is for 1920 × 1080 pixels of aspect 0.75 and the scene renders 1920 × 1080 of aspect 1"
-    assert said in capfd.readouterr().out
+    message = "The camera is for 1920 × 1080 pixels of aspect 0.75 and the scene renders 1920 × 1080 of aspect 1"
+    assert message in capfd.readouterr().out
     assert cameras.read(posed_camera, scene).distance == pytest.approx((600, 600), rel=2.0**-22)
     paste(text, set_size=True)
-    assert said not in capfd.readouterr().out
+    assert message not in capfd.readouterr().out
     assert scene.render.pixel_aspect_y / scene.render.pixel_aspect_x == pytest.approx(4 / 3, rel=2.0**-23)
     assert cameras.read(posed_camera, scene).distance == pytest.approx((600, 450), rel=2.0**-22)
 

@@ -1,4 +1,4 @@
-"""A comparison beside Blender: the same picture, another one, cancelled, broken; and nothing of it in the file."""
+"""A comparison beside Blender: the same picture, another one, canceled, broken; and nothing of it in the file."""
 
 import contextlib
 import errno
@@ -80,19 +80,19 @@ def stand_in(monkeypatch, seen):
 
 def wait_for(what, seconds=100):
     ends = time.monotonic() + seconds
-    while not (found := what()) and time.monotonic() < ends:
+    while not (outcome := what()) and time.monotonic() < ends:
         time.sleep(0.02)
-    assert found, "it does not come about"
-    return found
+    assert outcome, "it does not come about"
+    return outcome
 
 
 def processes_of(folder):
     """The processes whose command line names the folder; one that has ended has none."""
-    found = []
+    result = []
     for process in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
-            found += [process.name] if str(folder).encode() in (process / "cmdline").read_bytes() else []
-    return found
+            result += [process.name] if str(folder).encode() in (process / "cmdline").read_bytes() else []
+    return result
 
 
 def values_of(block):
@@ -101,16 +101,16 @@ def values_of(block):
     def plain(value):
         return tuple(map(plain, value)) if hasattr(value, "__len__") and not isinstance(value, str | bytes | set) else value
 
-    found = {}
+    result = {}
     for prop in block.bl_rna.properties:
         value = getattr(block, prop.identifier, None)
         if prop.type == "POINTER":
-            found[prop.identifier] = value and getattr(value, "name", "")
+            result[prop.identifier] = value and getattr(value, "name", "")
         elif prop.type == "COLLECTION":
-            found[prop.identifier] = len(value)
+            result[prop.identifier] = len(value)
         elif prop.identifier != "rna_type":
-            found[prop.identifier] = repr(plain(value))
-    return found
+            result[prop.identifier] = repr(plain(value))
+    return result
 
 
 def state(scene):
@@ -120,8 +120,8 @@ def state(scene):
     blocks += [camera_object, camera_object.data, camera_object.virtual_pinhole]
     collections = [prop.identifier for prop in bpy.data.bl_rna.properties if prop.type == "COLLECTION"]
     counts = {name: len(getattr(bpy.data, name)) for name in collections}
-    found = {f"{type(block).__name__} {name}": value for block in blocks for name, value in values_of(block).items()}
-    return found | counts | {"file": bpy.data.filepath, "dirty": bpy.data.is_dirty}
+    result = {f"{type(block).__name__} {name}": value for block in blocks for name, value in values_of(block).items()}
+    return result | counts | {"file": bpy.data.filepath, "dirty": bpy.data.is_dirty}
 
 
 def changed(before, after):
@@ -132,16 +132,16 @@ def changed(before, after):
 def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
     seen.objects["Suzanne"].location.x = 0.25  # an edit that nobody has saved
     before = state(seen)
-    comparison, told = comparing.RunningComparison(seen.camera, seen), []
+    comparison, lines = comparing.RunningComparison(seen.camera, seen), []
     while (outcome := comparison.poll()) is None:
-        told.append(comparison.progress())
+        lines.append(comparison.progress())
         time.sleep(0.01)
     assert changed(before, state(seen)) == {}
     assert outcome.answer == SAME and outcome.verdict.startswith("The same picture: over "), outcome.verdict
-    assert [share for share, _ in told] == sorted(share for share, _ in told) and told[0][0] == 0
-    assert told[0][1] == "Rendering with Cycles" and told[-1][1] == "Comparing"
+    assert [share for share, _ in lines] == sorted(share for share, _ in lines) and lines[0][0] == 0
+    assert lines[0][1] == "Rendering with Cycles" and lines[-1][1] == "Comparing"
     rows = dict(outcome.rows)
-    assert rows["Median"].endswith(" px") and "Mismatches" in rows and rows["Modelled"] == "1 of 1 objects"
+    assert rows["Median"].endswith(" px") and "Mismatches" in rows and rows["Modeled"] == "1 of 1 objects"
     assert outcome.report.is_file() and all(path.is_file() for path in outcome.pictures.values()) and outcome.colours
     assert "check untitled.blend --camera Camera --level geometry" in outcome.report.read_text()
     exported = json.loads((outcome.folder / "scene.json").read_text())
@@ -192,7 +192,7 @@ def test_light_is_compared_with_as_many_samples_as_it_takes(seen, add_lamp):
     assert outcome.answer == SAME, outcome.verdict
     assert outcome.what == "Camera, frame 1, direct" and "Light, to Tracer's" in dict(outcome.rows)
     assert "Orange where Cycles is brighter" in outcome.colours
-    assert set(outcome.pictures) == {"cycles", "tracer", "difference"}, "all of it is modelled"
+    assert set(outcome.pictures) == {"cycles", "tracer", "difference"}, "all of it is modeled"
     page = outcome.report.read_text(encoding="utf-8")
     assert "--find 2%" in page and "--clay" in page
     assert len(list(outcome.folder.glob("cycles-*.exr"))) == 8
@@ -215,13 +215,13 @@ def test_cancelled_while_it_renders_it_leaves_no_process_and_no_file(seen):
 
 def test_its_steps_tell_how_far_it_is(stand_in):
     comparison = stand_in()
-    told = [comparison.progress()]
+    lines = [comparison.progress()]
     for steps, name in ((1, "cycles.exr"), (2, "scene.json"), (3, "reference.exr")):
         comparison.let(steps)
         wait_for((comparison.folder / "report" / name).exists)
-        told.append(comparison.progress())
+        lines.append(comparison.progress())
     words = ["Rendering with Cycles", "Rendering with Cycles", "Tracing", "Comparing"]
-    assert told == list(zip((0, 0, 1 / 3, 2 / 3), words, strict=True))
+    assert lines == list(zip((0, 0, 1 / 3, 2 / 3), words, strict=True))
     assert comparison.poll() is None
     comparison.let(8)
     outcome = wait_for(comparison.poll)
@@ -232,12 +232,12 @@ def test_its_steps_tell_how_far_it_is(stand_in):
 def test_light_is_rendered_in_pictures_that_are_counted(stand_in):
     comparison = stand_in(level="path")
     assert comparison.progress() == (0, "Rendering with Cycles, 1 of 8")
-    with open(comparison.folder / "said.txt", "a", encoding="utf-8") as said:
-        said.write('{"event": "step", "name": "rendering", "number": 4, "of": 8}\n')
-        said.flush()
+    with open(comparison.folder / "said.txt", "a", encoding="utf-8") as log:
+        log.write('{"event": "step", "name": "rendering", "number": 4, "of": 8}\n')
+        log.flush()
         assert comparison.progress() == (3 / 10, "Rendering with Cycles, 4 of 8")
-        said.write('{"event": "step", "name": "tracing"}\n{"event": "progress", "share": 0.25}\n{"event": "pro')
-        said.flush()
+        log.write('{"event": "step", "name": "tracing"}\n{"event": "progress", "share": 0.25}\n{"event": "pro')
+        log.flush()
         assert comparison.progress() == (8.25 / 10, "Tracing"), "half a line is on its way"
     comparison.cancel()
 
@@ -328,7 +328,7 @@ def test_a_child_that_dies_is_told_with_its_last_words(monkeypatch, seen):
 
 
 @pytest.mark.parametrize(
-    ("said", "status", "sentence"),
+    ("output", "status", "sentence"),
     [
         ('traced\n{"event": "error", "text": "out.exr can\'t be written"}\nleft\n', 2, "Out.exr can't be written"),
         ('{"event": "error", "text": "l.json: one problem", "problems": ["shot 1: no EEVEE"]}', 2, "Shot 1: no EEVEE"),
@@ -337,8 +337,8 @@ def test_a_child_that_dies_is_told_with_its_last_words(monkeypatch, seen):
         ("first\n\n last \n", -9, "The process that compares was ended by signal 9 after saying: last"),
     ],
 )
-def test_the_sentence_is_the_childs_own_where_it_has_one(said, status, sentence):
-    assert comparing.failure(said, status) == sentence
+def test_the_sentence_is_the_childs_own_where_it_has_one(output, status, sentence):
+    assert comparing.failure(output, status) == sentence
 
 
 @pytest.mark.parametrize(
@@ -354,17 +354,17 @@ def test_the_sentence_is_the_childs_own_where_it_has_one(said, status, sentence)
                 ("Median", "0.000052 px"),
                 ("99.9 % within", "0.0028 px"),
                 ("Mismatches", "1,200, 7 explained"),
-                ("Modelled", "1 of 2 objects"),
+                ("Modeled", "1 of 2 objects"),
             ],
         ),
-        ({"passes": [{"name": "Position", "percentiles": {}}], "ledger": []}, [("Modelled", "0 of 0 objects")]),
+        ({"passes": [{"name": "Position", "percentiles": {}}], "ledger": []}, [("Modeled", "0 of 0 objects")]),
         (
             {"quantities": [{"ratio": 1.000123, "ratio_error": 3.1e-4, "noise_free": None}], "ledger": []},
-            [("Light, to Tracer's", "1.00012 ± 0.00031"), ("Modelled", "0 of 0 objects")],
+            [("Light, to Tracer's", "1.00012 ± 0.00031"), ("Modeled", "0 of 0 objects")],
         ),
         (
             {"quantities": [{"noise_free": {"percentiles": {"p50": {"value": 0.0}, "p99.9": {"value": 2e-7}}}}], "ledger": []},
-            [("Median", "0 of the light"), ("99.9 % within", "0.0000002 of the light"), ("Modelled", "0 of 0 objects")],
+            [("Median", "0 of the light"), ("99.9 % within", "0.0000002 of the light"), ("Modeled", "0 of 0 objects")],
         ),
     ],
 )
@@ -420,5 +420,5 @@ def test_the_copy_finds_what_the_file_finds_and_the_file_keeps_its_ways(seen, tm
     assert sorted(each.name for each in tmp_path.iterdir()) == ["elsewhere", "picture.png", "scene.blend"]
     bpy.ops.wm.open_mainfile(filepath=str(folder / "copy.blend"))
     assert bpy.data.objects["Suzanne"].location.x == 3
-    found = bpy.data.images["Picture"].filepath
-    assert os.path.samefile(bpy.path.abspath(found), tmp_path / "picture.png")
+    image_path = bpy.data.images["Picture"].filepath
+    assert os.path.samefile(bpy.path.abspath(image_path), tmp_path / "picture.png")

@@ -32,15 +32,15 @@ def test_the_menu_writes_what_the_command_writes(some_scene, tmp_path, capfd):
 
 def test_without_light_there_is_geometry_alone(some_scene, tmp_path):
     export(tmp_path / "scene.json", light=False)
-    found = scene_file.read(tmp_path / "scene.json")
-    assert found.lamps == () and found.materials == {} and len(found.objects) == 1
+    cameras_read = scene_file.read(tmp_path / "scene.json")
+    assert cameras_read.lamps == () and cameras_read.materials == {} and len(cameras_read.objects) == 1
 
 
 def test_the_origin_may_be_the_eye(some_scene, tmp_path):
     export(tmp_path / "scene.json", recenter=True)
-    found = scene_file.read(tmp_path / "scene.json")
-    assert found.origin == pytest.approx((0.3, -7, 4), abs=1e-6)
-    assert found.camera.eye == pytest.approx((0, 0, 0), abs=1e-6)
+    cameras_read = scene_file.read(tmp_path / "scene.json")
+    assert cameras_read.origin == pytest.approx((0.3, -7, 4), abs=1e-6)
+    assert cameras_read.camera.eye == pytest.approx((0, 0, 0), abs=1e-6)
 
 
 def test_a_name_without_suffix_gets_one(some_scene, tmp_path):

@@ -36,16 +36,16 @@ def steps(monkeypatch):
 def everything(camera_object):
     """All that Blender stores of the camera and its values; floats bit by bit."""
     bpy.context.view_layer.update()
-    found = {}
+    result = {}
     for block in (camera_object, camera_object.data, camera_object.virtual_pinhole):
         for each in block.bl_rna.properties:
             if each.type in ("FLOAT", "INT", "BOOLEAN", "STRING"):
                 value = getattr(block, each.identifier)
-                found[block.bl_rna.identifier, each.identifier] = value if each.type == "STRING" else np.array(value).tobytes()
-    return found
+                result[block.bl_rna.identifier, each.identifier] = value if each.type == "STRING" else np.array(value).tobytes()
+    return result
 
 
-def told(camera_object, scene):
+def check_messages(camera_object, scene):
     return cameras.check(camera_object, cameras.stated(camera_object, scene), scene)
 
 
@@ -54,7 +54,7 @@ def test_a_dragged_point_is_where_the_handle_is(posed_camera, scene, steps, name
     assert gizmos.place(posed_camera, name) == tuple(getattr(posed_camera.virtual_pinhole, name))
     gizmos.drag(posed_camera, name, ELSEWHERE)
     assert tuple(getattr(posed_camera.virtual_pinhole, name)) == gizmos.place(posed_camera, name) == ELSEWHERE
-    assert told(posed_camera, scene) == []
+    assert check_messages(posed_camera, scene) == []
 
 
 def test_a_dragged_up_points_to_the_handle_and_keeps_its_length(posed_camera, scene, steps):
@@ -65,7 +65,7 @@ def test_a_dragged_up_points_to_the_handle_and_keeps_its_length(posed_camera, sc
     arrow = np.subtract(ELSEWHERE, eye)
     # float32: three components, each rounded by 2⁻²⁴ of its size.
     np.testing.assert_allclose(up, 2.5 * arrow / np.linalg.norm(arrow), rtol=2**-24)
-    assert told(posed_camera, scene) == []
+    assert check_messages(posed_camera, scene) == []
     tip = gizmos.place(posed_camera, "up")
     assert math.dist(tip, eye) == pytest.approx(math.dist(diagram.up_tip(*group.numbers()[:2], (0, 0, 1), group.plane_at), eye))
 
@@ -92,7 +92,7 @@ def test_cancelling_restores_all_to_the_bit_though_the_camera_was_not_at_its_val
     after = everything(posed_camera)
     assert {key for key in before if after[key] != before[key]} == set()
     gizmos.end_drag()
-    assert steps == [], "a cancelled drag is no step of undo"
+    assert steps == [], "a canceled drag is no step of undo"
 
 
 def test_what_was_stated_in_float64_comes_back_in_float64(posed_camera, scene, steps):
@@ -171,7 +171,7 @@ def test_values_that_make_no_camera_can_be_dragged_apart(posed_camera, scene, st
     group.look_at = group.eye
     assert gizmos.place(posed_camera, "up") is None
     gizmos.drag(posed_camera, "look_at", ELSEWHERE)
-    assert told(posed_camera, scene) == []
+    assert check_messages(posed_camera, scene) == []
 
 
 def test_there_are_no_handles_where_there_is_no_viewport(posed_camera):

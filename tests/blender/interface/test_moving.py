@@ -41,7 +41,7 @@ def stated(posed_camera, scene):
 # --- What each does ---------------------------------------------------------------------------------------------------------
 
 
-def test_looks_at_the_selections_centre(selected_cube, stated):
+def test_looks_at_the_selections_center(selected_cube, stated):
     before = stated()
     assert bpy.ops.viewcam.look_at_selection() == {"FINISHED"}
     after = stated()
@@ -53,9 +53,9 @@ def test_looks_at_the_median_of_the_vertices_if_that_is_asked_for(selected_cube,
     for vertex in selected_cube.data.vertices:
         if vertex.co.x > 0 and not (vertex.co.y > 0 and vertex.co.z > 0):
             vertex.co.x = -1  # seven of eight corners on the left
-    bpy.ops.viewcam.look_at_selection(centre="MEDIAN")
+    bpy.ops.viewcam.look_at_selection(center="MEDIAN")
     assert stated().look_at == pytest.approx((POINT[0] - 0.75, *POINT[1:]))
-    bpy.ops.viewcam.look_at_selection(centre="BOUNDS")
+    bpy.ops.viewcam.look_at_selection(center="BOUNDS")
     assert stated().look_at == POINT
 
 
@@ -417,7 +417,7 @@ def test_dolly_in_a_menu_asks_for_the_distance_and_does_nothing_before(posed_cam
     operator = moving.VIEWCAM_OT_dolly_camera
     properties = SimpleNamespace(is_property_set=lambda name: False)
     window_manager = SimpleNamespace(invoke_props_dialog=lambda each: asked.append(each.reach) or {"RUNNING_MODAL"})
-    clicked = SimpleNamespace(found=lambda context: posed_camera, properties=properties, reach=0.0)
+    clicked = SimpleNamespace(target_camera=lambda context: posed_camera, properties=properties, reach=0.0)
     assert operator.invoke(clicked, SimpleNamespace(window_manager=window_manager), None) == {"RUNNING_MODAL"}
     assert asked == [math.dist(before.eye, before.look_at)] and stated() == before
 
@@ -448,10 +448,10 @@ def test_a_drag_moves_visibly_there_and_back_and_cancelling_restores_every_bit(p
 def test_a_dolly_zoom_keeps_the_size_at_the_look_at_point(posed_camera, scene):
     drag = dragging.Drag(posed_camera, scene, dragging.DOLLY_ZOOM)
     drag.move(120, 0)
-    found = cameras.stated(posed_camera, scene)
-    reach = math.dist(found.eye, found.look_at)
+    pinhole = cameras.stated(posed_camera, scene)
+    reach = math.dist(pinhole.eye, pinhole.look_at)
     assert reach < 0.7 * REACH
-    assert found.distance[0] / reach == pytest.approx(1500 / REACH, rel=1e-12)
+    assert pinhole.distance[0] / reach == pytest.approx(1500 / REACH, rel=1e-12)
 
 
 def test_a_truck_carries_the_look_at_point_along_under_the_mouse(posed_camera, scene):
@@ -465,12 +465,12 @@ def test_a_typed_number_counts_instead_of_the_mouse(posed_camera, scene):
     drag = dragging.Drag(posed_camera, scene, dragging.DOLLY)
     drag.move(500, 0)
     drag.type("2.5")
-    found = cameras.stated(posed_camera, scene)
-    assert math.dist(found.eye, found.look_at) == pytest.approx(REACH + 2.5, rel=1e-12)
+    pinhole = cameras.stated(posed_camera, scene)
+    assert math.dist(pinhole.eye, pinhole.look_at) == pytest.approx(REACH + 2.5, rel=1e-12)
     drag.type("-")
-    assert math.dist(cameras.stated(posed_camera, scene).eye, found.look_at) < REACH
+    assert math.dist(cameras.stated(posed_camera, scene).eye, pinhole.look_at) < REACH
     drag.type("-99")
-    assert math.dist(cameras.stated(posed_camera, scene).eye, found.look_at) < REACH, "beyond the look-at point it waits"
+    assert math.dist(cameras.stated(posed_camera, scene).eye, pinhole.look_at) < REACH, "beyond the look-at point it waits"
 
 
 def test_what_follows_an_object_is_not_dragged_away_from_it(posed_camera, scene, empty):
@@ -483,8 +483,8 @@ def test_what_follows_an_object_is_not_dragged_away_from_it(posed_camera, scene,
 
 def test_the_operator_does_the_same_by_numbers(posed_camera, scene):
     assert bpy.ops.viewcam.drag_camera(kind="DOLLY", amount=(1.0, 0.0)) == {"FINISHED"}
-    found = cameras.stated(posed_camera, scene)
-    assert math.dist(found.eye, found.look_at) == pytest.approx(REACH + 1)
+    pinhole = cameras.stated(posed_camera, scene)
+    assert math.dist(pinhole.eye, pinhole.look_at) == pytest.approx(REACH + 1)
 
 
 # --- Selection
@@ -499,8 +499,8 @@ def points(posed_camera):
 
     def sorted_points():
         bpy.context.view_layer.update()
-        found = selection.points(bpy.context, posed_camera)
-        return found[np.lexsort(found.round(3).T[::-1])]
+        positions = selection.points(bpy.context, posed_camera)
+        return positions[np.lexsort(positions.round(3).T[::-1])]
 
     return sorted_points
 
@@ -522,9 +522,9 @@ def test_modifiers_and_constraints_count(points, empty):
     array = cube.modifiers.new("Array", "ARRAY")
     array.use_relative_offset, array.use_constant_offset, array.constant_offset_displace = False, True, (10, 0, 0)
     cube.constraints.new("COPY_LOCATION").target = empty("There", (0, 0, 100))
-    found = points()
-    assert len(found) == 16
-    np.testing.assert_allclose(selection.bounds_centre(found), (5, 0, 100), atol=200 * 2**-24)
+    positions = points()
+    assert len(positions) == 16
+    np.testing.assert_allclose(selection.bounds_center(positions), (5, 0, 100), atol=200 * 2**-24)
 
 
 def test_the_instances_of_a_collection_count(points, scene):
@@ -544,15 +544,15 @@ def test_the_instances_of_a_collection_count(points, scene):
 def test_curves_surfaces_and_text_are_what_is_drawn(points, kind):
     room, name = kind.split(".")
     getattr(getattr(bpy.ops, room), f"{name}_add")(location=(0, 0, 7))
-    found = points()
-    assert len(found) > 8 and np.abs(found - (0, 0, 7)).max() < 3
+    positions = points()
+    assert len(positions) > 8 and np.abs(positions - (0, 0, 7)).max() < 3
 
 
 def test_metaballs_are_what_is_drawn(points):
     bpy.ops.object.metaball_add(type="BALL", location=(0, 0, 7))
-    found = points()
-    assert len(found) > 20
-    np.testing.assert_allclose(selection.bounds_centre(found), (0, 0, 7), atol=0.1)
+    positions = points()
+    assert len(positions) > 20
+    np.testing.assert_allclose(selection.bounds_center(positions), (0, 0, 7), atol=0.1)
 
 
 def test_what_has_no_geometry_is_its_origin(points, empty, add_lamp):
@@ -570,7 +570,7 @@ def test_armatures_and_lattices_are_their_boxes(points, kind):
     else:
         bpy.ops.object.add(type="LATTICE", location=(3, 0, 0))
         middle = (3, 0, 0)
-    np.testing.assert_allclose(selection.bounds_centre(points()), middle, atol=0.11)
+    np.testing.assert_allclose(selection.bounds_center(points()), middle, atol=0.11)
 
 
 def test_the_camera_itself_does_not_count(points, posed_camera, empty):
@@ -648,10 +648,10 @@ def test_in_pose_mode_the_selected_bones_count_as_they_are_posed(points):
     np.testing.assert_allclose(points(), [(5, 0, 10), (5, 0, 11)], atol=32 * 2**-24)
 
 
-def test_the_median_is_the_mean_and_the_centre_is_that_of_the_box():
+def test_the_median_is_the_mean_and_the_center_is_that_of_the_box():
     cloud = np.array([[0.0, 0, 0], [0, 0, 0], [3, 6, -9]])
     assert selection.median(cloud) == (1, 2, -3)
-    assert selection.bounds_centre(cloud) == (1.5, 3, -4.5)
+    assert selection.bounds_center(cloud) == (1.5, 3, -4.5)
 
 
 # --- Viewport
@@ -676,29 +676,29 @@ def region_of(area):
 
 
 def test_the_view_of_the_viewport_on_paper(area, scene):
-    found = viewport.pinhole_of(area, LIKE, scene)
+    pinhole = viewport.pinhole_of(area, LIKE, scene)
     # sqrt(½) in float32, and the quaternion is normalized in float32 again.
-    np.testing.assert_allclose(found.eye, (0, -5, 2), atol=8 * 4 * 2**-24)
-    assert found.look_at == (0, 3, 2) and found.up == (0, 0, 1)
-    assert (found.width, found.height, found.principal_point) == (1920, 1080, (960, 540))
+    np.testing.assert_allclose(pinhole.eye, (0, -5, 2), atol=8 * 4 * 2**-24)
+    assert pinhole.look_at == (0, 3, 2) and pinhole.up == (0, 0, 1)
+    assert (pinhole.width, pinhole.height, pinhole.principal_point) == (1920, 1080, (960, 540))
 
 
 @pytest.mark.parametrize("size", [(1920, 1080), (1080, 1920), (1000, 1000), (4000, 100)])
 @pytest.mark.parametrize("ratio", [1.0, 1.5])
 def test_the_picture_shows_all_that_the_viewport_shows_and_no_more_than_it_must(area, scene, size, ratio):
     like = dataclasses.replace(LIKE, width=size[0], height=size[1], distance=(1, ratio), principal_point=None)
-    found, region = viewport.pinhole_of(area, like, scene), region_of(area)
-    assert found.distance[1] == ratio * found.distance[0]
+    pinhole, region = viewport.pinhole_of(area, like, scene), region_of(area)
+    assert pinhole.distance[1] == ratio * pinhole.distance[0]
     larger = max(region.width, region.height)
-    shown = np.array([region.width / larger, region.height / larger])  # tangents: 45° to the larger side
-    pictured = np.array(size) / 2 / found.distance
-    assert (pictured / shown).min() == pytest.approx(1, rel=1e-15)
+    half_angles = np.array([region.width / larger, region.height / larger])  # tangents: 45° to the larger side
+    pictured = np.array(size) / 2 / pinhole.distance
+    assert (pictured / half_angles).min() == pytest.approx(1, rel=1e-15)
 
 
 def test_a_tilted_view_takes_its_own_up(area, scene):
     area.spaces.active.region_3d.view_rotation = (0.5, 0.5, 0.5, 0.5)
-    found = viewport.pinhole_of(area, LIKE, scene)
-    np.testing.assert_allclose(np.array(found.basis()), [(0, 1, 0), (0, 0, 1), (1, 0, 0)], atol=8 * 2**-24)
+    pinhole = viewport.pinhole_of(area, LIKE, scene)
+    np.testing.assert_allclose(np.array(pinhole.basis()), [(0, 1, 0), (0, 0, 1), (1, 0, 0)], atol=8 * 2**-24)
     area.spaces.active.region_3d.view_rotation = (1, 0, 0, 0)
     assert viewport.pinhole_of(area, LIKE, scene).up == (0, 1, 0)
 
@@ -724,9 +724,13 @@ def test_a_view_through_a_camera_is_that_camera(area, scene, posed_camera):
     posed_camera.data.shift_x = 0.1
     bpy.context.view_layer.update()
     area.spaces.active.region_3d.view_perspective = "CAMERA"
-    found, expected = viewport.pinhole_of(area, LIKE, scene), cameras.read(posed_camera, scene)
-    assert (found.eye, found.distance, found.principal_point) == (expected.eye, expected.distance, expected.principal_point)
-    np.testing.assert_allclose(found.look_at, (0, 0, 1), atol=1e-5)  # the values' distance along the camera's axis
+    pinhole, expected = viewport.pinhole_of(area, LIKE, scene), cameras.read(posed_camera, scene)
+    assert (pinhole.eye, pinhole.distance, pinhole.principal_point) == (
+        expected.eye,
+        expected.distance,
+        expected.principal_point,
+    )
+    np.testing.assert_allclose(pinhole.look_at, (0, 0, 1), atol=1e-5)  # the values' distance along the camera's axis
 
 
 def test_a_viewport_with_a_camera_of_its_own_looks_through_that(area, scene, posed_camera, add_camera):

@@ -36,7 +36,7 @@ from viewcam_addon.labels import files as label_files
 def contents(camera_object, scene):
     bpy.context.view_layer.update()
     warnings = [notice.sentence for notice in panel.notices(camera_object, scene)]
-    return {row.label: " ".join(row.shown) for row in panel.shown(camera_object, scene)}, warnings
+    return {row.label: " ".join(row.texts) for row in panel.readouts_of(camera_object, scene)}, warnings
 
 
 def test_a_camera_that_is_well_shows_its_read_outs_and_no_warning(posed_camera, scene):
@@ -126,11 +126,11 @@ def test_an_up_in_doubt_comes_with_a_better_one_and_a_certain_one_does_not(posed
 
 
 def test_the_camera_datas_panel_stays_away_from_the_data_of_a_lamp(posed_camera):
-    shown = [
+    rows = [
         panel.VIEWCAM_PT_data.poll(SimpleNamespace(camera=data, active_object=posed_camera))
         for data in (posed_camera.data, None)
     ]
-    assert shown == [True, False]
+    assert rows == [True, False]
 
 
 class Layout:
@@ -284,10 +284,10 @@ def test_nothing_but_a_dot_takes_room_from_the_lens(posed_camera):
     """Of "112.5 mm" a sidebar as Blender opens it would show "112.5 m"."""
     for unit in [item.identifier for item in fields()["lens_unit"].enum_items]:
         posed_camera.virtual_pinhole.lens_unit = unit
-        found = drawn(panel.VIEWCAM_PT_sidebar, 292)
+        widgets = drawn(panel.VIEWCAM_PT_sidebar, 292)
         name = SHOWN[posed_camera.virtual_pinhole.lens_unit]
-        (row,) = (layout for kind, other, _, layout, _ in found if (kind, other) == ("prop", name))
-        assert [each[:2] for each in found if each[3] is row] == [("prop", name), ("decorator", name)]
+        (row,) = (layout for kind, other, _, layout, _ in widgets if (kind, other) == ("prop", name))
+        assert [each[:2] for each in widgets if each[3] is row] == [("prop", name), ("decorator", name)]
 
 
 BLENDERS = {
@@ -307,9 +307,9 @@ def fields():
 @pytest.mark.parametrize("name", BLENDERS)
 def test_a_field_is_dragged_and_shown_as_blenders_own_of_its_kind(fresh_blender, name):
     """A drag goes by the step, and the digits are the precision: as in the field beside which an artist learned it."""
-    owner, theirs = BLENDERS[name]
-    ours, theirs = fields()[name], owner.bl_rna.properties[theirs]
-    assert (ours.step, ours.precision, ours.unit) == (theirs.step, theirs.precision, theirs.unit)
+    owner, blender_name = BLENDERS[name]
+    own, blender_name = fields()[name], owner.bl_rna.properties[blender_name]
+    assert (own.step, own.precision, own.unit) == (blender_name.step, blender_name.precision, blender_name.unit)
 
 
 def test_the_lens_in_pixels_is_dragged_about_as_far_as_in_millimeters(fresh_blender):
@@ -321,16 +321,16 @@ def test_the_lens_in_pixels_is_dragged_about_as_far_as_in_millimeters(fresh_blen
 
 def test_no_label_of_the_panel_reads_as_the_subjects_distance(posed_camera):
     """The lens is one, whatever its unit; a distance, to an artist, is that of what he looks at."""
-    said = []
+    result = []
     for unit in [item.identifier for item in fields()["lens_unit"].enum_items]:
         posed_camera.virtual_pinhole.lens_unit = unit
         panels = (panel.VIEWCAM_PT_sidebar, panel.VIEWCAM_PT_sidebar_options, panel.VIEWCAM_PT_sidebar_move)
         for kind, name, look, *_ in [row for each in panels for row in drawn(each)]:
-            said.append(look.get("text") or name)
+            result.append(look.get("text") or name)
             if kind == "prop" and name in fields():
-                said += [fields()[name].name, *(item.name for item in getattr(fields()[name], "enum_items", ()))]
-    assert {"Lens", "mm", "px", "Resize Keeps", "Lens in Pixels", "Selection"} <= set(said)
-    assert "Distance" not in said
+                result += [fields()[name].name, *(item.name for item in getattr(fields()[name], "enum_items", ()))]
+    assert {"Lens", "mm", "px", "Resize Keeps", "Lens in Pixels", "Selection"} <= set(result)
+    assert "Distance" not in result
 
 
 def test_the_box_does_not_tick_where_the_camera_is_no_pinhole(posed_camera):
@@ -358,7 +358,7 @@ def test_in_the_narrowest_sidebar_no_name_stands_beside_its_field(posed_camera, 
     scene.collection.objects.link(block)
     posed_camera.virtual_pinhole.look_at_target = block
     wide, narrow = (drawn(panel.VIEWCAM_PT_sidebar, width) for width in (300, NARROWEST))
-    fields = [[each[1] for each in found if each[0].startswith("prop")] for found in (wide, narrow)]
+    fields = [[each[1] for each in widgets if each[0].startswith("prop")] for widgets in (wide, narrow)]
     assert sorted(fields[0]) == sorted(fields[1]), "a field is missing"
     assert ("label", "Roll") in [each[:2] for each in wide]
     lacking = {"ENUM", "POINTER", "STRING"}  # what has no room for its name inside
@@ -373,9 +373,11 @@ def test_in_the_narrowest_sidebar_no_name_stands_beside_its_field(posed_camera, 
 
 def keyed_by_a_dot(each, width):
     """The fields that Blender or the panel draws a dot beside."""
-    found = drawn(each, width)
-    columns = {name for kind, name, _, at, _ in found if kind == "prop" and at.use_property_split and at.use_property_decorate}
-    return columns | {name for kind, name, *_ in found if kind == "decorator"}
+    widgets = drawn(each, width)
+    columns = {
+        name for kind, name, _, at, _ in widgets if kind == "prop" and at.use_property_split and at.use_property_decorate
+    }
+    return columns | {name for kind, name, *_ in widgets if kind == "decorator"}
 
 
 @pytest.mark.parametrize("each", [panel.VIEWCAM_PT_data, panel.VIEWCAM_PT_sidebar])
@@ -383,8 +385,8 @@ def test_what_can_be_keyed_has_its_dot_however_narrow_the_panel_is(posed_camera,
     for posed_camera.virtual_pinhole.pole in ("CANONICAL", "HOLD"):
         for posed_camera.virtual_pinhole.lens_unit in ("MILLIMETERS", "PIXELS"):
             for part, least in ((each, {"eye", "look_at", "up"}), (panel.VIEWCAM_PT_sidebar_options, {"zoom"})):
-                shown = {name for kind, name, *_ in drawn(part) if kind == "prop" and name != "name"}
-                keyed = {name for name in shown if fields()[name].is_animatable}
+                names = {name for kind, name, *_ in drawn(part) if kind == "prop" and name != "name"}
+                keyed = {name for name in names if fields()[name].is_animatable}
                 assert least <= keyed
                 for width in (300, 249, NARROWEST):
                     assert keyed <= keyed_by_a_dot(part, width), f"at {width} pixels"
@@ -402,23 +404,25 @@ def test_a_camera_that_is_not_enabled_shows_its_own_values_greyed_and_one_button
     posed_camera.virtual_pinhole.enabled = False
     posed_camera.location, posed_camera.rotation_euler, posed_camera.data.lens = (0, -8, -1e-8), (math.pi / 2, 0, 0), 50
     bpy.context.view_layer.update()
-    found = drawn(panel.VIEWCAM_PT_sidebar)
-    texts = [look.get("text", name) for kind, name, look, layout, _ in found if kind == "label" and not layout.is_all("active")]
+    widgets = drawn(panel.VIEWCAM_PT_sidebar)
+    texts = [
+        look.get("text", name) for kind, name, look, layout, _ in widgets if kind == "label" and not layout.is_all("active")
+    ]
     assert texts[:2] == ["Camera", "0   -8 m   0"], texts
     assert "50 mm" in texts and "0°" in texts and not any(text.startswith("-0") for text in texts)
-    offered = {name: look for kind, name, look, layout, _ in found if kind == "prop" and layout.is_all("active")}
+    offered = {name: look for kind, name, look, layout, _ in widgets if kind == "prop" and layout.is_all("active")}
     assert list(offered) == ["name", "enabled"] and offered["enabled"] == {"text": "Use", "toggle": True}
 
 
 def test_what_a_constraint_or_a_driver_places_is_read_only_with_a_word_why(posed_camera, empty):
     def locked():
         bpy.context.view_layer.update()
-        found = properties_drawn(panel.VIEWCAM_PT_data) | properties_drawn(panel.VIEWCAM_PT_data_options)
-        return [name for name, layout in found.items() if not layout.is_all("enabled")]
+        widgets = properties_drawn(panel.VIEWCAM_PT_data) | properties_drawn(panel.VIEWCAM_PT_data_options)
+        return [name for name, layout in widgets.items() if not layout.is_all("enabled")]
 
     def words():
-        found = drawn(panel.VIEWCAM_PT_data)
-        return [look.get("text", name) for kind, name, look, *_ in found if kind == "label" and look.get("icon") == "LOCKED"]
+        widgets = drawn(panel.VIEWCAM_PT_data)
+        return [look.get("text", name) for kind, name, look, *_ in widgets if kind == "label" and look.get("icon") == "LOCKED"]
 
     constraint = posed_camera.constraints.new("TRACK_TO")
     assert locked() == [], "a constraint without a target places nothing"
@@ -460,8 +464,8 @@ def test_of_an_override_it_is_said_why_lens_and_roll_are_grey(posed_camera, tmp_
     bpy.context.scene.camera = override
 
     def words():
-        found = drawn(panel.VIEWCAM_PT_data)
-        return [look.get("text", name) for kind, name, look, *_ in found if kind == "label" and look.get("icon") == "LOCKED"]
+        widgets = drawn(panel.VIEWCAM_PT_data)
+        return [look.get("text", name) for kind, name, look, *_ in widgets if kind == "label" and look.get("icon") == "LOCKED"]
 
     assert words() == ["Override: edit in px", "Override: edit Up"]
     override.virtual_pinhole.lens_unit = "PIXELS"
@@ -505,24 +509,26 @@ def test_apply_again_is_not_offered_where_it_mends_nothing(posed_camera, scene):
 
 def test_a_notice_is_drawn_in_lines_that_fit_and_with_its_remedy_below(posed_camera):
     posed_camera.virtual_pinhole.eye = (0, 0, 5)
-    found = drawn(panel.VIEWCAM_PT_sidebar, 200)
-    lines = [(name, look["icon"]) for kind, name, look, *_ in found if kind == "label" and "icon" in look]
+    widgets = drawn(panel.VIEWCAM_PT_sidebar, 200)
+    lines = [(name, look["icon"]) for kind, name, look, *_ in widgets if kind == "label" and "icon" in look]
     assert " ".join(line for line, _ in lines).startswith("The view is parallel to up")
     assert [icon for _, icon in lines] == ["ERROR"] + ["BLANK1"] * (len(lines) - 1) and len(lines) > 2
-    (remedy,) = (each for each in found if each[:2] == ("operator", "viewcam.choose_up"))
-    assert remedy[4].camera == "Camera" and found.index(remedy) < [each[1] for each in found].index("eye"), "it is at the top"
+    (remedy,) = (each for each in widgets if each[:2] == ("operator", "viewcam.choose_up"))
+    assert remedy[4].camera == "Camera" and widgets.index(remedy) < [each[1] for each in widgets].index("eye"), (
+        "it is at the top"
+    )
 
 
 def test_each_read_out_has_a_button_that_copies_it(posed_camera):
-    found = drawn(panel.VIEWCAM_PT_data_readouts)
-    buttons = [properties for kind, _, _, _, properties in found if kind == "operator"]
-    assert [button.label for button in buttons] == [row.label for row in panel.shown(posed_camera, bpy.context.scene)]
+    widgets = drawn(panel.VIEWCAM_PT_data_readouts)
+    buttons = [properties for kind, _, _, _, properties in widgets if kind == "operator"]
+    assert [button.label for button in buttons] == [row.label for row in panel.readouts_of(posed_camera, bpy.context.scene)]
     assert buttons[-1].label == "To Look-At" and float(buttons[-1].text) == pytest.approx(10.0499, abs=1e-4)
 
 
 def test_the_tooltip_of_a_copy_button_shows_what_is_copied():
-    said = SimpleNamespace(label="u", text="(1.0, 0.0, 0.0)")
-    described = clipboard.VIEWCAM_OT_copy_readout.description(bpy.context, said)
+    button = SimpleNamespace(label="u", text="(1.0, 0.0, 0.0)")
+    described = clipboard.VIEWCAM_OT_copy_readout.description(bpy.context, button)
     assert described == f"{clipboard.VIEWCAM_OT_copy_readout.bl_description}: (1.0, 0.0, 0.0)"
     assert bpy.ops.viewcam.copy_readout(label="u", text="(1.0, 0.0, 0.0)") == {"FINISHED"}
 
@@ -563,15 +569,15 @@ GERMAN = {
 def test_what_is_made_of_pieces_is_translated_before_the_pieces_go_in(posed_camera, monkeypatch):
     posed_camera.virtual_pinhole.eye = (0, 0, 5)
     monkeypatch.setattr(panel, "iface", lambda text: GERMAN.get(text, text))
-    found = drawn(panel.VIEWCAM_PT_data)
-    assert {"text": "Oben wird (1, 0, 0)", "translate": False} in [each[2] for each in found]
-    assert ("label", "Senkrecht", {"icon": "ERROR", "translate": False}) in [each[:3] for each in found]
+    widgets = drawn(panel.VIEWCAM_PT_data)
+    assert {"text": "Oben wird (1, 0, 0)", "translate": False} in [each[2] for each in widgets]
+    assert ("label", "Senkrecht", {"icon": "ERROR", "translate": False}) in [each[:3] for each in widgets]
 
 
 def test_numbers_are_never_translated(posed_camera):
-    rows = {text for row in panel.shown(posed_camera, bpy.context.scene) for text in row.shown}
-    found = drawn(panel.VIEWCAM_PT_data_readouts)
-    untranslated = {name for kind, name, look, *_ in found if kind == "label" and look.get("translate") is False}
+    rows = {text for row in panel.readouts_of(posed_camera, bpy.context.scene) for text in row.texts}
+    widgets = drawn(panel.VIEWCAM_PT_data_readouts)
+    untranslated = {name for kind, name, look, *_ in widgets if kind == "label" and look.get("translate") is False}
     assert untranslated == rows
 
 
@@ -592,18 +598,18 @@ AMERICAN_TOO = ("raise", "otherwise", "precise", "noise", "exercise", "advise", 
 
 def test_everything_that_blender_shows_is_spelled_as_blender_spells():
     """Labels and tooltips of all operators, panels and properties, and those of what may be chosen."""
-    found = {}
+    result = {}
     for name in dir(bpy.types):
         kind = getattr(bpy.types, name, None)
         if not getattr(kind, "__module__", "").startswith("viewcam_addon"):
             continue
-        said = [getattr(kind, key, "") for key in ("bl_label", "bl_description")]
+        texts = [getattr(kind, key, "") for key in ("bl_label", "bl_description")]
         for each in kind.bl_rna.properties:
-            said += [each.name, each.description]
-            said += [text for item in getattr(each, "enum_items", ()) for text in (item.name, item.description)]
-        words = {word for text in said for word in re.findall(r"[^\W_]+", text or "") if BRITISH.search(word)}
-        found |= {name: wrong} if (wrong := {word for word in words if word.lower() not in AMERICAN_TOO}) else {}
-    assert found == {}
+            texts += [each.name, each.description]
+            texts += [text for item in getattr(each, "enum_items", ()) for text in (item.name, item.description)]
+        words = {word for text in texts for word in re.findall(r"[^\W_]+", text or "") if BRITISH.search(word)}
+        result |= {name: wrong} if (wrong := {word for word in words if word.lower() not in AMERICAN_TOO}) else {}
+    assert result == {}
 
 
 def test_a_british_word_would_be_found():
@@ -624,12 +630,12 @@ written = json.loads(pathlib.Path(sys.argv[1]).read_text())
 
 @pytest.fixture
 def settings(fresh_blender, tmp_path):
-    found = bpy.context.window_manager.virtual_pinhole_labels
-    found.folder = str(tmp_path / "out")
-    yield found
+    group = bpy.context.window_manager.virtual_pinhole_labels
+    group.folder = str(tmp_path / "out")
+    yield group
     labels.background.end()
     for name in ("kinds", "depth_steps", "folder"):
-        found.property_unset(name)
+        group.property_unset(name)
 
 
 @pytest.fixture
@@ -714,13 +720,13 @@ def test_nothing_is_left_of_it_without_the_add_on(registered_addon):
 @pytest.mark.exhaustive
 def test_the_files_that_the_panel_shows_are_those_that_are_written(settings, monkey):
     settings.kinds = {kind.upper() for kind in KINDS}
-    shown = labels.file_names(bpy.context.scene.camera, settings.chosen())
+    file_names = labels.file_names(bpy.context.scene.camera, settings.chosen())
     assert bpy.ops.viewcam.write_labels() == {"FINISHED"}
     folder, _ = labels.background.latest
     of_the_batch = {"summary.json", "contact-sheet.html"}
-    assert {path.name for path in folder.glob("[!.]*")} - of_the_batch == set(shown)
-    told = label_files.read(folder / shown[-1])
-    assert "Suzanne" in {each["name"] for each in told["instances"]} and told["lost"] == {"forward": [], "backward": []}
+    assert {path.name for path in folder.glob("[!.]*")} - of_the_batch == set(file_names)
+    document = label_files.read(folder / file_names[-1])
+    assert "Suzanne" in {each["name"] for each in document["instances"]} and document["lost"] == {"forward": [], "backward": []}
 
 
 # --- The render engine's panels, and those of Blender that it takes over: all gone with the add-on
@@ -789,8 +795,8 @@ def test_what_the_lamps_panel_shows_is_there_and_named_once(scene, kind):
 def test_passes_in_the_panel_are_those_that_the_tracer_computes(scene):
     layer = scene.view_layers[0]
     assert not [name for name in SETTINGS.values() if not hasattr(layer, name)]
-    shown = {name for names in (render_panels.GEOMETRY_PASSES, render_panels.LIGHT_PASSES) for name in names}
-    assert set(SETTINGS) <= shown
+    pass_names = {name for names in (render_panels.GEOMETRY_PASSES, render_panels.LIGHT_PASSES) for name in names}
+    assert set(SETTINGS) <= pass_names
 
 
 # --- Operators

@@ -26,9 +26,9 @@ def seen(*points):
 @pytest.fixture
 def settings(fresh_blender):
     yield fresh_blender.context.window_manager.virtual_pinhole_match
-    found = fresh_blender.context.window_manager.virtual_pinhole_match
+    group = fresh_blender.context.window_manager.virtual_pinhole_match
     for name in ("kind", "axes", "sides", "precision", "is_lens_known", "length"):
-        found.property_unset(name)
+        group.property_unset(name)
 
 
 class Hand:
@@ -36,7 +36,7 @@ class Hand:
 
     def __init__(self, camera_object, scene):
         self.operator = SimpleNamespace(
-            found=camera_object,
+            camera_object=camera_object,
             before=kept.state(camera_object),
             drawing=photo_matching.begun(camera_object, bpy.context),
             result=None,
@@ -88,9 +88,9 @@ def test_edges_dragged_over_a_picture_turn_the_camera_and_set_its_lens_and_the_e
     draw_the_edges(hand)
     assert hand.event("RET") == {"FINISHED"}
     bpy.context.view_layer.update()
-    found = cameras.read(posed_camera, scene)
-    assert np.allclose(found.basis(), PHOTO.basis(), atol=1e-6)
-    assert found.distance[0] == pytest.approx(1800, rel=1e-6)
+    pinhole = cameras.read(posed_camera, scene)
+    assert np.allclose(pinhole.basis(), PHOTO.basis(), atol=1e-6)
+    assert pinhole.distance[0] == pytest.approx(1800, rel=1e-6)
     assert tuple(posed_camera.virtual_pinhole.eye) == before["virtual_pinhole.eye"]
     assert (scene.unit_settings.scale_length, scene.unit_settings.system) == units
     assert hand.operator.result.precision == ZOOM, "one pixel of the screen"
@@ -102,9 +102,9 @@ def test_the_length_of_the_first_edge_at_the_cursor_says_where_the_camera_stands
     draw_the_edges(hand)
     assert hand.event("RET") == {"FINISHED"}
     bpy.context.view_layer.update()
-    found = cameras.read(posed_camera, scene)
-    np.testing.assert_allclose(found.eye, PHOTO.eye, atol=1e-4)
-    assert np.allclose(found.basis(), PHOTO.basis(), atol=1e-6)
+    pinhole = cameras.read(posed_camera, scene)
+    np.testing.assert_allclose(pinhole.eye, PHOTO.eye, atol=1e-4)
+    assert np.allclose(pinhole.basis(), PHOTO.basis(), atol=1e-6)
 
 
 def test_a_lens_that_is_known_stays_to_the_bit_and_the_viewport_says_so(posed_camera, scene, settings):
@@ -115,7 +115,7 @@ def test_a_lens_that_is_known_stays_to_the_bit_and_the_viewport_says_so(posed_ca
     assert hand.event("RET") == {"FINISHED"} and posed_camera.virtual_pinhole.distance == 1800
     bpy.context.view_layer.update()
     assert np.allclose(cameras.read(posed_camera, scene).basis(), PHOTO.basis(), atol=1e-6)
-    line = photo_matching.told(hand.operator.result, posed_camera.data.lens)[0]
+    line = photo_matching.summary_of(hand.operator.result, posed_camera.data.lens)[0]
     assert line == "33.75 mm as it was,  d = 1800 px"
 
 
@@ -154,10 +154,10 @@ def test_a_rectangle_of_known_sides_at_the_cursor_gives_all_of_the_camera(posed_
     hand.drag((x + 90, y + 50), (x, y))  # and moved to the right one
     assert hand.event("RET") == {"FINISHED"}
     bpy.context.view_layer.update()
-    found = cameras.read(posed_camera, scene)
-    assert np.allclose(found.eye, PHOTO.eye, atol=1e-4) and found.distance[0] == pytest.approx(1800, rel=1e-5)
-    told = photo_matching.told(hand.operator.result, posed_camera.data.lens)
-    assert told[0].startswith("33.75 mm ± ") and "eye ±" in told[1]
+    pinhole = cameras.read(posed_camera, scene)
+    assert np.allclose(pinhole.eye, PHOTO.eye, atol=1e-4) and pinhole.distance[0] == pytest.approx(1800, rel=1e-5)
+    lines = photo_matching.summary_of(hand.operator.result, posed_camera.data.lens)
+    assert lines[0].startswith("33.75 mm ± ") and "eye ±" in lines[1]
 
 
 def test_objects_of_known_place_are_dragged_to_where_the_picture_shows_them(posed_camera, scene, settings, empty):

@@ -31,13 +31,13 @@ def test_the_render_menu_and_the_status_bar_are_as_before_without_the_add_on(reg
             *bpy.app.handlers.load_pre,
         ]
 
-    ours = {proof._draw_render_menu, proof._draw_status_bar, proof.background.on_load}
-    assert ours <= set(entries())
+    handlers = {proof._draw_render_menu, proof._draw_status_bar, proof.background.on_load}
+    assert handlers <= set(entries())
     for _ in range(3):
         registered_addon.unregister()
-        without = [each for each in entries() if each in ours]
+        without = [each for each in entries() if each in handlers]
         registered_addon.register()
-        assert without == [] and len([each for each in entries() if each in ours]) == 3
+        assert without == [] and len([each for each in entries() if each in handlers]) == 3
 
 
 WIDTH, HEIGHT = 12, 5
@@ -83,15 +83,17 @@ def columns(image):
 
 
 def test_labels_stand_where_their_pictures_begin(outcome):
-    shown = columns(proof_image.load(outcome, "ALL"))
+    picture_columns = columns(proof_image.load(outcome, "ALL"))
     for number, letter in enumerate("rgb"):
-        assert proof_image.begins(number, 3, len(shown)) == pytest.approx(shown.index(letter) / len(shown), abs=1e-12), letter
+        assert proof_image.begins(number, 3, len(picture_columns)) == pytest.approx(
+            picture_columns.index(letter) / len(picture_columns), abs=1e-12
+        ), letter
     assert proof_image.begins(0, 1, WIDTH) == 0
 
 
 def test_each_view_is_one_image_of_its_own_that_is_saved_with_the_file(outcome):
     gap = " " * proof_image._GAP
-    for view, swipe, shown in (
+    for view, swipe, visible in (
         ("ALL", 0.5, gap.join(letter * WIDTH for letter in "rgb")),
         ("SWIPE", 0.25, "r" * 3 + "g" * 9),
         ("SWIPE", 0.0, "g" * WIDTH),
@@ -101,7 +103,7 @@ def test_each_view_is_one_image_of_its_own_that_is_saved_with_the_file(outcome):
         ("DIFFERENCE", 0.5, "b" * WIDTH),
     ):
         image = proof_image.load(outcome, view, swipe)
-        assert columns(image) == shown, view
+        assert columns(image) == visible, view
         assert image.packed_file and not image.is_dirty
     assert [each.name for each in bpy.data.images] == [proof_image.NAME]
 
@@ -137,18 +139,18 @@ def test_no_editor_loses_the_render_result_the_viewer_or_the_artist_s_own_image(
     taken = [editor(image(name)) for name in ("Render Result", "Viewer Node", "Reference")]
     taken += [editor(pinned=True), editor(mode="PAINT"), editor(ui_type="UV")]
     assert chosen(*taken) is None
-    free, ours = editor(), editor(image(proof_image.NAME), pinned=True)
+    free, pinned = editor(), editor(image(proof_image.NAME), pinned=True)
     assert chosen(*taken, free) is free.spaces.active
-    assert chosen(*taken, free, ours) is ours.spaces.active
+    assert chosen(*taken, free, pinned) is pinned.spaces.active
 
 
 def escape(monkeypatch, playing):
     """The modal operator's response to Escape while a comparison is on its way: (its answer, whether it was ended)."""
-    ended, said = [], []
+    ended, messages = [], []
     monkeypatch.setattr(proof.background, "running", SimpleNamespace(cancel=lambda: ended.append(True)))
     screen = SimpleNamespace(is_animation_playing=playing, areas=[])
     context = SimpleNamespace(window_manager=SimpleNamespace(windows=[SimpleNamespace(screen=screen)]), workspace=None)
-    operator = SimpleNamespace(report=lambda *words: said.append(words), _leave=lambda _context: None)
+    operator = SimpleNamespace(report=lambda *words: messages.append(words), _leave=lambda _context: None)
     answer = proof.VIEWCAM_OT_compare_with_cycles.modal(operator, context, SimpleNamespace(type="ESC", value="PRESS"))
     return answer, bool(ended)
 
@@ -180,7 +182,7 @@ def test_escape_during_playback_ends_the_playback_and_not_the_comparison(monkeyp
                 "not_modelled": {"names": ["Hair"]},
                 "quantities": [{"noise_free": None, "ratio_error": 3e-4}],
             },
-            "The same light, but for noise of 0.03 %, but for 1 object that is not modelled",
+            "The same light, but for noise of 0.03 %, but for 1 object that is not modeled",
         ),
         ({"answer": "different"}, "Cycles renders another picture"),
     ],

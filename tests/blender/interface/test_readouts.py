@@ -11,8 +11,8 @@ LEVEL = Pinhole((0, -5, 0), (0, 0, 0), (0, 0, 1), 50.0, 100, 60)
 
 
 def test_readouts_are_the_camera_in_words():
-    found = readouts.readouts(LEVEL, 18.0, 50.0, ("5 m", 5.0))
-    rows = {row.label: " ".join(row.shown) for row in found}
+    readings = readouts.readouts(LEVEL, 18.0, 50.0, ("5 m", 5.0))
+    rows = {row.label: " ".join(row.texts) for row in readings}
     assert rows["Focal Length"] == "18 mm"
     assert rows["Horizontal FOV"] == "90.0000°"
     assert rows["Vertical FOV"] == f"{2 * math.degrees(math.atan(30 / 50)):.4f}°"

@@ -53,14 +53,14 @@ def two(add_camera, scene):
 def stand_in(monkeypatch):
     """A function that says with which status the child shall end."""
 
-    def told(status):
+    def use_command(status):
         def command(_copy, _scene, written):
             return [sys.executable, "-c", STAND_IN, str(written), str(status)]
 
         monkeypatch.setattr(comparing, "command", command)
 
-    told(0)
-    return told
+    use_command(0)
+    return use_command
 
 
 def test_every_camera_is_a_shot_in_its_own_picture(two):
@@ -143,8 +143,10 @@ def test_after_a_run_without_a_contact_sheet_none_of_an_earlier_run_is_opened(tw
     (tmp_path / "go").touch()
     assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path)) == {"FINISHED"}
     assert bpy.ops.viewcam.open_contact_sheet.poll()
-    told = '{"event": "error", "text": "shots.json: one problem, nothing is rendered", "problems": ["camera A: no graphics"]}'
-    monkeypatch.setattr(comparing, "command", lambda *_: [sys.executable, "-c", f"print({told!r}); raise SystemExit(2)"])
+    last_line = (
+        '{"event": "error", "text": "shots.json: one problem, nothing is rendered", "problems": ["camera A: no graphics"]}'
+    )
+    monkeypatch.setattr(comparing, "command", lambda *_: [sys.executable, "-c", f"print({last_line!r}); raise SystemExit(2)"])
     time.sleep(1.1)  # its folder is named by the second
     with pytest.raises(RuntimeError, match="Camera A: no graphics"):
         bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path))

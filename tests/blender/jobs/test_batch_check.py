@@ -19,9 +19,8 @@ from viewcam_addon.blender.temporary_settings import cameras_unbound, overridden
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import makers
 from viewcam_addon.jobs.job import Job
-from viewcam_addon.jobs.tracing import Tracing
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("one_process")]
 
 LEFT = Job("left", eye=(-3.0, -6.0, 2.5), look_at=(0.0, 0.0, 0.5), up=(0.0, 0.0, 1.0), d=90.0)
 RIGHT = replace(LEFT, name="right", eye=(3.0, -5.0, 2.0), d=110.0)
@@ -31,21 +30,6 @@ SIZE = (96, 54)
 def add(kind, **options):
     getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**options)
     return bpy.context.object
-
-
-@pytest.fixture(scope="module")
-def tracing():
-    """One for all tests, since to start it takes as long as a test."""
-    with Tracing() as tracing:
-        yield tracing
-
-
-@pytest.fixture(autouse=True)
-def one_process(tracing, monkeypatch):
-    class Kept(Tracing):
-        ask = staticmethod(tracing.ask)  # its own process is never started
-
-    monkeypatch.setattr(renderers, "Tracing", Kept)
 
 
 @pytest.fixture
@@ -87,16 +71,16 @@ def batch(tmp_path):
             done = {}
             for shot in shots:
                 image, preview = tmp_path / "image.exr", tmp_path / "preview.png"
-                said = renderer.render(shot, image, preview)
+                record = renderer.render(shot, image, preview)
                 verdict = {"check": renderer.check(shot)} if check else {}
-                done[shot.name] = said | verdict, image.read_bytes(), preview.read_bytes()
+                done[shot.name] = record | verdict, image.read_bytes(), preview.read_bytes()
             return done
 
     return run
 
 
 def verdicts(done):
-    return {name: said["check"] for name, (said, _, _) in done.items()}
+    return {name: record["check"] for name, (record, _, _) in done.items()}
 
 
 @pytest.fixture
@@ -145,27 +129,29 @@ FAULTS = {
     "half a pixel to the right": changed(data, "shift_x", lambda shift: shift + 0.5 / SIZE[0]),
     "half a pixel upwards": changed(data, "shift_y", lambda shift: shift + 0.5 / SIZE[0]),
     "a mirrored picture": changed(itself, "scale", lambda _: (-1, 1, 1)),
-    "an eye a millimetre off": changed(itself, "location", lambda at: (at[0] + 0.001, at[1], at[2])),
+    "an eye a millimeter off": changed(itself, "location", lambda at: (at[0] + 0.001, at[1], at[2])),
 }
 
 
 def test_shots_of_four_values_and_of_a_camera_pass_and_their_figures_say_so(stage, batch):
-    found = verdicts(batch(LEFT, RIGHT, Job("as it stands", camera="Camera")))
-    assert all(each["passed"] for each in found.values()), found
-    assert all(each["verdict"].startswith("The same picture") for each in found.values())
+    checks = verdicts(batch(LEFT, RIGHT, Job("as it stands", camera="Camera")))
+    assert all(each["passed"] for each in checks.values()), checks
+    assert all(each["verdict"].startswith("The same picture") for each in checks.values())
     bent = ["Suzanne: material 'Bumpy' turns the normals, and a plain one stands in"]
-    assert [each["ledger"] for each in found.values()] == [bent] * 3
-    assert all(each["answer"] == "same_but" and each["not_modelled"]["names"] == ["Suzanne"] for each in found.values()), found
-    assert all(0.01 < each["not_modelled"]["share"] < 0.9 for each in found.values()), found
-    assert found["left"]["figures"]["conversion"]["share"] <= 1
-    assert found["as it stands"]["figures"]["conversion"] is None, "nobody stated it"
+    assert [each["ledger"] for each in checks.values()] == [bent] * 3
+    assert all(each["answer"] == "same_but" and each["not_modelled"]["names"] == ["Suzanne"] for each in checks.values()), (
+        checks
+    )
+    assert all(0.01 < each["not_modelled"]["share"] < 0.9 for each in checks.values()), checks
+    assert checks["left"]["figures"]["conversion"]["share"] <= 1
+    assert checks["as it stands"]["figures"]["conversion"] is None, "nobody stated it"
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_camera_in_blender_that_is_not_the_sidecars_is_caught(stage, batch, spoil, fault):
     spoil(FAULTS[fault])
-    found = verdicts(batch(LEFT))["left"]
-    assert not found["passed"] and found["verdict"].startswith("Not the same picture"), found
+    checks = verdicts(batch(LEFT))["left"]
+    assert not checks["passed"] and checks["verdict"].startswith("Not the same picture"), checks
 
 
 def test_without_a_fault_that_way_of_spoiling_passes(stage, batch, spoil):
@@ -178,8 +164,8 @@ def test_a_sidecar_that_is_not_blenders_camera_is_caught(stage, batch, monkeypat
 
     read = renderer.cameras.read
     monkeypatch.setattr(renderer.cameras, "read", lambda *given: replace(read(*given), distance=90.09))
-    found = verdicts(batch(LEFT))["left"]
-    assert not found["passed"] and "magnified" in found["verdict"], found
+    checks = verdicts(batch(LEFT))["left"]
+    assert not checks["passed"] and "magnified" in checks["verdict"], checks
 
 
 def test_a_conversion_that_lost_the_four_values_is_caught(stage, batch, monkeypatch):
@@ -189,10 +175,10 @@ def test_a_conversion_that_lost_the_four_values_is_caught(stage, batch, monkeypa
     monkeypatch.setattr(
         renderer.cameras, "apply", lambda camera, pinhole, scene: apply(camera, replace(pinhole, distance=90.09), scene)
     )
-    found = verdicts(batch(LEFT))["left"]
-    assert not found["passed"] and "the camera in Blender is" in found["verdict"], found
+    checks = verdicts(batch(LEFT))["left"]
+    assert not checks["passed"] and "the camera in Blender is" in checks["verdict"], checks
     # 0.1 % of the distance moves the corner, which is 48 and 27 pixels away, by as much.
-    assert found["figures"]["conversion"]["largest"] == pytest.approx(0.001 * math.hypot(48, 27), rel=1e-2)
+    assert checks["figures"]["conversion"]["largest"] == pytest.approx(0.001 * math.hypot(48, 27), rel=1e-2)
 
 
 @pytest.mark.parametrize("engine", ["CYCLES", "VIEWCAM"])
@@ -213,11 +199,11 @@ def test_pictures_are_the_same_bytes_with_and_without_their_checks(stage, batch,
     stage.camera.data.dof.use_dof, stage.camera.data.dof.focus_distance = True, 3.0
     shots = [replace(shot, engine=engine) for shot in (LEFT, RIGHT)] + [Job("camera", camera="Camera", engine=engine)]
     with_checks, without = batch(*shots), batch(*shots, check=False)
-    for name, (said, image, preview) in without.items():
+    for name, (record, image, preview) in without.items():
         checked, its_image, its_preview = with_checks[name]
         assert (image, preview) == (its_image, its_preview), f"{name} is another picture for having been checked"
         verdict = checked.pop("check")
-        assert checked == said and verdict["passed"], verdict
+        assert checked == record and verdict["passed"], verdict
     assert len({image for _, image, _ in without.values()}) == 3
 
 
@@ -233,9 +219,11 @@ def test_verdicts_are_to_the_last_digit_those_of_a_batch_that_is_resumed(stage, 
 def test_a_check_gives_back_all_that_it_changes(stage, batch):
     def state():
         owners = [stage.render, stage.cycles, stage.render.image_settings, bpy.context.view_layer, stage.camera.data.dof]
-        told = [{prop.identifier: str(getattr(owner, prop.identifier)) for prop in owner.bl_rna.properties} for owner in owners]
+        properties = [
+            {prop.identifier: str(getattr(owner, prop.identifier)) for prop in owner.bl_rna.properties} for owner in owners
+        ]
         indices = [block.pass_index for blocks in (bpy.data.objects, bpy.data.materials) for block in blocks]
-        return told, indices, stage.camera.name, len(bpy.data.scenes), len(bpy.data.materials)
+        return properties, indices, stage.camera.name, len(bpy.data.scenes), len(bpy.data.materials)
 
     before = state()
     batch(LEFT)
@@ -246,16 +234,16 @@ def test_things_that_move_are_read_again_and_things_that_stand_are_not(stage, ba
     written = []
     write = scene_files.scene_file.write
     monkeypatch.setattr(scene_files.scene_file, "write", lambda scene, path: written.append(path) or write(scene, path))
-    found = verdicts(batch(LEFT, RIGHT, replace(LEFT, name="small", width=64, height=64)))
-    assert all(each["passed"] for each in found.values()) and len(written) == 1, "a scene that stands still is written once"
+    checks = verdicts(batch(LEFT, RIGHT, replace(LEFT, name="small", width=64, height=64)))
+    assert all(each["passed"] for each in checks.values()) and len(written) == 1, "a scene that stands still is written once"
     assert not written[0].exists(), "the checks' folder is left behind"
     written.clear()
     monkey = bpy.data.objects["Suzanne"]
     for frame, height in ((1, 1.0), (20, 2.0)):
         monkey.location.z = height
         monkey.keyframe_insert("location", frame=frame)
-    found = verdicts(batch(*(replace(LEFT, name=str(frame), frame=frame) for frame in (1, 20, 20))))
-    assert all(each["passed"] for each in found.values()) and len(written) == 2, found
+    checks = verdicts(batch(*(replace(LEFT, name=str(frame), frame=frame) for frame in (1, 20, 20))))
+    assert all(each["passed"] for each in checks.values()) and len(written) == 2, checks
 
 
 def follow_the_camera(moved):
@@ -286,8 +274,8 @@ def test_what_geometry_nodes_move_with_the_active_camera_is_read_for_each_shot(s
     assert all(each["passed"] for each in verdicts(batch(*shots)).values()) and len(read) == 1
     read.clear()
     follow_the_camera(bpy.data.objects["Cone"])
-    found = verdicts(batch(*shots))
-    assert all(each["passed"] for each in found.values()) and len(read) == 3, found
+    checks = verdicts(batch(*shots))
+    assert all(each["passed"] for each in checks.values()) and len(read) == 3, checks
 
 
 @pytest.mark.parametrize("crop", [False, True], ids=["in the whole frame", "cropped"])
@@ -303,22 +291,22 @@ def test_a_render_border_is_checked_as_the_picture_has_it(stage, batch, crop):
 
 def test_a_mirrored_camera_of_the_file_passes_as_what_it_is(stage, batch):
     stage.camera.scale = (-1, 1, 1)
-    said, _, _ = batch(Job("mirrored", camera="Camera"))["mirrored"]
-    assert said["camera"]["mirrored"] and said["check"]["passed"], said["check"]
+    record, _, _ = batch(Job("mirrored", camera="Camera"))["mirrored"]
+    assert record["camera"]["mirrored"] and record["check"]["passed"], record["check"]
 
 
 def test_a_picture_of_a_few_pixels_passes(stage, batch):
     """There the bias of Cycles' filter table is more than all roundings."""
-    found = verdicts(batch(*(replace(LEFT, name=str(n), width=n, height=n, d=0.9 * n) for n in (8, 16, 24))))
-    assert all(each["passed"] for each in found.values()), {name: each["verdict"] for name, each in found.items()}
+    checks = verdicts(batch(*(replace(LEFT, name=str(n), width=n, height=n, d=0.9 * n) for n in (8, 16, 24))))
+    assert all(each["passed"] for each in checks.values()), {name: each["verdict"] for name, each in checks.items()}
 
 
 def test_what_both_sides_leave_out_is_told_in_a_few_words(stage, batch):
     for number in range(8):
         curve = bpy.data.objects.new(f"Hair {number}", bpy.data.hair_curves.new("Hair"))
         stage.collection.objects.link(curve)
-    told = verdicts(batch(LEFT))["left"]["ledger"]
-    assert len(told) == 6 and "hair and curves" in told[0] and told[-1] == "and 4 more, which viewcam check tells", told
+    ledger = verdicts(batch(LEFT))["left"]["ledger"]
+    assert len(ledger) == 6 and "hair and curves" in ledger[0] and ledger[-1] == "and 4 more, which viewcam check tells", ledger
 
 
 def test_the_camera_of_a_shot_by_eevee_is_checked_with_cycles(stage, tracing):
@@ -385,8 +373,8 @@ def test_a_frame_taken_by_another_camera_than_its_markers_is_caught(stage, other
         scene.camera = camera_object
 
     monkeypatch.setattr(renderers, "render_still", through_one_camera)
-    found = verdicts(batch(*makers.frames("7..8")))
-    assert found["frame_007"]["passed"] and not found["frame_008"]["passed"], found
+    checks = verdicts(batch(*makers.frames("7..8")))
+    assert checks["frame_007"]["passed"] and not checks["frame_008"]["passed"], checks
 
 
 def test_a_failed_check_is_exit_status_1_and_one_that_passes_after_it_is_0(stage, spoil, monkeypatch, tmp_path, capfd):
@@ -398,8 +386,8 @@ def test_a_failed_check_is_exit_status_1_and_one_that_passes_after_it_is_0(stage
     spoil(FAULTS["half a pixel to the right"])
     assert cli.main(command) == 1
     assert "1 are not what the reference tracer sees: as it stands" in capfd.readouterr().out
-    said = json.loads((out / "as it stands.json").read_text(encoding="utf-8"))
-    assert not said["check"]["passed"] and "the picture is shifted by" in said["check"]["verdict"]
+    record = json.loads((out / "as it stands.json").read_text(encoding="utf-8"))
+    assert not record["check"]["passed"] and "the picture is shifted by" in record["check"]["verdict"]
     monkeypatch.setattr(checking.cycles, "render", render)
     assert cli.main([*command, "--resume"]) == 1, "what is kept keeps its verdict"
     assert cli.main([*command, "--overwrite"]) == 0

@@ -58,13 +58,13 @@ class Ear:
     """A listener that keeps each event that it is told."""
 
     def __init__(self):
-        self.told = []
+        self.events = []
 
     def tell(self, event, **fields):
-        self.told.append((event, fields))
+        self.events.append((event, fields))
 
     def shots(self, event):
-        return [fields["shot"] for name, fields in self.told if name == event]
+        return [fields["shot"] for name, fields in self.events if name == event]
 
 
 @pytest.fixture(scope="module")
@@ -88,22 +88,22 @@ def contents(folder):
 
 def children_of(process):
     """The numbers of the processes that this one has started and that still run."""
-    found = []
+    result = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
             state, parent = path.read_text().rpartition(")")[2].split()[:2]
         except OSError:
             continue
         if int(parent) == process and state != "Z":
-            found.append(int(path.parent.name))
-    return found
+            result.append(int(path.parent.name))
+    return result
 
 
 def until(is_so):
     ends = time.monotonic() + WAITS
-    while not (found := is_so()) and time.monotonic() < ends:
+    while not (outcome := is_so()) and time.monotonic() < ends:
         time.sleep(0.05)
-    return found
+    return outcome
 
 
 class Batch:
@@ -139,19 +139,19 @@ class Batch:
 
     def summary(self):
         self._thread.join(WAITS)
-        assert self._outcome, self.ear.told
+        assert self._outcome, self.ear.events
         return self._outcome[0]
 
 
 def test_whoever_is_killed_the_files_are_those_of_one_process_and_each_worker_loads_once(blend, alone, tmp_path):
     with cluster.opened(None, 2, bpy.app.binary_path or None) as machines:
         batch = Batch(machines, blend, alone, tmp_path / "out")
-        assert batch.has_done(1), batch.ear.told
+        assert batch.has_done(1), batch.ear.events
         first = batch.workers()
         assert [len(blenders) for blenders in first.values()] == [1, 1], f"a Blender for each worker, not {first}"
 
         worker, blender = batch.hold_the_slow_shot()
-        assert batch.has_done(len(SHOTS) - 1) and "slow" not in batch.ear.shots("shot_done"), batch.ear.told
+        assert batch.has_done(len(SHOTS) - 1) and "slow" not in batch.ear.shots("shot_done"), batch.ear.events
         assert batch.workers() == first, "a Blender was started again, though nobody had ended one"
         os.kill(blender, signal.SIGKILL)
         assert until(lambda: [each for each in children_of(worker) if each != blender]), "Blender is not started again"

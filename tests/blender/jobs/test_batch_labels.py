@@ -9,14 +9,14 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import image
-from viewcam_addon.blender.jobs import renderer as renderers
 from viewcam_addon.blender.jobs import scene_files
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
 from viewcam_addon.jobs.folder import Folder, Outputs
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.one import render_one
-from viewcam_addon.jobs.tracing import Tracing
 from viewcam_addon.pinhole import Pinhole
+
+pytestmark = pytest.mark.usefixtures("one_process")
 
 ALLOWED = 1e-3
 """Pixels: what flow may differ by where depths are float32."""
@@ -25,21 +25,6 @@ SLOPE = 0.25
 STATED = Job("stated", eye=(-3.0, -6.0, 2.5), look_at=(0.0, 0.0, 0.5), up=(0.0, 0.0, 1.0), d=90.0, frame=2)
 FRAMES = [Job(f"frame_{number}", camera="Camera", frame=number) for number in (1, 2, 3)]
 ALL = Outputs(picture=False, labels=("depth", "masks", "amodal", "flow"))
-
-
-@pytest.fixture(scope="module")
-def tracing():
-    """One for all tests, since to start it takes as long as a test."""
-    with Tracing() as tracing:
-        yield tracing
-
-
-@pytest.fixture(autouse=True)
-def one_process(tracing, monkeypatch):
-    class Kept(Tracing):
-        ask = staticmethod(tracing.ask)  # its own process is never started
-
-    monkeypatch.setattr(renderers, "Tracing", Kept)
 
 
 @pytest.fixture
@@ -79,18 +64,18 @@ def shoot(path, shots, outputs):
         return {shot.name: render_one(shot, folder, renderer, "a hash", outputs) for shot in shots}
 
 
-def told(path, name):
+def read_labels(path, name):
     """The labels of a shot: their picture, and the instances of its labels.json by name."""
     document = json.loads((path / f"{name}.labels.json").read_text())
     return image.read(path / f"{name}.labels.exr"), {each["name"]: each for each in document["instances"]}
 
 
-def world_points(found, camera):
+def world_points(passes, camera):
     """(height, width, 3) of a depth pass, rows from the bottom, by nothing but the four values."""
     u, v, w = camera.basis()
     rows, columns = np.mgrid[0 : camera.height, 0 : camera.width] + 0.5
     x, y = camera.view_plane(columns, rows)
-    return np.array(camera.eye) + found["Depth"].astype(float) * (x[..., None] * u + y[..., None] * v - w)
+    return np.array(camera.eye) + passes["Depth"].astype(float) * (x[..., None] * u + y[..., None] * v - w)
 
 
 def flow_to(there, points, rows, columns):
@@ -104,35 +89,35 @@ def test_flow_of_a_batch_is_that_of_depth_and_the_sidecars_poses(stage, tmp_path
     """Rigid things by their matrices in the other frame's labels, the sheet by its slope there."""
     records = shoot(tmp_path, FRAMES, ALL)
     cameras = {number: Pinhole(**records[f"frame_{number}"]["camera"]) for number in (here, there)}
-    found, instances = told(tmp_path, f"frame_{here}")
-    _, others = told(tmp_path, f"frame_{there}")
-    points = world_points(found, cameras[here])
+    passes, instances = read_labels(tmp_path, f"frame_{here}")
+    _, others = read_labels(tmp_path, f"frame_{there}")
+    points = world_points(passes, cameras[here])
     compared = 0
     for which, instance in instances.items():
-        seen = (found["Instance"][..., 0] == instance["id"]) & (found[f"{name} Hidden"][..., 0] == 0)
+        seen = (passes["Instance"][..., 0] == instance["id"]) & (passes[f"{name} Hidden"][..., 0] == 0)
         before, after = (np.array(each[which]["object_to_world"]) for each in (instances, others))
         local = (points[seen] - before[:3, 3]) @ np.linalg.inv(before[:3, :3]).T
         if which == "Sheet":
             local[:, 2] += SLOPE * 0.5 * (there - here) * local[:, 0]
         moved = local @ after[:3, :3].T + after[:3, 3]
         rows, columns = np.nonzero(seen)
-        difference = np.abs(flow_to(cameras[there], moved, rows, columns) - found[f"{name} Flow"][seen])
+        difference = np.abs(flow_to(cameras[there], moved, rows, columns) - passes[f"{name} Flow"][seen])
         assert difference.max() < ALLOWED, f"{which}: {difference.max()} pixels"
         compared += seen.sum()
-    assert compared > 0.4 * found["Depth"].size and set(instances) == {"Sheet", "Suzanne", "Cube"}
+    assert compared > 0.4 * passes["Depth"].size and set(instances) == {"Sheet", "Suzanne", "Cube"}
 
 
 def test_the_camera_of_four_values_stands_still_in_the_other_frames(stage, tmp_path):
     shoot(tmp_path, [STATED], ALL)
-    found, instances = told(tmp_path, "stated")
-    seen = found["Instance"][..., 0] == instances["Cube"]["id"]
-    assert seen.sum() > 50 and np.abs(found["Forward Flow"][seen]).max() < 1e-9
-    assert np.abs(found["Forward Flow"][found["Instance"][..., 0] == instances["Suzanne"]["id"]]).max() > 1
+    passes, instances = read_labels(tmp_path, "stated")
+    seen = passes["Instance"][..., 0] == instances["Cube"]["id"]
+    assert seen.sum() > 50 and np.abs(passes["Forward Flow"][seen]).max() < 1e-9
+    assert np.abs(passes["Forward Flow"][passes["Instance"][..., 0] == instances["Suzanne"]["id"]]).max() > 1
 
 
 def test_an_instance_has_one_id_in_all_shots(stage, tmp_path):
     shoot(tmp_path, [*FRAMES, STATED], Outputs(picture=False, labels=("masks",)))
-    ids = [{name: each["id"] for name, each in told(tmp_path, shot.name)[1].items()} for shot in (*FRAMES, STATED)]
+    ids = [{name: each["id"] for name, each in read_labels(tmp_path, shot.name)[1].items()} for shot in (*FRAMES, STATED)]
     assert ids[0] == ids[1] == ids[2] == ids[3] and len(set(ids[0].values())) == 3
 
 
@@ -142,8 +127,8 @@ def test_pictures_are_the_same_bytes_with_and_without_labels_and_the_scene_is_as
     shoot(tmp_path / "without", shots, Outputs())
     for shot in shots:
         for ending in ("exr", "png"):
-            one, other = ((tmp_path / kind / f"{shot.name}.{ending}").read_bytes() for kind in ("with", "without"))
-            assert one == other, f"{shot.name}.{ending}"
+            first, other = ((tmp_path / kind / f"{shot.name}.{ending}").read_bytes() for kind in ("with", "without"))
+            assert first == other, f"{shot.name}.{ending}"
     assert (stage.frame_current, stage.camera.name) == (1, "Camera")
 
 

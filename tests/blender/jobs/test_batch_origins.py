@@ -147,9 +147,9 @@ def test_the_versions_count(open_file, add_camera):
     add_camera()
     open_file()
     with BlenderRenderer() as renderer:
-        told = renderer.made_from()
-    assert set(told["versions"]) == {"blender", "viewcam"}
-    assert told["versions"]["viewcam"].count(".") == 2
+        sources = renderer.made_from()
+    assert set(sources["versions"]) == {"blender", "viewcam"}
+    assert sources["versions"]["viewcam"].count(".") == 2
 
 
 def test_two_files_of_one_name_that_swap_their_contents_are_other_files(open_file, picture, tmp_path):
@@ -165,15 +165,15 @@ def test_two_files_of_one_name_that_swap_their_contents_are_other_files(open_fil
 
 
 def test_so_are_two_that_swap_them_outside_of_the_files_folder(open_file, picture, tmp_path_factory):
-    one, other = (tmp_path_factory.mktemp("outside") / "wall.png" for _ in range(2))
-    picture(one, 0.25)
+    first, other = (tmp_path_factory.mktemp("outside") / "wall.png" for _ in range(2))
+    picture(first, 0.25)
     picture(other, 0.5)
-    load(one)
+    load(first)
     load(other)
     before = open_file()
     assert [name for name, _ in before["linked"]] == ["wall.png", "wall.png"]
-    kept = one.read_bytes()
-    one.write_bytes(other.read_bytes())
+    kept = first.read_bytes()
+    first.write_bytes(other.read_bytes())
     other.write_bytes(kept)
     assert origins.made_from() != before
 
@@ -190,7 +190,7 @@ def importing(fresh_blender, tmp_path):
         modifier = bpy.context.object.modifiers.new("Nodes", "NODES")
         tree = modifier.node_group = bpy.data.node_groups.new("Tree", "GeometryNodeTree")
         tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-        where, said = (tree, modifier)
+        where, operator = (tree, modifier)
         if way == "group in a group":
             inner = bpy.data.node_groups.new("Inner", "GeometryNodeTree")
             inner.interface.new_socket("Path", in_out="INPUT", socket_type="NodeSocketString")
@@ -207,7 +207,7 @@ def importing(fresh_blender, tmp_path):
             reroute = tree.nodes.new("NodeReroute")
             tree.links.new(tree.nodes.new("NodeGroupInput").outputs[0], reroute.inputs[0])
             tree.links.new(reroute.outputs[0], node.inputs[0])
-            set_input(said, socket.identifier, "//mesh.ply")
+            set_input(operator, socket.identifier, "//mesh.ply")
         elif way == "string node":
             text = tree.nodes.new("FunctionNodeInputString")
             text.string = str(tmp_path / "mesh.ply")

@@ -70,13 +70,13 @@ def pictures(stage, tmp_path):
         if not blend.exists():
             bpy.ops.wm.save_as_mainfile(filepath=str(blend))
         batches = [[shot] for shot in shots] if alone else [shots]
-        found = []
+        result = []
         for batch in batches:
             with BlenderRenderer(blend) as renderer:
                 for shot in batch:
                     renderer.render(shot, tmp_path / "shot.exr", tmp_path / "shot.png")
-                    found.append((tmp_path / "shot.exr").read_bytes())
-        return found
+                    result.append((tmp_path / "shot.exr").read_bytes())
+        return result
 
     return rendered
 
@@ -85,7 +85,7 @@ def differing(pictures, shots):
     """The shots that are others in a batch than alone."""
     together, alone = pictures(shots), pictures(shots, alone=True)
     assert len(set(alone)) == len(set(shots)), "two of the shots are one picture, and would hide a leak"
-    return [shot for shot, one, other in zip(shots, together, alone, strict=True) if one != other]
+    return [shot for shot, first, other in zip(shots, together, alone, strict=True) if first != other]
 
 
 def test_unlike_shots_are_the_same_to_the_bit_as_each_alone(pictures):
@@ -106,14 +106,14 @@ def follow_the_camera(block):
     start, end, active, place = map(tree.nodes.new, names)
     transform, shorter = tree.nodes.new("GeometryNodeTransform"), tree.nodes.new("ShaderNodeVectorMath")
     shorter.operation, shorter.inputs["Scale"].default_value = "SCALE", 0.3
-    for one, other in (
+    for first, other in (
         (active.outputs[0], place.inputs["Object"]),
         (place.outputs["Location"], shorter.inputs[0]),
         (shorter.outputs[0], transform.inputs["Translation"]),
         (start.outputs[0], transform.inputs["Geometry"]),
         (transform.outputs[0], end.inputs[0]),
     ):
-        tree.links.new(one, other)
+        tree.links.new(first, other)
     block.modifiers.new("Follow", "NODES").node_group = tree
 
 

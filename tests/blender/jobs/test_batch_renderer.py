@@ -58,8 +58,8 @@ def shoot(tmp_path):
     """A function: renderer, shot → what is said of it, the bytes of EXR and preview."""
 
     def render(renderer, shot):
-        said = renderer.render(shot, tmp_path / "shot.exr", tmp_path / "shot.png")
-        return said, (tmp_path / "shot.exr").read_bytes(), (tmp_path / "shot.png").read_bytes()
+        record = renderer.render(shot, tmp_path / "shot.exr", tmp_path / "shot.png")
+        return record, (tmp_path / "shot.exr").read_bytes(), (tmp_path / "shot.png").read_bytes()
 
     return render
 
@@ -145,21 +145,21 @@ def test_no_file_tells_of_time_or_place(stage, shoot, tmp_path):
 
 def test_the_four_values_are_the_camera_to_float32(stage, shoot):
     with BlenderRenderer() as renderer:
-        said = shoot(renderer, LEFT)[0]
-    found, stated = Pinhole(**said["camera"]), Pinhole(**said["stated"])
+        record = shoot(renderer, LEFT)[0]
+    pinhole, stated = Pinhole(**record["camera"]), Pinhole(**record["stated"])
     assert stated == Pinhole(LEFT.eye, LEFT.look_at, LEFT.up, LEFT.d, 32, 18)
-    assert (found.width, found.height) == (32, 18)
-    assert found.eye == pytest.approx(stated.eye, abs=4 * 2**-24)  # coordinates below 8, each rounded to float32 once
-    for ours, theirs in zip(found.basis(), stated.basis(), strict=True):
-        assert ours == pytest.approx(theirs, abs=1.6e-7)  # of a matrix entry: blender/camera.py
-    assert found.distance == pytest.approx(stated.distance, rel=2**-22)  # lens, sensor and their quotient in float32
-    json.dumps(said, allow_nan=False)
+    assert (pinhole.width, pinhole.height) == (32, 18)
+    assert pinhole.eye == pytest.approx(stated.eye, abs=4 * 2**-24)  # coordinates below 8, each rounded to float32 once
+    for actual, expected in zip(pinhole.basis(), stated.basis(), strict=True):
+        assert actual == pytest.approx(expected, abs=1.6e-7)  # of a matrix entry: blender/camera.py
+    assert pinhole.distance == pytest.approx(stated.distance, rel=2**-22)  # lens, sensor and their quotient in float32
+    json.dumps(record, allow_nan=False)
 
 
 def test_what_a_shot_says_is_rendered_and_said(stage, shoot):
     left = replace(LEFT, seed=7)
     with BlenderRenderer() as renderer:
-        plain, said = shoot(renderer, left)[0], shoot(renderer, replace(left, width=48, height=40, samples=1, frame=9))[0]
+        plain, record = shoot(renderer, left)[0], shoot(renderer, replace(left, width=48, height=40, samples=1, frame=9))[0]
         traced = shoot(renderer, replace(RIGHT, seed=7, engine="VIEWCAM", level="auto", samples=3))[0]
     settings = {
         "engine": "CYCLES",
@@ -170,26 +170,26 @@ def test_what_a_shot_says_is_rendered_and_said(stage, shoot):
         "view_layers": [stage.view_layers[0].name],
     }
     assert plain["rendered"] == settings | {"samples": 2, "width": 32, "height": 18, "frame": 4}
-    assert said["rendered"] == settings | {"samples": 1, "width": 48, "height": 40, "frame": 9}
+    assert record["rendered"] == settings | {"samples": 1, "width": 48, "height": 40, "frame": 9}
     assert traced["rendered"] | {"level": "path", "samples": 3, "engine": "VIEWCAM"} == traced["rendered"]
-    assert said["versions"]["blender"] == bpy.app.version_string
+    assert record["versions"]["blender"] == bpy.app.version_string
 
 
 def test_a_camera_of_the_file_is_rendered_as_it_stands(stage, shoot):
     with BlenderRenderer() as renderer:
-        said = shoot(renderer, Job("first", camera="First", frame=8))[0]
+        record = shoot(renderer, Job("first", camera="First", frame=8))[0]
         assert stage.camera.name == "First", "the marker's camera"
         assert stage.camera.data.dof.use_dof
-    assert "stated" not in said
-    assert said["camera"]["eye"] == pytest.approx((6, -7, 4)) and said["warnings"][-1].startswith("Depth of field is on")
+    assert "stated" not in record
+    assert record["camera"]["eye"] == pytest.approx((6, -7, 4)) and record["warnings"][-1].startswith("Depth of field is on")
 
 
 def test_the_own_camera_is_sharp_and_clips_as_the_scenes(stage, shoot):
     with BlenderRenderer() as renderer:
-        said = shoot(renderer, LEFT)[0]
+        record = shoot(renderer, LEFT)[0]
         data = stage.camera.data
         assert (data.clip_start, data.clip_end, data.dof.use_dof) == (0.5, 50, False)
-    assert said["warnings"] == []
+    assert record["warnings"] == []
 
 
 def test_a_cropped_border_is_that_part_of_the_picture_and_of_its_camera(stage, shoot):
@@ -197,12 +197,12 @@ def test_a_cropped_border_is_that_part_of_the_picture_and_of_its_camera(stage, s
     render.use_border = render.use_crop_to_border = True
     render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.5, 1, 0, 0.5
     with BlenderRenderer() as renderer:
-        said = shoot(renderer, LEFT)[0]
-    assert (said["rendered"]["width"], said["rendered"]["height"]) == (16, 9)
-    camera = Pinhole(**said["camera"])
+        record = shoot(renderer, LEFT)[0]
+    assert (record["rendered"]["width"], record["rendered"]["height"]) == (16, 9)
+    camera = Pinhole(**record["camera"])
     assert (camera.width, camera.height) == (16, 9)
     assert camera.principal_point == pytest.approx((0, 9), abs=1e-5)
-    assert said["warnings"] == ["The render border is on: the picture is that part of the frame"]
+    assert record["warnings"] == ["The render border is on: the picture is that part of the frame"]
 
 
 def test_what_can_not_be_as_in_a_render_by_itself_is_said(stage, shoot):
@@ -240,11 +240,11 @@ def test_the_compositor_makes_the_picture_and_writes_no_file_of_its_own(stage, c
     folder = tmp_path / "artist"
     setattr(writer, "directory" if hasattr(writer, "directory") else "base_path", f"{folder}/")
     with BlenderRenderer() as renderer:
-        said, composited, _ = shoot(renderer, LEFT)
+        record, composited, _ = shoot(renderer, LEFT)
         stage.render.use_compositing = False
         plain = shoot(renderer, LEFT)[1]
         stage.render.use_compositing = True
-    assert said["warnings"][0].startswith("The compositor's File Output nodes") and composited != plain
+    assert record["warnings"][0].startswith("The compositor's File Output nodes") and composited != plain
     assert not folder.exists() and not writer.mute
     bpy.ops.render.render()
     assert list(folder.iterdir()), "without a batch it writes"
@@ -284,12 +284,12 @@ def test_shots_of_frames_are_taken_by_the_camera_that_blender_chooses_at_each(st
         assert renderer.problems(shots) == ()
         taken = {shot: shoot(renderer, shot)[0] for shot in shots}
     assert_same(state(), before)
-    for shot, said in taken.items():
+    for shot, record in taken.items():
         if shot.eye is None:
             chosen = shot.camera or chosen_by_blender(stage, shot.frame)
-            assert said["camera"]["eye"] == pytest.approx(eyes[chosen]), (shot, said["camera"])
-            assert said["rendered"]["camera"] == chosen, (shot, said["rendered"])
-    assert [said["rendered"]["camera"] for said in taken.values() if "stated" not in said] == [
+            assert record["camera"]["eye"] == pytest.approx(eyes[chosen]), (shot, record["camera"])
+            assert record["rendered"]["camera"] == chosen, (shot, record["rendered"])
+    assert [record["rendered"]["camera"] for record in taken.values() if "stated" not in record] == [
         *["First"] * 4,
         "First",
         *["First", "Second", "Second"],
@@ -331,7 +331,7 @@ def test_an_orbit_begins_with_the_picture_that_the_camera_takes_of_a_cropped_bor
         assert [asked["rendered"][name] for name in ("width", "height")] == [
             own["rendered"][name] for name in ("width", "height")
         ]
-        taken, camera = (Pinhole(**said["camera"]) for said in (asked, own))
+        taken, camera = (Pinhole(**record["camera"]) for record in (asked, own))
         # What float32 stores of either: 2⁻²⁴ of a hundred pixels and of ten units, a few times over.
         assert taken.principal_point == pytest.approx(camera.principal_point, abs=1e-4)
         assert taken.distance == pytest.approx(camera.distance, rel=1e-6) and taken.eye == pytest.approx(camera.eye, abs=1e-5)
@@ -488,24 +488,24 @@ def taken(folder, name):
 def close(have, wanted):
     """As Blender's float32 numbers have it: half a dozen roundings of 2⁻²⁴ of lengths of 10 seen from 10."""
     points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
-    ours, theirs = have.project(points), wanted.project(points)
-    error = np.hypot(ours[0] - theirs[0], ours[1] - theirs[1]).max()
+    actual, expected = have.project(points), wanted.project(points)
+    error = np.hypot(actual[0] - expected[0], actual[1] - expected[1]).max()
     assert error < 16 * 2.0**-24 * max(*wanted.distance, wanted.width), f"{error:.3g} pixels"
     assert (have.width, have.height, have.mirrored) == (wanted.width, wanted.height, wanted.mirrored)
 
 
 def test_a_colmap_model_is_rendered_camera_by_camera_and_comes_back(blend, tmp_path):
-    given = [Camera(name, pinhole) for name, pinhole in GIVEN.items()]
-    cameras.save(given, tmp_path / "model", "colmap")
+    given_cameras = [Camera(name, pinhole) for name, pinhole in GIVEN.items()]
+    cameras.save(given_cameras, tmp_path / "model", "colmap")
     out = tmp_path / "out"
     assert cli.main(["batch", str(blend), str(tmp_path / "model"), "--out", str(out), "--transforms"]) == 0
     for name, pinhole in GIVEN.items():
         close(taken(out, name), pinhole)
     sidecars = {camera.name: camera.pinhole for camera in cameras.read(out, format="sidecar")}
     for form in ("transforms", "colmap"):
-        found = {camera.name: camera.pinhole for camera in cameras.read(out, format=form)}
-        assert found.keys() == sidecars.keys() == GIVEN.keys()
-        for name, pinhole in found.items():
+        cameras_read = {camera.name: camera.pinhole for camera in cameras.read(out, format=form)}
+        assert cameras_read.keys() == sidecars.keys() == GIVEN.keys()
+        for name, pinhole in cameras_read.items():
             exact = sidecars[name]
             assert (pinhole.distance, pinhole.width, pinhole.height) == (exact.distance, exact.width, exact.height)
             assert np.abs(np.array(pinhole.axes()) - exact.axes()).max() < 1e-15

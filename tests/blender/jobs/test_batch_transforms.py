@@ -48,8 +48,8 @@ def stage(fresh_blender, scene, tmp_path):
     scene.view_settings.view_transform = "Standard"
     scene.render.resolution_x, scene.render.resolution_y = 160, 120
     scene.render.image_settings.color_mode = "RGB"
-    for colour, centre in BALLS.items():
-        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=RADIUS, location=centre)
+    for colour, center in BALLS.items():
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=RADIUS, location=center)
         bpy.context.object.data.materials.append(_shining(colour))
     data = bpy.data.cameras.new("Shifted")
     data.lens, data.shift_x, data.shift_y = 36, 0.11, -0.07
@@ -109,10 +109,10 @@ def read_transforms(folder):
     document = json.loads((folder / "transforms.json").read_text())
     cameras = {}
     for frame in document["frames"]:
-        said = document | frame
-        to_camera = np.diag([1.0, -1.0, -1.0, 1.0]) @ np.linalg.inv(said["transform_matrix"])
-        f, c, size = (said["fl_x"], said["fl_y"]), (said["cx"], said["cy"]), (said["w"], said["h"])
-        cameras[said["file_path"]] = Camera(to_camera[:3], f, c, size)
+        values = document | frame
+        to_camera = np.diag([1.0, -1.0, -1.0, 1.0]) @ np.linalg.inv(values["transform_matrix"])
+        f, c, size = (values["fl_x"], values["fl_y"]), (values["cx"], values["cy"]), (values["w"], values["h"])
+        cameras[values["file_path"]] = Camera(to_camera[:3], f, c, size)
     return cameras
 
 
@@ -124,9 +124,9 @@ def read_colmap(folder):
     }
     lenses = {}
     for line in filter(None, lines["cameras"]):
-        number, model, width, height, *said = line.split(" ")
-        said = [*map(float, said)]
-        f, c = {"SIMPLE_PINHOLE": (said[:1] * 2, said[1:]), "PINHOLE": (said[:2], said[2:])}[model]
+        number, model, width, height, *parameters = line.split(" ")
+        parameters = [*map(float, parameters)]
+        f, c = {"SIMPLE_PINHOLE": (parameters[:1] * 2, parameters[1:]), "PINHOLE": (parameters[:2], parameters[2:])}[model]
         lenses[number] = tuple(f), tuple(c), (int(width), int(height))
     cameras = {}
     for line in lines["images"][0::2]:
@@ -158,12 +158,12 @@ def look(path):
     picture.colorspace_settings.name = "Non-Color"
     (width, height), flat = picture.size, np.empty(picture.size[0] * picture.size[1] * picture.channels, np.float32)
     picture.pixels.foreach_get(flat)
-    shown = flat.reshape(height, width, -1)[::-1, :, :3].astype(float)
+    pixels = flat.reshape(height, width, -1)[::-1, :, :3].astype(float)
     bpy.data.images.remove(picture)
-    return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+    return np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4)
 
 
-def found(picture):
+def ball_centers(picture):
     """(n, 2) centers of weight of the balls, in the order of BALLS: column and row, pixel centers at + 0.5."""
     height, width, _ = picture.shape
     columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
@@ -194,7 +194,7 @@ def hold(cameras, pictures):
     for name, camera in cameras.items():
         height, width, _ = pictures[name].shape
         assert camera.size == (width, height), f"{name} has {width} × {height} pixels and not {camera.size}"
-        miss = np.linalg.norm(camera.project([*BALLS.values()]) - found(pictures[name]), axis=-1)
+        miss = np.linalg.norm(camera.project([*BALLS.values()]) - ball_centers(pictures[name]), axis=-1)
         worst = int(np.argmax(miss - beside(camera)))
         assert (miss <= CLOSE + beside(camera)).all(), f"{name}: {[*BALLS][worst]} is {miss[worst]:.2f} pixels off"
 
@@ -221,7 +221,7 @@ def test_the_balls_are_in_the_pictures_where_both_formats_say(stage, batch, tmp_
 FAULTS = {
     "half a pixel to the right": lambda camera: {"c": (camera.c[0] + 0.5, camera.c[1])},
     "half a pixel downwards": lambda camera: {"c": (camera.c[0], camera.c[1] + 0.5)},
-    "corners for centres": lambda camera: {"c": (camera.c[0] - 0.5, camera.c[1] - 0.5)},
+    "corners for centers": lambda camera: {"c": (camera.c[0] - 0.5, camera.c[1] - 0.5)},
     "1 % more distance": lambda camera: {"f": (camera.f[0] * 1.01, camera.f[1] * 1.01)},
     "x the other way": lambda camera: {"to_camera": camera.to_camera * [[-1], [1], [1]]},
     "y the other way": lambda camera: {"to_camera": camera.to_camera * [[1], [-1], [1]]},
@@ -271,8 +271,10 @@ def test_a_part_of_a_batch_writes_no_dataset_and_the_rest_of_it_does(stage, batc
 
 def test_a_name_with_a_space_is_refused_before_anything_is_rendered(stage, batch, tmp_path, capfd):
     assert batch(stage(), [SHOTS[0] | {"name": "front left"}], *QUICK) == 2
-    said = capfd.readouterr().err
-    assert "a COLMAP model can't name a picture with a space, as front left.png: rename it" in said and said.count("\n") == 1
+    output = capfd.readouterr().err
+    assert (
+        "a COLMAP model can't name a picture with a space, as front left.png: rename it" in output and output.count("\n") == 1
+    )
     assert not list(tmp_path.glob("out/*.*"))
 
 

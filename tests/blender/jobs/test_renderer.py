@@ -289,9 +289,9 @@ def test_render_and_export_tell_the_same(blend, camera_object, tmp_path):
     camera_object.data.dof.use_dof = True
     bpy.data.objects["Cube"].is_shadow_catcher = True
     path = blend()
-    told = jobs.cycles(Job(blend=path), tmp_path / "picture.exr")
-    assert told == jobs.export(Job(blend=path)).ledger
-    assert {entry.object: entry.status for entry in told} == {"Camera": "approximated", "Cube": "approximated"}
+    entries = jobs.cycles(Job(blend=path), tmp_path / "picture.exr")
+    assert entries == jobs.export(Job(blend=path)).ledger
+    assert {entry.object: entry.status for entry in entries} == {"Camera": "approximated", "Cube": "approximated"}
     assert (tmp_path / "picture.exr").stat().st_size > 1000
 
 
@@ -321,9 +321,13 @@ def test_for_the_least_level_a_scene_is_exported_once(blend, monkeypatch, lit_by
     for module, name in ((export_geometry, "mesh_of"), (images, "picture_of")):
         function = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *given, f=function, name=name: read.append(name) or f(*given))
-    found = jobs.export(Job(blend=path, level="auto", recenter=recenter))
+    exported = jobs.export(Job(blend=path, level="auto", recenter=recenter))
     assert sorted(read) == ["mesh_of"] + ["picture_of"] * (level != "geometry"), read
-    assert (found.ledger, list(found.materials), len(found.lamps)) == (wanted.ledger, list(wanted.materials), len(wanted.lamps))
+    assert (exported.ledger, list(exported.materials), len(exported.lamps)) == (
+        wanted.ledger,
+        list(wanted.materials),
+        len(wanted.lamps),
+    )
 
 
 def test_what_is_flattened_so_that_cycles_does_not_draw_it_gives_no_light(blend, scene, tmp_path):

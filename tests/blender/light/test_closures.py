@@ -99,17 +99,17 @@ def patches(scene, strewn, painted, add_lamp, set_world, read_passes, tmp_path):
         path = tmp_path / "patches.exr"
         exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-        (theirs,) = read_passes([path])
-        ours = render.render(exported, "direct", 1, threads=2)
-        found = []
+        (cycles_passes,) = read_passes([path])
+        traced = render.render(exported, "direct", 1, threads=2)
+        result = []
         for number in range(len(shaders)):
-            here = ours["Object Index"][..., 0] == number + 1
-            one, other = (side["Combined"][here][:, :3].astype(np.float64) for side in (ours, theirs))
-            lit = (one > 0) & (other > 0)
+            here = traced["Object Index"][..., 0] == number + 1
+            first, other = (side["Combined"][here][:, :3].astype(np.float64) for side in (traced, cycles_passes))
+            lit = (first > 0) & (other > 0)
             assert here.sum() > 60 and lit.any(), (shaders[number], here.sum())
             least = 1e-6 * other.max()
-            found.append(np.abs(one - other)[lit] / np.maximum(other, least)[lit])
-        return found
+            result.append(np.abs(first - other)[lit] / np.maximum(other, least)[lit])
+        return result
 
     return show
 
@@ -157,13 +157,13 @@ def of_layers_below_sheen():
         yield PRINCIPLED, sheen | {"Coat Weight": 0.6, "Coat Roughness": 0.3}, {}
 
 
-def check(found, shaders, figures):
-    told = [
+def check(errors, shaders, figures):
+    summary = [
         f"{kind} {inputs} {properties}: p50 {np.median(each):.1e}, p99 {np.quantile(each, 0.99):.1e}, most {each.max():.1e}"
-        for each, (kind, inputs, properties) in zip(found, shaders, strict=True)
+        for each, (kind, inputs, properties) in zip(errors, shaders, strict=True)
         if not (np.median(each) <= figures[0] and np.quantile(each, 0.99) <= figures[1])
     ]
-    assert not told, "\n".join(told)
+    assert not summary, "\n".join(summary)
 
 
 def test_lobes_are_cycles_to_float32(patches):
@@ -195,8 +195,8 @@ def test_sheen_is_cycles_where_a_smooth_normal_is_turned_away(pictures, painted,
         ball.materials.clear()
         ball.materials.append(painted(*shader))
         (sides,) = pictures(scenes=1)
-        ours, theirs = (passes["Diffuse Color"][..., :3] for passes in (sides.traced, sides.cycles[0]))
-        assert np.abs(ours - theirs).max() <= TABLES[1], shader
+        traced, cycles = (passes["Diffuse Color"][..., :3] for passes in (sides.traced, sides.cycles[0]))
+        assert np.abs(traced - cycles).max() <= TABLES[1], shader
 
 
 def test_what_lies_below_sheen_is_cycles_to_the_tables(patches):
@@ -255,8 +255,8 @@ def test_a_little_more_of_an_input_or_a_tint_dropped_is_found(patches, monkeypat
 def tables():
     """name → the albedos that a table of the core has, float32, roughness last."""
     source = Path(native.__file__).parent / "core/bsdf/albedo_tables.h"
-    found = re.findall(r"float (\w+)\[\] = \{([^}]*)\}", source.read_text(encoding="utf-8"))
-    return {name: np.array(re.findall(r"[\d.]+(?=f)", numbers), np.float32) for name, numbers in found}
+    match = re.findall(r"float (\w+)\[\] = \{([^}]*)\}", source.read_text(encoding="utf-8"))
+    return {name: np.array(re.findall(r"[\d.]+(?=f)", numbers), np.float32) for name, numbers in match}
 
 
 @pytest.mark.parametrize("name", ["GGX", "FRESNEL"])
@@ -285,8 +285,8 @@ def test_no_verdict_tells_the_tables_apart_by_which_a_principled_floor_is_a_litt
     (sides,) = pictures(scenes=1)
     test = Image(sides.cycles[0], sides.exported.camera)
     reference = api.render(sides.exported, "direct", 1, threads=2)
-    found = radiance.compare(reference, [test], sides.exported.camera, 1)
-    assert found.passed, found.sentence
+    comparison = radiance.compare(reference, [test], sides.exported.camera, 1)
+    assert comparison.passed, comparison.sentence
     unaware = replace(
         reference, attributes={key: value for key, value in reference.attributes.items() if key != "albedo tables"}
     )
@@ -310,8 +310,8 @@ def test_a_lamp_without_multiple_importance_is_met_by_no_ray_and_lights_what_is_
     assert not [entry for entry in sides.exported.ledger if entry.status != "exported"]
     reference = Image(sides.traced, sides.exported.camera, {"samples": "256", "albedo tables": "yes"})
     tests = [Image(passes, sides.exported.camera) for passes in sides.cycles]
-    found = radiance.compare(reference, tests, sides.exported.camera, 64)
-    assert found.passed, found.sentence
+    comparison = radiance.compare(reference, tests, sides.exported.camera, 64)
+    assert comparison.passed, comparison.sentence
     other = replace(
         sides.exported, lamps=tuple(replace(lamp, multiple_importance=not multiple_importance) for lamp in sides.exported.lamps)
     )
@@ -340,13 +340,13 @@ def test_rough_refraction_beside_a_translucent_is_up_to_5_percent_off_and_told(
     strewn(materials, backwards=lambda i: backwards)
     paths = [tmp_path / f"{picture}.exr" for picture in range(2)]
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=128), paths)
-    told = {entry.object: entry.reason for entry in exported.ledger if "refracts roughly" in entry.reason}
-    assert set(told) == {"P0", "P1", "P2"}, exported.ledger
-    theirs = np.mean([each["Combined"][..., :3] for each in read_passes(paths)], axis=0, dtype=np.float64)
-    ours = render.render(exported, "direct", 128, threads=2)
+    reasons = {entry.object: entry.reason for entry in exported.ledger if "refracts roughly" in entry.reason}
+    assert set(reasons) == {"P0", "P1", "P2"}, exported.ledger
+    cycles_passes = np.mean([each["Combined"][..., :3] for each in read_passes(paths)], axis=0, dtype=np.float64)
+    traced = render.render(exported, "direct", 128, threads=2)
     shares = [
-        ours["Combined"][here][:, :3].sum(dtype=np.float64) / theirs[here].sum()
-        for here in (ours["Object Index"][..., 0] == number for number in (1, 2, 3))
+        traced["Combined"][here][:, :3].sum(dtype=np.float64) / cycles_passes[here].sum()
+        for here in (traced["Object Index"][..., 0] == number for number in (1, 2, 3))
     ]
     assert all(abs(share - 1) < 0.05 for share in shares), shares
     # From behind it depends on the version: 5.2 is nearly the same.

@@ -33,23 +33,24 @@ def irradiance(lamp, position):
 
 def errors(sides):
     """Relative errors of all lit channels of all scenes, and how many are lit on one side only."""
-    found, mismatches = [], 0
+    errors_found, mismatches = [], 0
     for each in sides:
         (lamp,) = each.exported.lamps
         facing = irradiance(lamp, render(each.exported, threads=2)["Position"].astype(np.float64)) / np.pi
-        ours, theirs = (passes["Combined"][..., :3].astype(np.float64) for passes in (each.traced, each.cycles[0]))
-        lit = (ours > 0) & (theirs > 0)
-        mismatches += int(((ours > 0) != (theirs > 0)).sum())
+        traced, cycles = (passes["Combined"][..., :3].astype(np.float64) for passes in (each.traced, each.cycles[0]))
+        lit = (traced > 0) & (cycles > 0)
+        mismatches += int(((traced > 0) != (cycles > 0)).sum())
         full = facing * each.traced["Diffuse Color"]
-        found.append(np.abs(ours - theirs)[lit] / full[lit])
-    return np.concatenate(found), mismatches
+        errors_found.append(np.abs(traced - cycles)[lit] / full[lit])
+    return np.concatenate(errors_found), mismatches
 
 
 def check(sides, figures):
-    found, mismatches = errors(sides)
-    p50, p99 = np.percentile(found, [50, 99])
-    told = f"{len(found)} lit, {mismatches} on one side only, p50 {p50:.3g}, p99 {p99:.3g}, most {found.max():.3g}"
-    assert len(found) > 20_000 and mismatches == 0 and p50 <= figures[0] and p99 <= figures[1], told
+    relative_errors, mismatches = errors(sides)
+    p50, p99 = np.percentile(relative_errors, [50, 99])
+    most = relative_errors.max()
+    summary = f"{len(relative_errors)} lit, {mismatches} on one side only, p50 {p50:.3g}, p99 {p99:.3g}, most {most:.3g}"
+    assert len(relative_errors) > 20_000 and mismatches == 0 and p50 <= figures[0] and p99 <= figures[1], summary
 
 
 @pytest.fixture
@@ -99,20 +100,20 @@ def test_area_lamps_of_any_spread(pictures, add_lamp, shape):
         lamp.location, lamp.data.energy = (*rng.uniform(-1, 1, 2), rng.uniform(3, 6)), rng.uniform(1, 900)
         lamp.rotation_euler, lamp.data.spread = rng.uniform(-0.3, 0.3, 3), rng.uniform(0.7, 3)
 
-    told = []
+    result = []
     for each in pictures(arrange, scenes=4):
         (area,) = each.exported.lamps
         ways = render(each.exported, threads=2)["Position"].astype(np.float64) - area.matrix[:3, 3]
         squared = (ways**2).sum(axis=-1, keepdims=True)
         half = area.spread / 2
         below = area.power[0] / np.pi**2 / squared * np.tan(half) / (np.tan(half) - half)
-        ours, theirs = (passes["Combined"][..., :3].astype(np.float64) for passes in (each.traced, each.cycles[0]))
+        traced, cycles = (passes["Combined"][..., :3].astype(np.float64) for passes in (each.traced, each.cycles[0]))
         full = below * each.traced["Diffuse Color"]
-        assert ((ours > 0) != (theirs > 0)).mean() < 1e-3
-        lit = (ours > 0) & (theirs > 0)
+        assert ((traced > 0) != (cycles > 0)).mean() < 1e-3
+        lit = (traced > 0) & (cycles > 0)
         assert lit.sum() > 300, "that would tell nothing"
-        told.append(np.abs(ours - theirs)[lit] / full[lit])
-    p50, p99 = np.percentile(np.concatenate(told), [50, 99])
+        result.append(np.abs(traced - cycles)[lit] / full[lit])
+    p50, p99 = np.percentile(np.concatenate(result), [50, 99])
     assert p50 <= SPREAD[0] and p99 <= SPREAD[1], (p50, p99)
 
 
@@ -135,9 +136,9 @@ def test_emission_is_the_exact_colour(pictures, make_material, scene, exposure):
 
     for each in pictures(arrange):
         for name in ("Combined", "Emission"):
-            ours, theirs = each.traced[name][..., :3], each.cycles[0][name][..., :3]
+            traced, cycles = each.traced[name][..., :3], each.cycles[0][name][..., :3]
             # Cycles' product of color and strength is rounded once more than ours, that with the exposure too.
-            assert np.allclose(ours, theirs, rtol=2.0**-23, atol=0), np.abs(ours - theirs).max()
+            assert np.allclose(traced, cycles, rtol=2.0**-23, atol=0), np.abs(traced - cycles).max()
         assert (each.traced["Emission"] > 0).sum() > 300
 
 
@@ -145,11 +146,11 @@ def test_a_world_that_nothing_hides_lights_a_floor_by_its_albedo(pictures, set_w
     set_world((0.25, 0.5, 0.75), 1.0)
     bpy.data.objects["Monkey"].hide_render = True
     for each in pictures():
-        ours, theirs = each.traced["Combined"], each.cycles[0]["Combined"]
-        assert np.allclose(ours, theirs, rtol=2e-7, atol=0), np.abs(ours - theirs).max()
+        traced, cycles = each.traced["Combined"], each.cycles[0]["Combined"]
+        assert np.allclose(traced, cycles, rtol=2e-7, atol=0), np.abs(traced - cycles).max()
         floor = each.traced["Object Index"][..., 0] > 0
         paper = each.traced["Diffuse Color"] * (0.25, 0.5, 0.75)
-        assert floor.sum() > 1000 and np.allclose(theirs[floor, :3], paper[floor], rtol=1e-6), "on paper"
+        assert floor.sum() > 1000 and np.allclose(cycles[floor, :3], paper[floor], rtol=1e-6), "on paper"
 
 
 @pytest.mark.parametrize("sabotage", ["power", "shadow", "direction", "albedo"])
@@ -159,6 +160,7 @@ def test_a_wrong_formula_is_caught(pictures, sun, sabotage, monkeypatch):
 
     from viewcam_addon.blender.scenes import lamps
     from viewcam_addon.tracer.scene import materials
+    from viewcam_addon.tracer.scene.shader_nodes import Closure, node
 
     right = lamps.lamps_in
 
@@ -174,12 +176,14 @@ def test_a_wrong_formula_is_caught(pictures, sun, sabotage, monkeypatch):
 
     monkeypatch.setattr(lamps, "lamps_in", wrong)
     if sabotage == "albedo":
-        colours = materials.Material.colours.fget
+        closures = materials.Material.closures.fget
 
         def darker(material):
-            return {name: replace(each, rgb=tuple(0.99999 * x for x in each.rgb)) for name, each in colours(material).items()}
+            for each in closures(material):
+                color = each.node["color"]
+                yield Closure(node(each.node.type, color=replace(color, rgb=tuple(0.99999 * x for x in color.rgb))))
 
-        monkeypatch.setattr(materials.Material, "colours", property(darker))
+        monkeypatch.setattr(materials.Material, "closures", property(lambda material: tuple(darker(material))))
     sides = pictures(sun, scenes=2)
     with pytest.raises(AssertionError):
         check(sides * 5, SUN)

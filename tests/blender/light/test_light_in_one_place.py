@@ -50,21 +50,21 @@ def test_light_on_surfaces_in_one_place_is_taken_out_and_named(room, tmp_path, r
     exported = jobs.both_sides(Job(threads=2, level=level, samples=64), paths)
     tests = [Image(passes, exported.camera) for passes in read_passes(paths)]
 
-    found = compared(exported, level, tests)
-    assert found.passed, "\n".join(found.lines())
-    assert found.answer.answer == "same_but", found.sentence
-    assert set(found.taken_out.names) == {"Floor", kind.capitalize()}
-    assert 0.02 < found.taken_out.pixels.mean() < 0.9
-    assert 0.02 < found.not_modelled.share < 0.9 and set(found.not_modelled.names) == {"Floor", kind.capitalize()}
+    comparison = compared(exported, level, tests)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert comparison.answer.answer == "same_but", comparison.sentence
+    assert set(comparison.taken_out.names) == {"Floor", kind.capitalize()}
+    assert 0.02 < comparison.taken_out.pixels.mean() < 0.9
+    assert 0.02 < comparison.not_modelled.share < 0.9 and set(comparison.not_modelled.names) == {"Floor", kind.capitalize()}
     brighter = tuple(replace(lamp, irradiance=tuple(1.03 * x for x in lamp.irradiance)) for lamp in exported.lamps)
     assert not compared(replace(exported, lamps=brighter), level, tests, exported).passed
 
 
-def compared(scene, level, tests, told=None):
+def compared(scene, level, tests, known=None):
     """The comparison with a scene's own picture, which is said to be of another."""
     passes = render.render(scene, level, 64, threads=2)
     reference = Image(passes, scene.camera, {"samples": "64", "level": level, "albedo tables": "yes"})
-    return api.compare(reference, tests, told or scene, 2, 16)
+    return api.compare(reference, tests, known or scene, 2, 16)
 
 
 def hidden_from_scattered_rays(sheet):
@@ -92,9 +92,9 @@ def lit_past_a_sheet(scene, camera, add, add_lamp, mesh_from):
     """A floor, a sheet over one side of it, and far above that a light: an area lamp, or a surface that glows."""
 
     def material(name):
-        made = bpy.data.materials.new(name)
-        made.use_nodes = True
-        return made
+        material = bpy.data.materials.new(name)
+        material.use_nodes = True
+        return material
 
     def make(light, sheet=lambda sheet: None):
         for name, size, place in (("Floor", 8, (0, 0, 0)), ("Sheet", 2, (1.5, 1, 2))):
@@ -133,13 +133,13 @@ def test_light_past_what_not_all_rays_see_is_taken_out_and_named(lit_past_a_shee
     paths = [tmp_path / f"cycles-{number}.exr" for number in range(4)]
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=256), paths)
     tests = [Image(passes, exported.camera) for passes in read_passes(paths)]
-    found = compared(exported, "direct", tests)
-    assert found.passed, "\n".join(found.lines())
-    assert found.taken_out.seen_otherwise.keys() == {name} and not found.pairs
-    assert 0.02 < found.taken_out.pixels.mean() < 0.7
-    assert found.not_modelled.names == (name,)
+    comparison = compared(exported, "direct", tests)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert comparison.taken_out.seen_otherwise.keys() == {name} and not comparison.pairs
+    assert 0.02 < comparison.taken_out.pixels.mean() < 0.7
+    assert comparison.not_modelled.names == (name,)
     if light != "shadowless":  # which the ledger tells as approximated already
-        assert "but for 1 shadow that not all rays see" in found.sentence and "not modelled" not in found.sentence
+        assert "but for 1 shadow that not all rays see" in comparison.sentence and "not modeled" not in comparison.sentence
     brighter = [replace(image, passes={**image.passes, "Combined": 1.03 * image["Combined"]}) for image in tests]
     assert not compared(exported, "direct", brighter).passed
 
@@ -189,10 +189,10 @@ def test_a_lamp_exactly_in_the_plane_of_a_ceiling_is_in_one_place_with_it(
     paths = [tmp_path / f"cycles-{number}.exr" for number in range(2)]
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=64), paths)
     tests = [Image(passes, exported.camera) for passes in read_passes(paths)]
-    found = compared(exported, "direct", tests)
-    assert found.passed, "\n".join(found.lines())
-    assert ("Ceiling", "Lamp") in found.pairs and "but for 2 objects with surfaces in one place" in found.sentence
-    assert 0.1 < found.taken_out.pixels.mean() < 0.9
+    comparison = compared(exported, "direct", tests)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert ("Ceiling", "Lamp") in comparison.pairs and "but for 2 objects with surfaces in one place" in comparison.sentence
+    assert 0.1 < comparison.taken_out.pixels.mean() < 0.9
     brighter = [replace(image, passes={**image.passes, "Combined": 1.01 * image["Combined"]}) for image in tests]
     assert not compared(exported, "direct", brighter).passed
 

@@ -31,23 +31,25 @@ def panel(add, mesh_from, painted):
 
 
 def unlinked(exported):
-    return replace(exported, objects=tuple(replace(one, receivers=None, blockers=None) for one in exported.objects))
+    return replace(exported, objects=tuple(replace(placed, receivers=None, blockers=None) for placed in exported.objects))
 
 
 def links_of(exported):
-    return next((one.receivers, one.blockers) for one in exported.objects if one.name == "Panel")
+    return next((placed.receivers, placed.blockers) for placed in exported.objects if placed.name == "Panel")
 
 
-def told(exported):
+def reasons(exported):
     return {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
 
 
 def off(exported, traced, cycles):
     """The part of pixels lit on one side only, and the median and the 99th percentile of the relative error of all others."""
-    ours, theirs = (passes["Combined"][..., :3].astype(np.float64) for passes in (traced, cycles))
-    lit = (ours > 0) & (theirs > 0)
-    error = np.abs(ours - theirs)[lit] / theirs[lit]
-    return ((ours > 0) != (theirs > 0)).mean(), *(np.percentile(error, [50, 99]) if lit.any() else (np.inf, np.inf))
+    traced_values, cycles_values = (passes["Combined"][..., :3].astype(np.float64) for passes in (traced, cycles))
+    lit = (traced_values > 0) & (cycles_values > 0)
+    error = np.abs(traced_values - cycles_values)[lit] / cycles_values[lit]
+    return ((traced_values > 0) != (cycles_values > 0)).mean(), *(
+        np.percentile(error, [50, 99]) if lit.any() else (np.inf, np.inf)
+    )
 
 
 LINKS = [
@@ -71,9 +73,9 @@ def test_cycles_shows_the_same_of_linked_surfaces(pictures, panel, painted, link
     most, p50, p99 = (1e-3, 1e-6, 2e-5) if mirrors else (1e-3, 0.02 / 50, 0.02)
     differs = 0
     for sides in pictures(scenes=3):
-        assert bool(told(sides.exported)) == ("INCLUDE" in links.get("blocker_collection", {}).values())
-        found = off(sides.exported, sides.traced, sides.cycles[0])
-        assert (np.array(found) <= (most, p50, p99)).all(), found
+        assert bool(reasons(sides.exported)) == ("INCLUDE" in links.get("blocker_collection", {}).values())
+        hits = off(sides.exported, sides.traced, sides.cycles[0])
+        assert (np.array(hits) <= (most, p50, p99)).all(), hits
         plain = render.render(unlinked(sides.exported), "direct", 1, threads=2)
         differs += any(np.array(off(sides.exported, plain, sides.cycles[0])) > (10 * most, p50, p99))
     assert differs >= 2  # what is linked is seen: without, it is found
@@ -88,7 +90,7 @@ def test_of_a_collection_that_includes_blockers_cycles_loses_light_behind_all_ot
     for name in ("Monkey", "Floor"):
         bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": 0.0})
     (sides,) = pictures(scenes=1)
-    assert LOSES in told(sides.exported)["Panel"]
+    assert LOSES in reasons(sides.exported)["Panel"]
     assert off(sides.exported, sides.traced, sides.cycles[0])[0] > 0.01
 
 
@@ -103,7 +105,7 @@ def test_what_is_hidden_from_shadow_rays_stands_in_no_light_that_has_blockers(pi
     for name in ("Monkey", "Floor"):
         bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": 0.0})
     (sides,) = pictures(scenes=1)
-    assert bool(told(sides.exported)) == loses
+    assert bool(reasons(sides.exported)) == loses
     assert [block.light_linking.blocker_collection] == list(bpy.data.collections)  # what Cycles was given is gone
     assert (np.array(off(sides.exported, sides.traced, sides.cycles[0])) <= (1e-3, 1e-6, 2e-5)).all()
 
@@ -122,8 +124,8 @@ def test_near_by_samples_of_light_and_scattered_rays_make_the_same_as_in_cycles(
     (sides,) = pictures(samples=64, count=4, scenes=1, level="path")
     reference = Image(sides.traced, sides.exported.camera, {"samples": "256", "albedo tables": "yes"})
     tests = [Image(passes, sides.exported.camera) for passes in sides.cycles]
-    found = radiance.compare(reference, tests, sides.exported.camera, 64)
-    assert found.passed, found.sentence
+    comparison = radiance.compare(reference, tests, sides.exported.camera, 64)
+    assert comparison.passed, comparison.sentence
     wrong = replace(reference, passes=render.render(unlinked(sides.exported), "path", 256, threads=2))
     assert not radiance.compare(wrong, tests, sides.exported.camera, 64).passed, "and without links, it would differ"
 
@@ -139,8 +141,8 @@ def test_scattered_rays_find_a_lamp_past_what_is_no_blocker_as_in_cycles(picture
     (sides,) = pictures(samples=64, count=4, scenes=1, level="path")
     reference = Image(sides.traced, sides.exported.camera, {"samples": "256", "albedo tables": "yes"})
     tests = [Image(passes, sides.exported.camera) for passes in sides.cycles]
-    found = radiance.compare(reference, tests, sides.exported.camera, 64)
-    assert found.passed and not told(sides.exported), found.sentence
+    comparison = radiance.compare(reference, tests, sides.exported.camera, 64)
+    assert comparison.passed and not reasons(sides.exported), comparison.sentence
     other = replace(sides.exported, lamps=tuple(replace(each, blockers=None) for each in sides.exported.lamps))
     wrong = replace(reference, passes=render.render(other, "path", 256, threads=2))
     assert not radiance.compare(wrong, tests, sides.exported.camera, 64).passed
@@ -151,11 +153,11 @@ def test_only_surfaces_that_shine_are_linked(stage, panel, link):
     link(panel(3, 3, 5.0), receiver_collection={"Monkey": "INCLUDE"}, blocker_collection={"Floor": "EXCLUDE"})
     link(bpy.data.objects["Floor"], receiver_collection={"Monkey": "EXCLUDE"})
     exported = jobs.export(Job(level="direct"))
-    assert links_of(exported) == ({"Monkey"}, {"Monkey", "Panel"}) and not told(exported)
+    assert links_of(exported) == ({"Monkey"}, {"Monkey", "Panel"}) and not reasons(exported)
     assert unlinked(exported).objects[1:] != exported.objects[1:]
-    assert [one.receivers for one in exported.objects if one.name != "Panel"] == [None, None]
+    assert [placed.receivers for placed in exported.objects if placed.name != "Panel"] == [None, None]
     geometry = jobs.export(Job(level="geometry"))
-    assert links_of(geometry) == (None, None) and not told(geometry)
+    assert links_of(geometry) == (None, None) and not reasons(geometry)
 
 
 def test_an_instance_shines_for_what_its_object_shines(pictures, panel, painted, scene, link):
@@ -175,8 +177,8 @@ def test_an_instance_shines_for_what_its_object_shines(pictures, panel, painted,
     assert (np.array(off(sides.exported, sides.traced, sides.cycles[0])) <= (1e-3, 1e-6, 2e-5)).all()
 
 
-def test_a_recentred_scene_has_no_links_and_they_are_told(stage, panel, link):
+def test_a_recentered_scene_has_no_links_and_they_are_told(stage, panel, link):
     stage(np.random.default_rng(0))
     link(panel(3, 3, 5.0), receiver_collection={"Monkey": "INCLUDE"})
     exported = jobs.export(Job(level="direct", recenter=True))
-    assert links_of(exported) == (None, None) and told(exported)["Panel"] == "light linking is off on both sides"
+    assert links_of(exported) == (None, None) and reasons(exported)["Panel"] == "light linking is off on both sides"

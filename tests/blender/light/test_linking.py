@@ -23,8 +23,8 @@ def lamp(stage, add_lamp):
 
 def linked(request="direct"):
     exported = jobs.export(Job(level=request))
-    told = {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
-    return exported.lamps[0].receivers, exported.lamps[0].blockers, told
+    reasons = {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
+    return exported.lamps[0].receivers, exported.lamps[0].blockers, reasons
 
 
 @pytest.mark.parametrize(
@@ -48,8 +48,8 @@ def test_a_collection_means_what_it_includes_or_all_that_it_does_not_exclude(
 ):
     bpy.data.collections.new("Inner").objects.link(bpy.data.objects["Monkey"])
     link(lamp, receiver_collection=states)
-    receivers, blockers, told = linked()
-    assert receivers == (None if expected is None else frozenset(expected)) and blockers is None and not told
+    receivers, blockers, reasons = linked()
+    assert receivers == (None if expected is None else frozenset(expected)) and blockers is None and not reasons
     link(lamp, receiver_collection={}, blocker_collection=states)
     assert linked()[1] == receivers
 
@@ -69,16 +69,16 @@ def test_cycles_shows_the_same_of_linked_lights(pictures, add_lamp, link, what, 
 
     differs = 0
     for each in pictures(arrange, scenes=3):
-        ours, theirs = (passes["Combined"][..., :3].astype(np.float64) for passes in (each.traced, each.cycles[0]))
-        lit = (ours > 0) & (theirs > 0)
-        assert ((ours > 0) != (theirs > 0)).mean() < 1e-3
-        error = np.abs(ours - theirs)[lit] / theirs[lit]
+        traced, cycles = (passes["Combined"][..., :3].astype(np.float64) for passes in (each.traced, each.cycles[0]))
+        lit = (traced > 0) & (cycles > 0)
+        assert ((traced > 0) != (cycles > 0)).mean() < 1e-3
+        error = np.abs(traced - cycles)[lit] / cycles[lit]
         assert np.percentile(error, 50) <= 1e-6 and np.percentile(error, 99) <= 2e-5
         (exported,) = each.exported.lamps
         plain = render(
             replace(each.exported, lamps=(replace(exported, receivers=None, blockers=None),)), "direct", 1, threads=2
         )
-        differs += (np.abs(plain["Combined"][..., :3] - theirs) > 1e-3 * theirs.max()).mean() > 0.01
+        differs += (np.abs(plain["Combined"][..., :3] - cycles) > 1e-3 * cycles.max()).mean() > 0.01
     assert differs >= 2  # what is linked is seen: without, it is found
 
 

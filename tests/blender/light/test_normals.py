@@ -78,11 +78,11 @@ def bump(material, mapped, vector=OBJECT, filter_width=1.0, invert=False, first=
         if name in node.inputs:
             node.inputs[name].default_value = value
     if texture:
-        made = tree.nodes.new(texture[0])
+        texture_node = tree.nodes.new(texture[0])
         for name, value in texture[1].items():
-            setattr(made, name, value)
-        tree.links.new(source.outputs[vector[1]], made.inputs["Vector"])
-        tree.links.new(made.outputs[0], node.inputs["Height"])
+            setattr(texture_node, name, value)
+        tree.links.new(source.outputs[vector[1]], texture_node.inputs["Vector"])
+        tree.links.new(texture_node.outputs[0], node.inputs["Height"])
     else:
         tree.links.new(hills(tree, source.outputs[vector[1]]), node.inputs["Height"])
     if first:
@@ -119,7 +119,7 @@ def displace(material, mapped, vector=OBJECT, kind="Displacement", space="WORLD"
 
 
 @pytest.fixture
-def shown(scene, camera, add_lamp, set_world, read_passes, tmp_path):
+def render_pair(scene, camera, add_lamp, set_world, read_passes, tmp_path):
     """shown(size, level) → ours, theirs: (height, width, 3), and the number of the object that each pixel shows."""
     from mathutils import Vector
 
@@ -133,44 +133,44 @@ def shown(scene, camera, add_lamp, set_world, read_passes, tmp_path):
         path = tmp_path / "normals.exr"
         exported = jobs.both_sides(Job(threads=2, level=level, samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-        (theirs,) = read_passes([path])
-        ours = render.render(exported, level, 1, threads=2)
-        one, other = (each["Combined"][..., :3].astype(np.float64) for each in (ours, theirs))
-        return one, other, ours["Object Index"][..., 0]
+        (cycles_passes,) = read_passes([path])
+        traced = render.render(exported, level, 1, threads=2)
+        first, other = (each["Combined"][..., :3].astype(np.float64) for each in (traced, cycles_passes))
+        return first, other, traced["Object Index"][..., 0]
 
     return show
 
 
 @pytest.fixture
-def patches(shown, strewn, painted):
+def patches(render_pair, strewn, painted):
     """patches(cases, turn) → errors of each case's pixels. A case: a shader as above, and what `turn` is given."""
 
     def show(cases, turn=map_normals):
         materials, rng = [], np.random.default_rng(3)
-        for (kind, inputs, properties, mapped), given in cases:
+        for (kind, inputs, properties, mapped), expected in cases:
             materials.append(painted(kind, inputs, properties))
-            turn(materials[-1], mapped, **given)
+            turn(materials[-1], mapped, **expected)
         for block in strewn(materials, backwards=lambda i: i % 5 == 4):
             shades = block.data.color_attributes.new("Shades", "FLOAT_COLOR", "CORNER")
             shades.data.foreach_set("color", rng.uniform(0, 1, 4 * len(block.data.loops)))
-        ours, theirs, numbers = shown(144)
-        found = []
+        traced, cycles, numbers = render_pair(144)
+        result = []
         for number in range(1, len(cases) + 1):
             here = numbers == number
-            assert here.sum() > 60 and theirs[here].max() > 0.01, (cases[number - 1], here.sum(), theirs[here].max())
-            found.append(np.abs(ours - theirs)[here].max(axis=1) / theirs[here].max())
-        return found
+            assert here.sum() > 60 and cycles[here].max() > 0.01, (cases[number - 1], here.sum(), cycles[here].max())
+            result.append(np.abs(traced - cycles)[here].max(axis=1) / cycles[here].max())
+        return result
 
     return show
 
 
-def check(found, cases, p50=2e-6, p99=1e-4):
-    told = [
+def check(errors, cases, p50=2e-6, p99=1e-4):
+    summary = [
         f"{case}: p50 {np.median(each):.1e}, p99 {np.quantile(each, 0.99):.1e}, most {each.max():.1e}"
-        for each, case in zip(found, cases, strict=True)
+        for each, case in zip(errors, cases, strict=True)
         if not (np.median(each) <= p50 and np.quantile(each, 0.99) <= p99)
     ]
-    assert not told, "\n".join(told)
+    assert not summary, "\n".join(summary)
 
 
 def test_every_shader_is_bumped_as_in_cycles(patches):
@@ -212,7 +212,7 @@ def test_every_way_to_displace_is_cycles(patches):
 
 
 def test_what_differs_of_a_displacement_is_float32_which_counts_more_the_closer_places_are_and_the_larger_heights(
-    shown, strewn, painted
+    render_pair, strewn, painted
 ):
     """Cycles rounds heights h to 2⁻²⁴ h, which is 2⁻²⁴ h/w of a slope over w: 4 times as much where pixels are a quarter as
     wide, or heights 4 times as large, as far between powers of two. Were a formula another, that would not be.
@@ -224,8 +224,8 @@ def test_what_differs_of_a_displacement_is_float32_which_counts_more_the_closer_
     strewn(materials, cells=6)
     apart = []
     for size in (72, 288):
-        ours, theirs, numbers = shown(size)
-        errors = (np.abs(ours - theirs)[numbers == number].max(axis=1) / theirs.max() for number in (1, 2))
+        traced, cycles, numbers = render_pair(size)
+        errors = (np.abs(traced - cycles)[numbers == number].max(axis=1) / cycles.max() for number in (1, 2))
         apart.append([np.quantile(each, 0.99) for each in errors])
     (low, high), (fine_low, fine_high) = apart
     assert [high / low, fine_low / low, fine_high / fine_low, fine_high / high] == pytest.approx([4.0] * 4, rel=0.3), apart
@@ -285,7 +285,7 @@ def body(camera, add, mesh_from, make_material):
 @pytest.mark.parametrize(
     "turned_by", ["a map", "heights", "heights on a map", "a displacement", "a displacement of the object", "both"]
 )
-def test_a_smooth_body_has_normals_of_its_own(shown, body, turned_by):
+def test_a_smooth_body_has_normals_of_its_own(render_pair, body, turned_by):
     """The map's stand on the tangents of MikkTSpace."""
     material, image = body
     if turned_by == "a map":
@@ -296,16 +296,16 @@ def test_a_smooth_body_has_normals_of_its_own(shown, body, turned_by):
             bump(material, ("Normal",), Distance=0.1)
     else:
         bump(material, ("Normal",), first=(0.6, 0.4, 0.9) if "map" in turned_by else None, Distance=0.1)
-    ours, theirs, numbers = shown(96)
-    here = (numbers == 1) & (theirs.max(axis=-1) > 0) & (ours.max(axis=-1) > 0)
-    apart = np.abs(ours - theirs)[here].max(axis=1) / theirs.max()
-    told = here.sum(), *np.percentile(apart, (50, 90, 99, 100))
+    traced, cycles, numbers = render_pair(96)
+    here = (numbers == 1) & (cycles.max(axis=-1) > 0) & (traced.max(axis=-1) > 0)
+    apart = np.abs(traced - cycles)[here].max(axis=1) / cycles.max()
+    summary = here.sum(), *np.percentile(apart, (50, 90, 99, 100))
     packed = bpy.app.version >= (5, 1)  # normals as two numbers of 16 bits
-    assert here.sum() > 200 and told[1] < (1e-4 if packed else 1e-5) and told[3] < 2e-3, told
+    assert here.sum() > 200 and summary[1] < (1e-4 if packed else 1e-5) and summary[3] < 2e-3, summary
 
 
 @pytest.mark.parametrize("tangent", ["X", "Y", "Z", "UV_MAP", None])
-def test_a_smooth_body_is_stretched_along_tangents_of_its_own(shown, body, tangent):
+def test_a_smooth_body_is_stretched_along_tangents_of_its_own(render_pair, body, tangent):
     """Round axes of its generated coordinates, which are none of the world's, along its UV map, and by default."""
     material, _ = body
     tree = material.node_tree
@@ -318,15 +318,15 @@ def test_a_smooth_body_is_stretched_along_tangents_of_its_own(shown, body, tange
         node.direction_type = tangent if tangent == "UV_MAP" else "RADIAL"
         node.axis = tangent if len(tangent) == 1 else "Z"
         tree.links.new(node.outputs[0], shader.inputs["Tangent"])
-    ours, theirs, numbers = shown(96)
-    here = (numbers == 1) & (theirs.max(axis=-1) > 0) & (ours.max(axis=-1) > 0)
-    apart = np.abs(ours - theirs)[here].max(axis=1) / theirs.max()
-    told = here.sum(), *np.percentile(apart, (50, 90, 99, 100))
+    traced, cycles, numbers = render_pair(96)
+    here = (numbers == 1) & (cycles.max(axis=-1) > 0) & (traced.max(axis=-1) > 0)
+    apart = np.abs(traced - cycles)[here].max(axis=1) / cycles.max()
+    summary = here.sum(), *np.percentile(apart, (50, 90, 99, 100))
     packed = bpy.app.version >= (5, 1)  # normals as two numbers of 16 bits
-    assert here.sum() > 300 and told[1] < (1e-4 if packed else 1e-5) and told[3] < 2e-3, told
+    assert here.sum() > 300 and summary[1] < (1e-4 if packed else 1e-5) and summary[3] < 2e-3, summary
 
 
-def test_a_pixel_seen_in_mirrors_is_as_wide_as_its_way_is_long(scene, shown, camera, add, make_material):
+def test_a_pixel_seen_in_mirrors_is_as_wide_as_its_way_is_long(scene, render_pair, camera, add, make_material):
     floor, mirror = make_material("Floor", DIFFUSE, Color=COLOUR), make_material("Mirror", GLOSSY, Roughness=0.0)
     bump(floor, ("Normal",), Distance=0.3)
     for name, material, corners in (
@@ -339,19 +339,19 @@ def test_a_pixel_seen_in_mirrors_is_as_wide_as_its_way_is_long(scene, shown, cam
         add(mesh, name, pass_index=1 if name == "Floor" else 2)
     camera.location, camera.rotation_euler, camera.data.lens = (0.1, -3.0, 2.0), (1.5, 0.0, 0.0), 50.0
     scene.cycles.max_bounces = scene.cycles.glossy_bounces = 2
-    ours, theirs, numbers = shown(48, "path")
-    here = (numbers == 2) & (theirs.max(axis=-1) > 0)
-    apart = np.abs(ours - theirs)[here].max(axis=1) / theirs.max()
-    told = here.sum(), *np.percentile(apart, (50, 99))
-    assert here.sum() > 200 and told[1] < 5e-6 and told[2] < 1e-4, told
+    traced, cycles, numbers = render_pair(48, "path")
+    here = (numbers == 2) & (cycles.max(axis=-1) > 0)
+    apart = np.abs(traced - cycles)[here].max(axis=1) / cycles.max()
+    summary = here.sum(), *np.percentile(apart, (50, 99))
+    assert here.sum() > 200 and summary[1] < 5e-6 and summary[2] < 1e-4, summary
 
 
 def test_light_that_the_smooth_surface_has_before_it_counts_where_the_true_one_has_it_behind(
     tilted,
 ):
     """Shadow rays leave below the surface, where scattered ones are lost."""
-    found, kinds = tilted()
-    check(found, kinds, *TILTED)
+    errors, kinds = tilted()
+    check(errors, kinds, *TILTED)
 
 
 def test_a_smooth_normal_that_is_a_little_wrong_is_found(tilted, monkeypatch):
@@ -363,14 +363,14 @@ def test_a_smooth_normal_that_is_a_little_wrong_is_found(tilted, monkeypatch):
 
     right = export_geometry._corner_normals
     monkeypatch.setattr(export_geometry, "_corner_normals", turned)
-    found, kinds = tilted()
-    for each, kind in zip(found, kinds, strict=True):
+    errors, kinds = tilted()
+    for each, kind in zip(errors, kinds, strict=True):
         with pytest.raises(AssertionError, match="p50"):
             check([each], [kind], *TILTED)
 
 
 @pytest.fixture
-def tilted(shown, camera, add, painted):
+def tilted(render_pair, camera, add, painted):
     """tilted() → errors of patches of each shader, tilted at random, whose normals are tilted, too; and the shaders."""
     rough, bare = {"Roughness": 0.6}, {"Specular IOR Level": 0.0}
     kinds = [
@@ -413,12 +413,12 @@ def tilted(shown, camera, add, painted):
             mesh.normals_split_custom_set([normals[loop.vertex_index] for loop in mesh.loops])
             mesh.materials.append(material)
             add(mesh, f"P{number}", pass_index=number + 1)
-        ours, theirs, numbers = shown(144)
-        found = [
-            np.abs(ours - theirs)[numbers == k + 1].max(axis=1) / theirs[numbers == k + 1].max() for k in range(len(kinds))
+        traced, cycles, numbers = render_pair(144)
+        errors = [
+            np.abs(traced - cycles)[numbers == k + 1].max(axis=1) / cycles[numbers == k + 1].max() for k in range(len(kinds))
         ]
-        assert min(map(len, found)) > 200
-        return found, kinds
+        assert min(map(len, errors)) > 200
+        return errors, kinds
 
     return show
 

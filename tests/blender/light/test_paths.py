@@ -30,13 +30,13 @@ def light(add_lamp, set_world, scene):
 
 def deviation(sides, name="Combined"):
     """By how many standard errors, and by what share, all light of all scenes differs from Cycles'."""
-    ours = theirs = variance = 0.0
+    traced = cycles = variance = 0.0
     for each in sides:
         pictures = np.array([passes[name][..., :3] for passes in each.cycles], np.float64)
-        ours += each.traced[name][..., :3].sum(dtype=np.float64)
-        theirs += pictures.mean(axis=0).sum()
+        traced += each.traced[name][..., :3].sum(dtype=np.float64)
+        cycles += pictures.mean(axis=0).sum()
         variance += each.traced["Variance"].sum(dtype=np.float64) + (pictures.var(axis=0, ddof=1) / len(pictures)).sum()
-    return (ours - theirs) / np.sqrt(variance), ours / theirs - 1
+    return (traced - cycles) / np.sqrt(variance), traced / cycles - 1
 
 
 def check(sides):
@@ -201,8 +201,8 @@ def test_a_see_through_film_with_its_own_exposure_and_filter(take, scene, shape)
     sides = take()
     check(sides)
     for each in sides:
-        theirs = np.mean([passes["Combined"][..., 3] for passes in each.cycles])
-        assert each.traced["Combined"][..., 3].mean() == pytest.approx(theirs, rel=0.05) and 0 < theirs < 0.9
+        cycles = np.mean([passes["Combined"][..., 3] for passes in each.cycles])
+        assert each.traced["Combined"][..., 3].mean() == pytest.approx(cycles, rel=0.05) and 0 < cycles < 0.9
 
 
 @pytest.mark.parametrize("sabotage", ["albedo", "bounce"])
@@ -210,15 +210,15 @@ def test_a_percent_less_light_is_caught(take, scene, sabotage, monkeypatch):
     """The tests above must be able to fail."""
     from viewcam_addon.blender.scenes import export, shaders
     from viewcam_addon.tracer.scene.film import Bounces
-    from viewcam_addon.tracer.scene.materials import Colour, Material
+    from viewcam_addon.tracer.scene.materials import Colour, sum_of
 
     if sabotage == "albedo":
         right = shaders.read
 
         def darker(material):
             reading = right(material)
-            rgb = tuple(0.99 * value for value in reading.material.diffuse.rgb)
-            reading.material = Material(diffuse=Colour(rgb))
+            rgb = tuple(0.99 * value for value in reading.material.surface["color"].rgb)
+            reading.material = sum_of(diffuse=Colour(rgb))
             return reading
 
         monkeypatch.setattr(shaders, "read", darker)

@@ -86,11 +86,11 @@ def rays(sheet, shown_directions, scene, make_material, read_passes, tmp_path):
     return cast
 
 
-def check(found, expected):
+def check(light, expected):
     """Assert the same directions, but for a hundredth. Cycles' are float32: off by 1e-7, and ten times that where bent."""
-    shown = found.any(axis=0)
-    error = np.sqrt(dot(found - expected, found - expected))[shown]
-    assert shown.mean() > 0.1, "nearly all of the sheet is black"
+    is_lit = light.any(axis=0)
+    error = np.sqrt(dot(light - expected, light - expected))[is_lit]
+    assert is_lit.mean() > 0.1, "nearly all of the sheet is black"
     assert np.percentile(error, 50) < 5e-7 and np.percentile(error, 99) < 1e-5, np.percentile(error, [50, 90, 99, 100])
 
 

@@ -7,7 +7,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 import viewcam_addon as vp
-from viewcam_addon.commands.options import ledger_lines
+from viewcam_addon.commands._options import ledger_lines
 
 pytestmark = pytest.mark.slow
 
@@ -87,9 +87,9 @@ def test_what_is_not_modelled_and_in_the_picture_makes_it_amber(stage, change, l
     change()
     check = stage(level)
     assert (check.answer, check.passed) == ("same_but", True), check.sentence
-    told = check.figures["not_modelled"]
-    assert told["names"] == [name] and 0.01 < told["share"] < 0.9, told
-    assert f"but for 1 object that is not modelled ({name}; " in check.sentence
+    names = check.figures["not_modelled"]
+    assert names["names"] == [name] and 0.01 < names["share"] < 0.9, names
+    assert f"but for 1 object that is not modeled ({name}; " in check.sentence
 
 
 @pytest.mark.parametrize(
@@ -108,9 +108,9 @@ def test_hair_that_is_not_seen_and_casts_a_shadow_into_the_picture_makes_it_ambe
     ball, lamp = bpy.data.objects["Ball"], bpy.data.objects["Area"]
     ball.location, lamp.location, lamp.data.size = (0, 0, 6), (0, 0, 9), 0.1  # above what the camera sees
     bpy.context.view_layer.update()
-    told = stage("path").figures
-    assert told["answer"] == "same_but" and told["not_modelled"]["names"] == ["Ball"], told["sentence"]
-    assert told["not_modelled"]["shown"] == 0.0 and told["not_modelled"]["share"] > 0.005, told["not_modelled"]
+    figures = stage("path").figures
+    assert figures["answer"] == "same_but" and figures["not_modelled"]["names"] == ["Ball"], figures["sentence"]
+    assert figures["not_modelled"]["shown"] == 0.0 and figures["not_modelled"]["share"] > 0.005, figures["not_modelled"]
 
 
 def test_surface_scattering_below_the_skin_is_no_matter_of_geometry(stage):

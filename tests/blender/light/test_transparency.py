@@ -66,11 +66,13 @@ def set_black(world):
 
 
 def check(sides, names=("Combined",)):
-    _, ours, (theirs,) = sides
+    _, traced, (cycles,) = sides
     for name in names:
-        off = np.abs(ours[name].astype(np.float64) - theirs[name])
-        told = "\n".join(f"{n} panes: {ours[name][4, 8 * n + 4]} for {theirs[name][4, 8 * n + 4]}" for n in range(PANES + 1))
-        assert off.max() <= FLOAT32 * max(theirs[name].max(), 1), f"{name} is off by {off.max():.2g}\n{told}"
+        off = np.abs(traced[name].astype(np.float64) - cycles[name])
+        summary = "\n".join(
+            f"{n} panes: {traced[name][4, 8 * n + 4]} for {cycles[name][4, 8 * n + 4]}" for n in range(PANES + 1)
+        )
+        assert off.max() <= FLOAT32 * max(cycles[name].max(), 1), f"{name} is off by {off.max():.2g}\n{summary}"
 
 
 DIFFUSE, GLOWING = "ShaderNodeBsdfDiffuse", "ShaderNodeEmission"
@@ -86,8 +88,8 @@ def test_as_many_panes_are_gone_through_as_in_cycles(stage, both, scene, below, 
         set_black(scene.world)
     sides = both("direct")
     check(sides, ("Combined", "Diffuse Color", "Environment"))
-    shown = sides[1]["Combined" if below else "Environment"]
-    assert sides[0].bounces.transparent == most and shown[..., :3].max() > 0.1
+    passes = sides[1]["Combined" if below else "Environment"]
+    assert sides[0].bounces.transparent == most and passes[..., :3].max() > 0.1
 
 
 @pytest.mark.parametrize("is_seen_through", [False, True])
@@ -107,7 +109,7 @@ def test_a_pane_is_told_of_the_ray_what_cycles_tells_it(stage, both, scene, belo
     """Its color is made of all that Light Path says: of the eye's rays, of those to the sun, and of those from a mirror."""
     pane = stage(below)
     tree = pane.node_tree
-    said = tree.nodes.new("ShaderNodeLightPath")
+    light_path = tree.nodes.new("ShaderNodeLightPath")
     total = None
     weights = {"Ray Length": 0.01, "Is Camera Ray": 0.3, "Is Glossy Ray": 0.2, "Is Reflection Ray": 0.1, "Is Shadow Ray": 0.37}
     weights |= {"Is Singular Ray": 0.05, "Is Diffuse Ray": 0.8, "Is Transmission Ray": 0.9, "Ray Depth": 0.07}
@@ -115,7 +117,7 @@ def test_a_pane_is_told_of_the_ray_what_cycles_tells_it(stage, both, scene, belo
     for name, weight in weights.items():
         term = tree.nodes.new("ShaderNodeMath")
         term.operation = "MULTIPLY_ADD"
-        tree.links.new(said.outputs[name], term.inputs[0])
+        tree.links.new(light_path.outputs[name], term.inputs[0])
         term.inputs[1].default_value, term.inputs[2].default_value = weight, 0.2
         if total:
             tree.links.new(total.outputs[0], term.inputs[2])
@@ -128,8 +130,8 @@ def test_a_pane_is_told_of_the_ray_what_cycles_tells_it(stage, both, scene, belo
         bpy.data.objects.remove(next(block for block in scene.objects if block.type == "LIGHT"))
     sides = both("path")
     check(sides)
-    shown = sides[1]["Combined"][4, 4::8, 0]
-    assert len(set(np.round(shown, 3))) == PANES + 1, shown
+    values = sides[1]["Combined"][4, 4::8, 0]
+    assert len(set(np.round(values, 3))) == PANES + 1, values
 
 
 def test_cut_out_leaves(stage, both, scene):
@@ -148,8 +150,8 @@ def test_cut_out_leaves(stage, both, scene):
     set_black(scene.world)
     sides = both("direct")
     check(sides)
-    shown = sides[1]["Diffuse Color"][..., 0]
-    assert 0.1 < np.mean(np.abs(shown - TINT[0]) < 1e-3) < 0.9
+    color = sides[1]["Diffuse Color"][..., 0]
+    assert 0.1 < np.mean(np.abs(color - TINT[0]) < 1e-3) < 0.9
 
 
 def mixed(pane, factor):
@@ -163,12 +165,12 @@ def mixed(pane, factor):
 
 def deviation(sides):
     """Standard errors between the means of both pictures and their alphas."""
-    _, ours, theirs = sides
-    pictures = np.array([passes["Combined"] for passes in theirs], np.float64)
-    error = np.sqrt((pictures[..., :3].var(axis=0, ddof=1) / len(pictures)).sum() + ours["Variance"].sum())
+    _, traced, cycles = sides
+    pictures = np.array([passes["Combined"] for passes in cycles], np.float64)
+    error = np.sqrt((pictures[..., :3].var(axis=0, ddof=1) / len(pictures)).sum() + traced["Variance"].sum())
     alphas = pictures[..., 3].mean(axis=(1, 2))
-    off = (ours["Combined"][..., :3].sum(dtype=np.float64) - pictures[..., :3].mean(axis=0).sum()) / error
-    return off, ours["Combined"][..., 3].mean() - alphas.mean(), alphas.std(ddof=1)
+    off = (traced["Combined"][..., :3].sum(dtype=np.float64) - pictures[..., :3].mean(axis=0).sum()) / error
+    return off, traced["Combined"][..., 3].mean() - alphas.mean(), alphas.std(ddof=1)
 
 
 @pytest.mark.parametrize(("kind", "level"), [("alpha", "path"), ("mix", "direct")])
@@ -192,10 +194,10 @@ def test_two_percent_less_alpha_are_caught(stage, both, scene, monkeypatch):
     right = native.described_closure
 
     def thinner(closure, images, nodes):
-        made = dict(closure.node.inputs)
-        if "alpha" in made:
-            made["alpha"] = replace(made["alpha"], rgb=(made["alpha"].rgb[0] - 0.02,) * 3)
-        return right(replace(closure, node=replace(closure.node, inputs=tuple(made.items()))), images, nodes)
+        inputs = dict(closure.node.inputs)
+        if "alpha" in inputs:
+            inputs["alpha"] = replace(inputs["alpha"], rgb=(inputs["alpha"].rgb[0] - 0.02,) * 3)
+        return right(replace(closure, node=replace(closure.node, inputs=tuple(inputs.items()))), images, nodes)
 
     monkeypatch.setattr(native, "described_closure", thinner)
     pane = stage(above="ShaderNodeBsdfPrincipled")

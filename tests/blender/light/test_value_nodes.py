@@ -82,172 +82,174 @@ ATTRIBUTES = (
 
 def graphs(image, straight):
     """name → what a patch shows."""
-    found = {}
+    result = {}
     a, b = two_colours()
     for word in KINDS["math"].inputs["operation"]:
-        found[f"math {word}"] = N("Math", {"Value": U, "Value_001": V, "Value_002": 0.4}, operation=word.upper())
+        result[f"math {word}"] = N("Math", {"Value": U, "Value_001": V, "Value_002": 0.4}, operation=word.upper())
     warm = N("Gamma", {"Color": (0.8, 0.3, 0.1, 1.0), "Gamma": 1.2})
-    found["a constant colour as a number"] = N("Math", {"Value": warm, "Value_001": U}, operation="MULTIPLY")
-    found["math clamp"] = N("Math", {"Value": U, "Value_001": V}, operation="ADD", use_clamp=True)
+    result["a constant color as a number"] = N("Math", {"Value": warm, "Value_001": U}, operation="MULTIPLY")
+    result["math clamp"] = N("Math", {"Value": U, "Value_001": V}, operation="ADD", use_clamp=True)
     for word in KINDS["vector_math"].inputs["operation"]:
-        theirs = {"fract": "FRACTION"}.get(word, word.upper())
-        if theirs not in bpy.types.ShaderNodeVectorMath.bl_rna.properties["operation"].enum_items:
+        operations = {"fract": "FRACTION"}.get(word, word.upper())
+        if operations not in bpy.types.ShaderNodeVectorMath.bl_rna.properties["operation"].enum_items:
             continue  # some came with 4.3
         inputs = {"Vector": OBJECT, "Vector_001": a, "Vector_002": (0.3, 0.2, 0.1), "Scale": 0.7}
-        found[f"vector math {word}"] = N("VectorMath", inputs, operation=theirs)
+        result[f"vector math {word}"] = N("VectorMath", inputs, operation=operations)
     for word in KINDS["mix_color"].inputs["blend"]:
         inputs = {"Factor_Float": 0.6, "A_Color": a, "B_Color": b}
-        found[f"mix {word}"] = N("Mix", inputs, data_type="RGBA", blend_type=word.upper())
-    found["mix clamped"] = N(
+        result[f"mix {word}"] = N("Mix", inputs, data_type="RGBA", blend_type=word.upper())
+    result["mix clamped"] = N(
         "Mix", {"Factor_Float": U, "A_Color": a, "B_Color": b}, data_type="RGBA", blend_type="ADD", clamp_result=True
     )
-    found["mix number"] = N("Mix", {"Factor_Float": V, "A_Float": U, "B_Float": a}, data_type="FLOAT", clamp_factor=False)
+    result["mix number"] = N("Mix", {"Factor_Float": V, "A_Float": U, "B_Float": a}, data_type="FLOAT", clamp_factor=False)
     for word in KINDS["map_range"].inputs["interpolation"]:
         inputs = {"Value": U, "From Min": 0.2, "From Max": 1.1, "To Min": 0.9, "To Max": 0.1, "Steps": 3.0}
-        found[f"map range {word}"] = N("MapRange", inputs, interpolation_type=word.upper(), clamp=False)
-        found[f"map range {word} clamped"] = N("MapRange", inputs, interpolation_type=word.upper(), clamp=True)
+        result[f"map range {word}"] = N("MapRange", inputs, interpolation_type=word.upper(), clamp=False)
+        result[f"map range {word} clamped"] = N("MapRange", inputs, interpolation_type=word.upper(), clamp=True)
     for interpolation in ("Linear", "Closest", "Cubic", "Smart"):
         for extension in ("REPEAT", "EXTEND", "CLIP", "MIRROR"):
             if interpolation in ("Linear", "Cubic") or extension == "CLIP":
                 image_node = {"image": image, "interpolation": interpolation, "extension": extension}
-                found[f"image {interpolation} {extension}"] = N("TexImage", {"Vector": UV}, **image_node)
+                result[f"image {interpolation} {extension}"] = N("TexImage", {"Vector": UV}, **image_node)
     place = N("Mapping", {"Vector": OBJECT, "Rotation": (0.3, -0.4, 1.1), "Location": (0.2, -0.3, 0.1)})
     for word in ("SPHERE", "TUBE"):
-        found[f"image {word}"] = N("TexImage", {"Vector": place}, image=image, projection=word)
+        result[f"image {word}"] = N("TexImage", {"Vector": place}, image=image, projection=word)
     for blend in (0.0, 0.3, 0.6, 1.0):
         properties = {"image": image, "projection": "BOX", "projection_blend": blend}
-        found[f"turned box {blend}"] = N("TexImage", {"Vector": place}, **properties)
+        result[f"turned box {blend}"] = N("TexImage", {"Vector": place}, **properties)
     for word in ("EQUIRECTANGULAR", "MIRROR_BALL"):
-        found[f"environment {word}"] = N("TexEnvironment", {"Vector": place}, image=image, projection=word)
-    found["environment of positions"] = N("TexEnvironment", image=image, interpolation="Cubic")
-    found["alpha"] = N("TexImage", {"Vector": UV}, "Alpha", image=straight, extension="CLIP")
-    found["premultiplied"] = N("TexImage", {}, "Color", image=straight)
+        result[f"environment {word}"] = N("TexEnvironment", {"Vector": place}, image=image, projection=word)
+    result["environment of positions"] = N("TexEnvironment", image=image, interpolation="Cubic")
+    result["alpha"] = N("TexImage", {"Vector": UV}, "Alpha", image=straight, extension="CLIP")
+    result["premultiplied"] = N("TexImage", {}, "Color", image=straight)
     for word in ("POINT", "TEXTURE", "VECTOR", "NORMAL"):
         inputs = {"Vector": OBJECT, "Rotation": (0.3, -0.4, 1.1), "Scale": (1.5, 0.7, 2.0)}
         inputs |= {"Location": (0.2, -0.3, 0.1)} if word in ("POINT", "TEXTURE") else {}
-        found[f"mapping {word}"] = N("Mapping", inputs, vector_type=word)
+        result[f"mapping {word}"] = N("Mapping", inputs, vector_type=word)
     for word in ("UV", "Generated", "Object", "Normal", "Reflection", "Camera", "Window"):
-        found[f"coordinate {word}"] = N("TexCoord", output=word)
-    found["coordinate of another"] = N("TexCoord", output="Object", object=bpy.data.objects["Camera"])
+        result[f"coordinate {word}"] = N("TexCoord", output=word)
+    result["coordinate of another"] = N("TexCoord", output="Object", object=bpy.data.objects["Camera"])
     for word in ("View Vector", "View Z Depth", "View Distance"):
-        found[f"camera {word}"] = N("CameraData", output=word)
-    found["second UV"] = N("UVMap", uv_map="Second")
+        result[f"camera {word}"] = N("CameraData", output=word)
+    result["second UV"] = N("UVMap", uv_map="Second")
     for name in ("Weight", "Tint", "Byte", "Way", "Second", "Nothing"):
         for word in ("Color", "Vector", "Fac", "Alpha"):
-            found[f"attribute {name} {word}"] = N("Attribute", output=word, attribute_name=name)
-    found["colour attribute"] = N("VertexColor", output="Color", layer_name="Byte")
-    found["colour attribute alpha"] = N("VertexColor", output="Alpha", layer_name="Tint")
+            result[f"attribute {name} {word}"] = N("Attribute", output=word, attribute_name=name)
+    result["color attribute"] = N("VertexColor", output="Color", layer_name="Byte")
+    result["color attribute alpha"] = N("VertexColor", output="Alpha", layer_name="Tint")
     for word in ("Position", "Normal", "True Normal", "Incoming", "Backfacing", "Tangent", "Parametric"):
-        found[f"geometry {word}"] = N("NewGeometry", output=word)
+        result[f"geometry {word}"] = N("NewGeometry", output=word)
     for word in ("Pointiness", "Random Per Island"):
-        found[f"geometry {word}"] = N("NewGeometry", output=word)
-    found["geometry by its name"] = N("Attribute", output="Fac", attribute_name="random_per_island")
+        result[f"geometry {word}"] = N("NewGeometry", output=word)
+    result["geometry by its name"] = N("Attribute", output="Fac", attribute_name="random_per_island")
     for pixels, size in ((False, 0.02), (True, 1.1)):
         wide = N("Math", {"Value": U, "Value_001": size, "Value_002": size}, operation="MULTIPLY_ADD")
-        found[f"wireframe {pixels}"] = N("Wireframe", {"Size": wide}, use_pixel_size=pixels)
-    found["tangent round z"] = N("Tangent", direction_type="RADIAL")
+        result[f"wireframe {pixels}"] = N("Wireframe", {"Size": wide}, use_pixel_size=pixels)
+    result["tangent round z"] = N("Tangent", direction_type="RADIAL")
     for layer in ("", "Second"):
-        found[f"tangent along {layer}"] = N("Tangent", direction_type="UV_MAP", uv_map=layer)
+        result[f"tangent along {layer}"] = N("Tangent", direction_type="UV_MAP", uv_map=layer)
     for word in ("Location", "Color", "Alpha", "Object Index", "Material Index", "Random"):
-        found[f"object {word}"] = N("ObjectInfo", output=word)
-    found["fresnel"] = N("Fresnel", {"IOR": 1.45})
+        result[f"object {word}"] = N("ObjectInfo", output=word)
+    result["fresnel"] = N("Fresnel", {"IOR": 1.45})
     for word in ("Fresnel", "Facing"):
         for blend in (0.2, 0.5, 0.8):
-            found[f"layer weight {word} {blend}"] = N("LayerWeight", {"Blend": blend}, word)
+            result[f"layer weight {word} {blend}"] = N("LayerWeight", {"Blend": blend}, word)
     stops = [(0.3, (0.9, 0.1, 0.2, 0.5)), (0.6, (0.1, 0.3, 0.8, 1.0))]
     for word in ("LINEAR", "CONSTANT", "EASE", "B_SPLINE"):
-        found[f"ramp {word}"] = N("ValToRGB", {"Fac": U}, "Color", stops=stops, ramp=word)
-    found["ramp alpha"] = N("ValToRGB", {"Fac": a}, "Alpha", stops=stops)
-    found |= procedural()
-    found["gamma"] = N("Gamma", {"Color": a, "Gamma": 1.7})
-    found["bright"] = N("BrightContrast", {"Color": a, "Bright": 0.1, "Contrast": 0.4})
-    found["hue"] = N("HueSaturation", {"Color": a, "Hue": 0.63, "Saturation": 1.2, "Value": 0.8, "Fac": 0.9})
-    found["invert"] = N("Invert", {"Color": a, "Fac": 0.7})
-    found["luminance"] = N("RGBToBW", {"Color": a})
-    found["separate"] = N("SeparateColor", {"Color": b}, "Green")
-    found |= curves(a)
-    found |= conversions(a, b)
-    found["clamp"] = N("Clamp", {"Value": U, "Min": 0.2, "Max": 0.8})
-    found["number of a vector"] = N("Math", {"Value": OBJECT, "Value_001": a}, operation="ADD")
-    return found
+        result[f"ramp {word}"] = N("ValToRGB", {"Fac": U}, "Color", stops=stops, ramp=word)
+    result["ramp alpha"] = N("ValToRGB", {"Fac": a}, "Alpha", stops=stops)
+    result |= procedural()
+    result["gamma"] = N("Gamma", {"Color": a, "Gamma": 1.7})
+    result["bright"] = N("BrightContrast", {"Color": a, "Bright": 0.1, "Contrast": 0.4})
+    result["hue"] = N("HueSaturation", {"Color": a, "Hue": 0.63, "Saturation": 1.2, "Value": 0.8, "Fac": 0.9})
+    result["invert"] = N("Invert", {"Color": a, "Fac": 0.7})
+    result["luminance"] = N("RGBToBW", {"Color": a})
+    result["separate"] = N("SeparateColor", {"Color": b}, "Green")
+    result |= curves(a)
+    result |= conversions(a, b)
+    result["clamp"] = N("Clamp", {"Value": U, "Min": 0.2, "Max": 0.8})
+    result["number of a vector"] = N("Math", {"Value": OBJECT, "Value_001": a}, operation="ADD")
+    return result
 
 
 def curves(color):
     """Curves of colors, vectors and numbers; beyond their ends either way."""
     bent = (((0.1, 0.9), (0.4, 0.2), (0.8, 1.3)), ((0.0, 0.0), (1.0, 0.6)), ((-0.2, 0.1), (0.5, 0.5), (0.9, -0.3)))
     common = ((0.0, 0.1), (0.7, 0.4), (1.0, 1.0))
-    found = {}
+    result = {}
     for word in ("EXTRAPOLATED", "HORIZONTAL"):
-        found[f"rgb curves {word}"] = N("RGBCurve", {"Color": color, "Fac": 0.9}, curves=(*bent, common), extend=word)
-        found[f"vector curves {word}"] = N("VectorCurve", {"Vector": OBJECT, "Fac": 1.0}, curves=bent, extend=word)
-        found[f"float curve {word}"] = N("FloatCurve", {"Value": U, "Factor": V}, curves=bent[:1], extend=word)
-    return found
+        result[f"rgb curves {word}"] = N("RGBCurve", {"Color": color, "Fac": 0.9}, curves=(*bent, common), extend=word)
+        result[f"vector curves {word}"] = N("VectorCurve", {"Vector": OBJECT, "Fac": 1.0}, curves=bent, extend=word)
+        result[f"float curve {word}"] = N("FloatCurve", {"Value": U, "Factor": V}, curves=bent[:1], extend=word)
+    return result
 
 
 def conversions(a, b):
     """Conversions between ways to write colors, of ranges, of vectors."""
-    found = {}
+    result = {}
     for mode in ("HSV", "HSL"):
         parts = N("SeparateColor", {"Color": a}, mode=mode)
         for word in ("Red", "Green", "Blue"):
-            found[f"separate {mode} {word}"] = N("SeparateColor", {"Color": b}, word, mode=mode)
-        found[f"combine {mode}"] = N("CombineColor", {"Red": parts, "Green": 0.7, "Blue": V}, mode=mode)
+            result[f"separate {mode} {word}"] = N("SeparateColor", {"Color": b}, word, mode=mode)
+        result[f"combine {mode}"] = N("CombineColor", {"Red": parts, "Green": 0.7, "Blue": V}, mode=mode)
     for word in KINDS["map_range"].inputs["interpolation"]:
         ends = {"From_Min_FLOAT3": (0.2, 0.1, 1.0), "From_Max_FLOAT3": (1.1, 0.1, -0.4), "To_Min_FLOAT3": (0.9, -0.4, 0.1)}
         ends |= {"To_Max_FLOAT3": (0.1, 0.7, 0.8), "Steps_FLOAT3": (3.0, 2.0, 0.0)}
         for clamp in (False, True):
             settings = {"interpolation_type": word.upper(), "data_type": "FLOAT_VECTOR", "clamp": clamp}
-            found[f"map range of vectors {word} {clamp}"] = N("MapRange", {"Vector": OBJECT} | ends, **settings)
-    found["clamp range"] = N("Clamp", {"Value": U, "Min": 0.8, "Max": 0.2}, clamp_type="RANGE")
+            result[f"map range of vectors {word} {clamp}"] = N("MapRange", {"Vector": OBJECT} | ends, **settings)
+    result["clamp range"] = N("Clamp", {"Value": U, "Min": 0.8, "Max": 0.2}, clamp_type="RANGE")
     for mode, factor in (("UNIFORM", {"Factor_Float": V}), ("NON_UNIFORM", {"Factor_Vector": UV})):
         for clamp in (False, True):
             inputs = factor | {"A_Vector": OBJECT, "B_Vector": (0.3, -0.4, 1.2)}
             settings = {"data_type": "VECTOR", "factor_mode": mode, "clamp_factor": clamp}
-            found[f"mix vectors {mode} {clamp}"] = N("Mix", inputs, **settings)
+            result[f"mix vectors {mode} {clamp}"] = N("Mix", inputs, **settings)
     for word in KINDS["vector_rotate"].inputs["kind"]:
         inputs = {"Vector": OBJECT, "Center": (0.2, -0.1, 0.3)}
         inputs |= {"Rotation": (0.3, -0.4, 1.1)} if word == "euler_xyz" else {"Angle": 0.8}
         inputs |= {"Axis": (0.3, 0.5, -0.9)} if word == "axis_angle" else {}
         for invert in (False, True):
-            found[f"vector rotate {word} {invert}"] = N("VectorRotate", inputs, rotation_type=word.upper(), invert=invert)
+            result[f"vector rotate {word} {invert}"] = N("VectorRotate", inputs, rotation_type=word.upper(), invert=invert)
     for kind in ("POINT", "VECTOR", "NORMAL"):
         for start, end in itertools.permutations(("WORLD", "OBJECT", "CAMERA"), 2):
             words = {"vector_type": kind, "convert_from": start, "convert_to": end}
-            found[f"vector transform {kind} {start} {end}"] = N("VectorTransform", {"Vector": OBJECT}, **words)
+            result[f"vector transform {kind} {start} {end}"] = N("VectorTransform", {"Vector": OBJECT}, **words)
     kelvin = N("MapRange", {"Value": U, "To Min": 500.0, "To Max": 9000.0}, clamp=False)
-    found["blackbody"] = N("Blackbody", {"Temperature": kelvin})
+    result["blackbody"] = N("Blackbody", {"Temperature": kelvin})
     nanometres = N("MapRange", {"Value": U, "To Min": 400.0, "To Max": 700.0}, clamp=False)
-    found["wavelength"] = N("Wavelength", {"Wavelength": nanometres})
+    result["wavelength"] = N("Wavelength", {"Wavelength": nanometres})
     for word in ("Normal", "Dot"):
-        found[f"normal {word}"] = N("Normal", {"Normal": OBJECT}, word)
+        result[f"normal {word}"] = N("Normal", {"Normal": OBJECT}, word)
     for word in ("Is Camera Ray", "Is Shadow Ray", "Ray Length"):
-        found[f"light path {word}"] = N("LightPath", output=word)
-    return found
+        result[f"light path {word}"] = N("LightPath", output=word)
+    return result
 
 
 def procedural():
     """Textures that are formulas: noise on whole coordinates, too, where hashes must be the same."""
     place = N("Mapping", {"Vector": OBJECT, "Rotation": (0.3, -0.4, 1.1), "Location": (0.2, -0.3, 0.1)})
     cells = N("VectorMath", {"Vector": N("VectorMath", {"Vector": place, "Scale": 7.0}, operation="SCALE")}, operation="FLOOR")
-    found = {}
+    result = {}
     for kind in KINDS["noise"].inputs["kind"]:
         inputs = {"Vector": place, "Scale": 1.7, "Detail": 2.5, "Roughness": 0.6, "Lacunarity": 2.2, "Offset": 0.3, "Gain": 1.4}
-        found[f"noise {kind}"] = N("TexNoise", inputs, "Fac", noise_type=kind.upper())
+        result[f"noise {kind}"] = N("TexNoise", inputs, "Fac", noise_type=kind.upper())
     for dimensions in ("1D", "2D", "3D", "4D"):
         inputs = {"Vector": place, "W": U, "Scale": 2.0, "Detail": 1.0, "Distortion": 0.4}
-        found[f"noise {dimensions}"] = N("TexNoise", inputs, "Color", noise_dimensions=dimensions, normalize=dimensions == "2D")
+        result[f"noise {dimensions}"] = N(
+            "TexNoise", inputs, "Color", noise_dimensions=dimensions, normalize=dimensions == "2D"
+        )
         whole = {
             "Vector": cells,
             "W": N("Math", {"Value": N("Math", {"Value": U, "Value_001": 5}, operation="MULTIPLY")}, operation="FLOOR"),
         }
-        found[f"white noise {dimensions}"] = N("TexWhiteNoise", whole, "Color", noise_dimensions=dimensions)
-    found["white noise value"] = N("TexWhiteNoise", {"Vector": cells}, "Value")
+        result[f"white noise {dimensions}"] = N("TexWhiteNoise", whole, "Color", noise_dimensions=dimensions)
+    result["white noise value"] = N("TexWhiteNoise", {"Vector": cells}, "Value")
     for name in ("TexNoise", "TexWhiteNoise", "TexChecker", "TexMagic", "TexBrick", "TexGradient", "TexWave", "TexVoronoi"):
-        found[f"{name} without a vector"] = N(name, {}, "Color" if name != "TexNoise" else "Fac")
+        result[f"{name} without a vector"] = N(name, {}, "Color" if name != "TexNoise" else "Fac")
     a, b = two_colours()
     for word in ("Color", "Fac"):
-        found[f"checker {word}"] = N("TexChecker", {"Vector": place, "Color1": a, "Color2": b, "Scale": 3.3}, word)
-        found[f"magic {word}"] = N("TexMagic", {"Vector": place, "Scale": 1.3, "Distortion": 1.2}, word, turbulence_depth=4)
+        result[f"checker {word}"] = N("TexChecker", {"Vector": place, "Color1": a, "Color2": b, "Scale": 3.3}, word)
+        result[f"magic {word}"] = N("TexMagic", {"Vector": place, "Scale": 1.3, "Distortion": 1.2}, word, turbulence_depth=4)
         inputs = {
             "Vector": place,
             "Color1": a,
@@ -258,21 +260,21 @@ def procedural():
             "Bias": -0.2,
         }
         settings = {"offset": 0.3, "offset_frequency": 3, "squash": 0.6, "squash_frequency": 2}
-        found[f"brick {word}"] = N("TexBrick", inputs, word, **settings)
+        result[f"brick {word}"] = N("TexBrick", inputs, word, **settings)
     for kind in KINDS["gradient"].inputs["kind"]:
-        found[f"gradient {kind}"] = N("TexGradient", {"Vector": place}, gradient_type=kind.upper())
+        result[f"gradient {kind}"] = N("TexGradient", {"Vector": place}, gradient_type=kind.upper())
     inputs = {"Vector": place, "Scale": 0.8, "Distortion": 0.7, "Detail": 1.5, "Detail Scale": 1.4, "Phase Offset": 0.3}
     for direction, profile in (("X", "SIN"), ("Y", "SAW"), ("Z", "TRI"), ("DIAGONAL", "SIN")):
         rings = direction.replace("DIAGONAL", "SPHERICAL")
         words = {"bands_direction": direction, "rings_direction": rings, "wave_profile": profile}
-        found[f"wave bands {direction}"] = N("TexWave", inputs, "Color", **words)
-        found[f"wave rings {direction}"] = N("TexWave", inputs | {"Distortion": 0.0}, "Fac", wave_type="RINGS", **words)
-    return found | voronoi(place)
+        result[f"wave bands {direction}"] = N("TexWave", inputs, "Color", **words)
+        result[f"wave rings {direction}"] = N("TexWave", inputs | {"Distortion": 0.0}, "Fac", wave_type="RINGS", **words)
+    return result | voronoi(place)
 
 
 def voronoi(place):
     """Every feature in every dimension, by one metric after the other, and the metrics' own."""
-    found, metrics = {}, itertools.cycle(("MINKOWSKI", "CHEBYCHEV", "MANHATTAN", "EUCLIDEAN"))
+    result, metrics = {}, itertools.cycle(("MINKOWSKI", "CHEBYCHEV", "MANHATTAN", "EUCLIDEAN"))
     words = {"DISTANCE_TO_EDGE": ("Distance",), "N_SPHERE_RADIUS": ("Radius",)}
     for feature in ("F1", "F2", "SMOOTH_F1", "DISTANCE_TO_EDGE", "N_SPHERE_RADIUS"):
         for dimensions in ("1D", "2D", "3D", "4D"):
@@ -282,8 +284,8 @@ def voronoi(place):
                 inputs |= {} if plain or word == "Radius" else {"Detail": 1.3, "Roughness": 0.6, "Lacunarity": 1.8}
                 settings = {"feature": feature, "voronoi_dimensions": dimensions, "normalize": dimensions == "2D"}
                 settings["distance"] = next(metrics)
-                found[f"voronoi {feature} {dimensions} {word}"] = N("TexVoronoi", inputs, word, **settings)
-    return found
+                result[f"voronoi {feature} {dimensions} {word}"] = N("TexVoronoi", inputs, word, **settings)
+    return result
 
 
 @pytest.fixture
@@ -297,11 +299,11 @@ def floor(scene, strewn, make_material, set_world, read_passes, tmp_path):
         for name, graph in graphs.items():
             materials.append(make_material(name, "ShaderNodeEmission"))
             tree = materials[-1].node_tree
-            shown = graph
+            picture = graph
             for operation, *by in (("MINIMUM", 3), ("MAXIMUM", -3), ("MULTIPLY_ADD", 0.1, 0.5)):
-                inputs = {"Vector": shown} | {f"Vector_00{i}": (value,) * 3 for i, value in enumerate(by, start=1)}
-                shown = N("VectorMath", inputs, operation=operation)
-            tree.links.new(shown.add(tree), tree.nodes["Shader"].inputs["Color"])
+                inputs = {"Vector": picture} | {f"Vector_00{i}": (value,) * 3 for i, value in enumerate(by, start=1)}
+                picture = N("VectorMath", inputs, operation=operation)
+            tree.links.new(picture.add(tree), tree.nodes["Shader"].inputs["Color"])
         rng = np.random.default_rng(1)
         blocks = strewn(materials, cells=30, width=3.0, backwards=lambda i: i % 2 == 0)
         for name, block in zip(graphs, blocks, strict=True):
@@ -319,34 +321,36 @@ def floor(scene, strewn, make_material, set_world, read_passes, tmp_path):
         path = tmp_path / "floor.exr"
         exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-        (theirs,) = read_passes([path])
-        ours = render.render(exported, "direct", 1, threads=2)
-        indices = ours["Object Index"][..., 0]
+        (cycles_passes,) = read_passes([path])
+        traced = render.render(exported, "direct", 1, threads=2)
+        indices = traced["Object Index"][..., 0]
         return {
-            name: tuple(each["Combined"][indices == number][:, :3].astype(np.float64) for each in (ours, theirs))
+            name: tuple(each["Combined"][indices == number][:, :3].astype(np.float64) for each in (traced, cycles_passes))
             for number, name in enumerate(graphs, start=1)
         }
 
     return show
 
 
-def check(found):
-    told = []
-    for name, (ours, theirs) in found.items():
-        assert len(ours) > 20, (name, len(ours))
-        apart = np.abs(ours - theirs).max(axis=1) / np.maximum(np.abs(theirs).max(axis=1), 1)
-        scale = BYTES if name.startswith(("attribute Byte", "colour attribute")) else GLOW if name == "blackbody" else 1
+def check(pairs):
+    result = []
+    for name, (traced, cycles) in pairs.items():
+        assert len(traced) > 20, (name, len(traced))
+        apart = np.abs(traced - cycles).max(axis=1) / np.maximum(np.abs(cycles).max(axis=1), 1)
+        scale = BYTES if name.startswith(("attribute Byte", "color attribute")) else GLOW if name == "blackbody" else 1
         apart /= scale
         if np.median(apart) > TYPICAL or (apart > MOST).mean() > JUMPS:
-            told.append(f"{name}: p50 {np.median(apart):.1e}, {(apart > MOST).mean():.1%} above {MOST}, most {apart.max():.1e}")
-    assert not told, "\n".join(told)
+            result.append(
+                f"{name}: p50 {np.median(apart):.1e}, {(apart > MOST).mean():.1%} above {MOST}, most {apart.max():.1e}"
+            )
+    assert not result, "\n".join(result)
 
 
 @pytest.fixture
 def images(fresh_blender):
     """An image of many colors, and one with an alpha that colors are multiplied by."""
     rng = np.random.default_rng(zlib.crc32(b"images"))
-    made = []
+    result = []
     for name in ("many", "straight"):
         image = bpy.data.images.new(name, 4, 3, alpha=True)
         pixels = rng.random((12, 4)).astype(np.float32)
@@ -355,8 +359,8 @@ def images(fresh_blender):
         image.pixels.foreach_set(pixels.ravel())
         image.update()
         image.pack()
-        made.append(image)
-    return made
+        result.append(image)
+    return result
 
 
 @pytest.mark.parametrize("part", range(PARTS))
@@ -401,7 +405,7 @@ def test_a_node_that_is_a_little_wrong_is_found(floor, images, monkeypatch, wron
             node = native.Node(node.type, (*node.inputs, (name, change(node[name]))))
         return right(node, *numbers)
 
-    shown = {
+    names = {
         "math": N("Math", {"Value": 0.7, "Value_001": U}, operation="ADD"),
         "mix_color": N("Mix", {"Factor_Float": 0.5, "A_Color": UV, "B_Color": (0.2, 0.9, 0.4, 1)}, data_type="RGBA"),
         "mapping": N("Mapping", {"Vector": UV, "Rotation": (0, 0, 0.2)}),
@@ -411,7 +415,7 @@ def test_a_node_that_is_a_little_wrong_is_found(floor, images, monkeypatch, wron
     }
     monkeypatch.setattr(native, "_described_node", described)
     with pytest.raises(AssertionError, match="p50"):
-        check(floor({wrong: shown[wrong]}))
+        check(floor({wrong: names[wrong]}))
 
 
 def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(
@@ -441,13 +445,13 @@ def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(
     path = tmp_path / "generated.exr"
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
     assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-    (theirs,) = read_passes([path])
-    ours = render.render(exported, "direct", 1, threads=2)
-    met = ours["Depth"][..., 0] < 100
-    apart = np.abs(ours["Combined"] - theirs["Combined"])[met]
-    told = met.sum(), *np.percentile(apart, (50, 99, 100))
+    (cycles_passes,) = read_passes([path])
+    traced = render.render(exported, "direct", 1, threads=2)
+    met = traced["Depth"][..., 0] < 100
+    apart = np.abs(traced["Combined"] - cycles_passes["Combined"])[met]
+    summary = met.sum(), *np.percentile(apart, (50, 99, 100))
     # Calibrated: 3e-7, 7e-6, and where the grid is seen edge-on 4.5e-5, of Cycles' barycentric coordinates in float32.
-    assert met.sum() > 300 and told[1] < 1e-6 and told[2] < 1e-5 and told[3] < 1e-4, told
+    assert met.sum() > 300 and summary[1] < 1e-6 and summary[2] < 1e-5 and summary[3] < 1e-4, summary
 
 
 @pytest.fixture
@@ -471,11 +475,11 @@ def thrown(scene, camera, add, mesh_from, make_material, set_world, images, read
         path = tmp_path / "thrown.exr"
         exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-        (theirs,) = read_passes([path])
-        ours = render.render(exported, "direct", 1, threads=2)
-        here = ours["Object Index"][..., 0] == 1
+        (cycles_passes,) = read_passes([path])
+        traced = render.render(exported, "direct", 1, threads=2)
+        here = traced["Object Index"][..., 0] == 1
         assert here.sum() > 500
-        return np.abs(ours["Combined"] - theirs["Combined"])[here].max(axis=1)
+        return np.abs(traced["Combined"] - cycles_passes["Combined"])[here].max(axis=1)
 
     return show
 
@@ -486,8 +490,8 @@ THROWN = (5e-6, 1e-3) if bpy.app.version >= (5, 1) else (2e-6, 2e-5)
 
 @pytest.mark.parametrize("blend", [0.0, 0.3, 0.7, 1.0])
 def test_an_image_is_thrown_on_a_body_along_its_axes(thrown, blend):
-    told = np.percentile(thrown(blend), (50, 97))
-    assert (told <= THROWN).all(), told
+    percentiles = np.percentile(thrown(blend), (50, 97))
+    assert (percentiles <= THROWN).all(), percentiles
 
 
 def test_a_blend_between_axes_that_is_a_little_wrong_is_found(thrown, monkeypatch):
@@ -525,11 +529,11 @@ def test_each_instance_has_a_random_number_and_the_color_of_what_places_it(
     path = tmp_path / "instances.exr"
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
     assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-    (theirs,) = read_passes([path])
-    ours = render.render(exported, "direct", 1, threads=2)
-    apart = np.abs(ours["Combined"] - theirs["Combined"])[..., :3].max(axis=-1)
+    (cycles_passes,) = read_passes([path])
+    traced = render.render(exported, "direct", 1, threads=2)
+    apart = np.abs(traced["Combined"] - cycles_passes["Combined"])[..., :3].max(axis=-1)
     assert apart.max() < 1e-6
-    drawn = np.unique(np.round(theirs["Combined"][..., 0].astype(np.float64), 6))
+    drawn = np.unique(np.round(cycles_passes["Combined"][..., 0].astype(np.float64), 6))
     assert len(drawn) > 30, drawn  # 36 instances, the one alone, and nothing
 
 
@@ -588,11 +592,11 @@ def pointed(scene, camera, add, mesh_from, make_material, set_world, read_passes
         path = tmp_path / "pointed.exr"
         exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-        (theirs,) = read_passes([path])
-        ours = render.render(exported, "direct", 1, threads=2)
-        here = ours["Object Index"][..., 0] == 1
-        assert here.sum() > 2000 and len(np.unique(theirs["Combined"][here][:, 1])) >= 2
-        return np.abs(ours["Combined"] - theirs["Combined"])[here][:, :3]
+        (cycles_passes,) = read_passes([path])
+        traced = render.render(exported, "direct", 1, threads=2)
+        here = traced["Object Index"][..., 0] == 1
+        assert here.sum() > 2000 and len(np.unique(cycles_passes["Combined"][here][:, 1])) >= 2
+        return np.abs(traced["Combined"] - cycles_passes["Combined"])[here][:, :3]
 
     return show
 

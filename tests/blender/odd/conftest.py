@@ -31,8 +31,8 @@ class _Panel:
         self.kind, self.layout = kind, _Layout()
 
     def __getattr__(self, name):
-        found = inspect.getattr_static(self.kind, name)
-        return found.__get__(self, self.kind) if hasattr(found, "__get__") else found
+        attribute = inspect.getattr_static(self.kind, name)
+        return attribute.__get__(self, self.kind) if hasattr(attribute, "__get__") else attribute
 
 
 class _Over:
@@ -85,9 +85,9 @@ def _is_shown(kind, context, drawn):
 def no_traceback(capfd):
     """Whatever is done, nothing that a handler or a callback raises stands in the console."""
     yield
-    said = "".join(capfd.readouterr())
-    print(said)
-    assert "Traceback" not in said
+    output = "".join(capfd.readouterr())
+    print(output)
+    assert "Traceback" not in output
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,12 +129,12 @@ class OddRow:
         from viewcam_addon.errors import InputError
 
         try:
-            said = cameras.apply(camera_object, cameras.stated(camera_object, scene), scene)
+            messages = cameras.apply(camera_object, cameras.stated(camera_object, scene), scene)
         except InputError as error:
-            said = [datablocks.sentence(error)]
+            messages = [datablocks.sentence(error)]
         self._compare(0, _off_by(camera_object, scene, datablocks.depsgraph_of(scene)), "right after apply")
         if self.sticks[0] == self.sticks[1]:
-            assert set(said) <= set(self.sentences), f"apply says {said}"
+            assert set(messages) <= set(self.sentences), f"apply says {messages}"
 
     def later(self, camera_object, scene, moment):
         """Look at the camera and at its panel."""
@@ -147,8 +147,8 @@ class OddRow:
             bpy.context.view_layer.update()
         self._compare(1, _off_by(camera_object, scene, datablocks.depsgraph_of(scene)), moment)
         self.draw()
-        said = [notice.sentence for notice in panel.notices(camera_object, scene)]
-        assert said == self.sentences, f"{moment} the panel says\n" + "\n".join(said)
+        sentences = [notice.sentence for notice in panel.notices(camera_object, scene)]
+        assert sentences == self.sentences, f"{moment} the panel says\n" + "\n".join(sentences)
 
     def render(self, camera_object, scene):
         """Look at the camera as a render engine gets it."""
@@ -204,10 +204,12 @@ def odd_rows(tmp_path, draw_panels):
     for line in page.read_text(encoding="utf-8").splitlines():
         cells = [cell.strip() for cell in line.strip("|").split(" | ")]
         if cells[-1].strip("`").startswith("test_"):
-            _, *sticks, said, test = cells
+            _, *sticks, sentence, test = cells
             assert test not in rows and len(sticks) == 3, f"one row, three cells of yes or no for {test}"
             sticks = tuple({"yes": True, "no": False, "—": None}[cell] for cell in sticks)
-            rows[test.strip("`")] = OddRow(sticks, [] if said == "nothing" else said.split("<br>"), tmp_path, draw_panels)
+            rows[test.strip("`")] = OddRow(
+                sticks, [] if sentence == "nothing" else sentence.split("<br>"), tmp_path, draw_panels
+            )
     return rows
 
 

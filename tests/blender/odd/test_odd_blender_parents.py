@@ -12,15 +12,9 @@ TURNED = (0.3, 0.4, 0.5)
 
 
 @pytest.fixture
-def rig(scene):
+def rig(add_rig):
     """An armature with one bone, Head, posed."""
-    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    scene.collection.objects.link(armature)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.object.mode_set(mode="EDIT")
-    bone = armature.data.edit_bones.new("Head")
-    bone.head, bone.tail, bone.roll = (0, 0, 1), (0, 1, 2), 0.4
-    bpy.ops.object.mode_set(mode="OBJECT")
+    armature = add_rig(0.4)
     armature.location, armature.rotation_euler = (1, 2, 3), TURNED
     armature.pose.bones["Head"].location = (0.5, 0, 0)
     return armature

@@ -173,7 +173,7 @@ def test_a_smaller_scale_of_units_changes_nothing_but_the_words(posed_camera, sc
 
 def test_feet_change_nothing_but_the_words(posed_camera, scene, odd):
     scene.unit_settings.system, scene.unit_settings.length_unit = "IMPERIAL", "FEET"
-    rows = {row.label: row.shown for row in panel.shown(posed_camera, scene)}
+    rows = {row.label: row.texts for row in panel.readouts_of(posed_camera, scene)}
     assert rows["To Look-At"] == ("32.972'",)  # √(7² + 6² + 4²) m
     odd.check(posed_camera, then=lambda: keep_above(posed_camera, 7))
 
@@ -548,14 +548,8 @@ def test_child_of_under_a_parent_carries_the_camera_and_the_pose_sticks(posed_ca
     odd.check(posed_camera)
 
 
-def test_an_armature_constraint_carries_the_camera_and_the_pose_sticks(posed_camera, constrain, scene, odd):
-    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    scene.collection.objects.link(armature)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.object.mode_set(mode="EDIT")
-    bone = armature.data.edit_bones.new("Head")
-    bone.head, bone.tail = (0, 0, 1), (0, 1, 2)
-    bpy.ops.object.mode_set(mode="OBJECT")
+def test_an_armature_constraint_carries_the_camera_and_the_pose_sticks(posed_camera, constrain, add_rig, odd):
+    armature = add_rig()
     armature.pose.bones["Head"].location = (1, 0, 0)
     target = constrain("ARMATURE", target=False).targets.new()
     target.target, target.subtarget = armature, "Head"
@@ -964,12 +958,12 @@ def test_undo_brings_camera_target_and_values_back(aimed_camera, action, draw_pa
 
 def _everything():
     bpy.context.view_layer.update()
-    found = {"camera": bpy.context.scene.camera and bpy.context.scene.camera.name}
+    state = {"camera": bpy.context.scene.camera and bpy.context.scene.camera.name}
     for block in bpy.context.scene.objects:
-        found[block.name] = (tuple(map(tuple, block.matrix_world)), block.parent and block.parent.name)
+        state[block.name] = (tuple(map(tuple, block.matrix_world)), block.parent and block.parent.name)
         if block.type == "CAMERA":
-            found[block.name] += (block.virtual_pinhole.numbers(), targets.names(block), block.data.lens)
-    return found
+            state[block.name] += (block.virtual_pinhole.numbers(), targets.names(block), block.data.lens)
+    return state
 
 
 def test_the_panel_of_data_that_no_object_of_the_scene_has_stays_away(posed_camera, draw_panels):

@@ -11,13 +11,13 @@ pytest.importorskip("bpy")
 
 def found_tests():
     """The tests beside this one that take the fixture `odd`, by name: whether they ask it for what the row says."""
-    found = {}
+    result = {}
     for path in Path(__file__).parent.glob("test_odd_blender_*.py"):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and any(argument.arg == "odd" for argument in node.args.args):
                 body = ast.unparse(node)
-                found[node.name] = "odd.check(" in body or "odd.later(" in body
-    return found
+                result[node.name] = "odd.check(" in body or "odd.later(" in body
+    return result
 
 
 def test_every_row_has_its_test_and_every_test_its_row(odd_rows):

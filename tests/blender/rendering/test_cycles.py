@@ -21,21 +21,21 @@ NO_SETTINGS = {"rna_type", "is_evaluated", "depsgraph", "tool_settings"}
 
 def dump(block, depth=4):
     """All that can be read of a datablock's own settings, nested and as text, without following other datablocks."""
-    found = {}
+    result = {}
     for prop in block.bl_rna.properties:
         name = prop.identifier
         if name in NO_SETTINGS:
             continue
         value = getattr(block, name)
         if prop.type not in ("POINTER", "COLLECTION"):
-            found[name] = repr(value[:]) if getattr(prop, "is_array", False) else repr(value)
+            result[name] = repr(value[:]) if getattr(prop, "is_array", False) else repr(value)
         elif prop.type == "COLLECTION" and depth:
-            found[name] = [item.name if isinstance(item, bpy.types.ID) else dump(item, depth - 1) for item in value]
+            result[name] = [item.name if isinstance(item, bpy.types.ID) else dump(item, depth - 1) for item in value]
         elif isinstance(value, bpy.types.ID):
-            found[name] = value.name
+            result[name] = value.name
         elif isinstance(value, bpy.types.bpy_struct) and depth:
-            found[name] = dump(value, depth - 1)
-    return found
+            result[name] = dump(value, depth - 1)
+    return result
 
 
 def state(scene):
@@ -62,8 +62,8 @@ def differences(before, after, path=""):
         for key in before.keys() | after.keys():
             yield from differences(before.get(key), after.get(key), f"{path}.{key}")
     elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
-        for number, (one, other) in enumerate(zip(before, after, strict=True)):
-            yield from differences(one, other, f"{path}[{number}]")
+        for number, (first, other) in enumerate(zip(before, after, strict=True)):
+            yield from differences(first, other, f"{path}[{number}]")
     elif before != after:
         yield f"{path}: {before!r} became {after!r}"
 
@@ -154,8 +154,8 @@ def test_every_override_for_light_is_restored(crowded, tmp_path, request_):
     exported = jobs.both_sides(Job(level="path", samples=4, threads=2, **request_), paths)
     assert not (changed := list(differences(before, state(crowded)))), "\n".join(changed)
     assert all(path.stat().st_size > 1000 for path in paths) and paths[0].read_bytes() != paths[1].read_bytes()
-    told = {entry.object: entry.reason for entry in exported.ledger}
-    assert "Object Info" in told["Lamp"] and "has a volume" in told["Fog"]
+    reasons = {entry.object: entry.reason for entry in exported.ledger}
+    assert "Object Info" in reasons["Lamp"] and "has a volume" in reasons["Fog"]
 
 
 @pytest.fixture
@@ -185,10 +185,10 @@ def test_pictures_of_light_share_samples_and_count_seeds(scene, camera_object, t
     assert [each["seed"] for each in settings_of_renders] == [7, 8, 9]
     assert settings_of_renders[0]["max_bounces"] == 9 and settings_of_renders[0]["diffuse_bounces"] == 3
     assert settings_of_renders[0]["pixel_filter_type"] == "BOX" and settings_of_renders[0]["film_exposure"] == 2.0
-    assert settings_of_renders[0]["passes"] == {"use_pass_emit"}, "what is at the centre needs the first sample"
+    assert settings_of_renders[0]["passes"] == {"use_pass_emit"}, "what is at the center needs the first sample"
 
 
-def test_direct_light_has_no_bounces_and_one_sample_is_the_centre(scene, camera_object, tmp_path, settings_of_renders):
+def test_direct_light_has_no_bounces_and_one_sample_is_the_center(scene, camera_object, tmp_path, settings_of_renders):
     jobs.both_sides(Job(level="direct", samples=1), [tmp_path / "picture.exr"])
     (seen,) = settings_of_renders
     assert (seen["samples"], seen["max_bounces"], seen["diffuse_bounces"]) == (1, 0, 0)

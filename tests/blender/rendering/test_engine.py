@@ -70,10 +70,10 @@ def channels(path):
         return dict(archive)
 
 
-def written(name, found, layer="ViewLayer"):
+def written(name, passes, layer="ViewLayer"):
     """One pass of those that were written, (height, width, channels)."""
     names = [f"{layer}.{versions.pass_name(name)}.{letter}" for letter in image.CHANNELS[name]]
-    return np.stack([found[each] for each in names], axis=-1)
+    return np.stack([passes[each] for each in names], axis=-1)
 
 
 def traced(level="path", samples=SAMPLES, seed=SEED):
@@ -91,9 +91,9 @@ def ask_for_all_passes(view_layer):
 def test_every_pass_is_what_the_tracer_computes_bit_for_bit(lit, write, level):
     lit.virtual_pinhole_reference.level = level.upper()
     ask_for_all_passes(lit.view_layers[0])
-    found, expected = write(), traced("geometry") | traced(level)
+    hits, expected = write(), traced("geometry") | traced(level)
     for name in ("Combined", *SETTINGS, "Variance"):
-        values = written(name, found)
+        values = written(name, hits)
         if name in expected:
             assert np.array_equal(values, expected[name]), f"{name} differs by up to {np.abs(values - expected[name]).max()}"
         elif name != "Combined":
@@ -103,16 +103,16 @@ def test_every_pass_is_what_the_tracer_computes_bit_for_bit(lit, write, level):
 @pytest.fixture
 def prepared(monkeypatch):
     """One word for each tracer that is made: "same" if it has the hierarchies of one before it, else "new"."""
-    made = []
+    result = []
     real = renders.Tracer.__init__
 
     def init(self, scene, threads=None, kept=None):
         before = None if kept is None else kept._core
         real(self, scene, threads, kept)
-        made.append("same" if self._core is before else "new")
+        result.append("same" if self._core is before else "new")
 
     monkeypatch.setattr(renders.Tracer, "__init__", init)
-    return made
+    return result
 
 
 @pytest.mark.parametrize("persistent", [False, True])
@@ -128,8 +128,8 @@ def test_persistent_data_keeps_what_frames_share(persistent, lit, prepared, tmp_
     assert prepared == (["new"] + ["same"] * 5 if persistent else ["new", "same"] * 3)
     for frame in (1, 2, 3):
         lit.frame_set(frame)
-        found = channels(tmp_path / f"frame{frame:04}.exr")
-        assert np.array_equal(written("Combined", found), traced()["Combined"]), f"frame {frame} is another picture"
+        read_image = channels(tmp_path / f"frame{frame:04}.exr")
+        assert np.array_equal(written("Combined", read_image), traced()["Combined"]), f"frame {frame} is another picture"
 
 
 def test_another_seed_is_another_picture_and_another_number_of_threads_is_not(lit, write):
@@ -168,10 +168,10 @@ def test_a_border_is_that_part_of_the_picture(lit, write, crop):
     frame.use_border, frame.use_crop_to_border = True, crop
     frame.border_min_x, frame.border_max_x, frame.border_min_y, frame.border_max_y = 0.25, 0.75, 0.5, 0.875
     lit.view_layers[0].use_pass_z = True
-    found = write()
-    combined, part = written("Combined", found), (slice(24, 42), slice(16, 48))
+    picture = write()
+    combined, part = written("Combined", picture), (slice(24, 42), slice(16, 48))
     if crop:
-        assert np.array_equal(written("Depth", found), traced()["Depth"])
+        assert np.array_equal(written("Depth", picture), traced()["Depth"])
         assert combined.shape == (18, 32, 4)
     else:
         assert combined.shape == whole.shape
@@ -196,11 +196,11 @@ def test_each_view_layer_shows_its_own(lit, write, camera):
     hidden.objects.link(cube)
     second = lit.view_layers.new("Second")
     second.layer_collection.children[hidden.name].exclude = True
-    found = write()
-    assert np.array_equal(written("Combined", found), traced()["Combined"])
+    picture = write()
+    assert np.array_equal(written("Combined", picture), traced()["Combined"])
     lit.view_layers[0].use = False
-    assert np.array_equal(written("Combined", found, "Second"), written("Combined", write(), "Second"))
-    assert not np.array_equal(written("Combined", found), written("Combined", found, "Second"))
+    assert np.array_equal(written("Combined", picture, "Second"), written("Combined", write(), "Second"))
+    assert not np.array_equal(written("Combined", picture), written("Combined", picture, "Second"))
 
 
 def test_frames_of_an_animation_show_the_animated_pinhole(lit, camera_object, tmp_path):
@@ -286,9 +286,9 @@ def test_what_can_not_be_modelled_is_one_warning(lit, write, monkey, camera_obje
     camera_object.data.dof.use_dof = True
     monkey.is_shadow_catcher = True
     write()
-    said = [line for line in "".join(capfd.readouterr()).splitlines() if "Not modelled" in line]
-    assert len(said) == 1, said
-    assert "Depth of field is on" in said[0] or "a shadow catcher" in said[0]
+    output = [line for line in "".join(capfd.readouterr()).splitlines() if "Not modeled" in line]
+    assert len(output) == 1, output
+    assert "Depth of field is on" in output[0] or "a shadow catcher" in output[0]
 
 
 def test_a_render_changes_nothing_in_the_file(lit, write):
@@ -302,7 +302,7 @@ def test_a_render_changes_nothing_in_the_file(lit, write):
 
 
 def settings_of(scene):
-    found = {}
+    result = {}
     owners = {"": scene, "render.": scene.render, "cycles.": scene.cycles, "layer.": scene.view_layers[0]}
     owners |= {f"{block.name}.": block for block in scene.objects}
     owners |= {f"{block.name}.data.": block.data for block in scene.objects}
@@ -310,5 +310,5 @@ def settings_of(scene):
         for prop in owner.bl_rna.properties:
             if prop.type in ("BOOLEAN", "INT", "FLOAT", "ENUM", "STRING") and not prop.is_readonly:
                 value = getattr(owner, prop.identifier)
-                found[prefix + prop.identifier] = tuple(map(repr, value)) if getattr(prop, "is_array", False) else repr(value)
-    return found | {"counts": [len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "materials", "scenes")]}
+                result[prefix + prop.identifier] = tuple(map(repr, value)) if getattr(prop, "is_array", False) else repr(value)
+    return result | {"counts": [len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "materials", "scenes")]}

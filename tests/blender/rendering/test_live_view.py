@@ -110,12 +110,12 @@ def test_the_camera_of_a_viewport_is_that_of_the_matrices_it_is_drawn_with(posed
         SimpleNamespace(width=320, height=200),
         SimpleNamespace(window_matrix=matrix, view_matrix=pose, is_perspective=True),
     )
-    found, expected = live_view.camera_of(region, view), cameras.read(posed_camera, scene)
+    pinhole, expected = live_view.camera_of(region, view), cameras.read(posed_camera, scene)
     # float32: the matrices, and of coordinates below 10 their inverse.
-    np.testing.assert_allclose(found.eye, expected.eye, atol=1e-5)
-    np.testing.assert_allclose(found.basis(), expected.basis(), atol=1e-6)
-    np.testing.assert_allclose(found.distance, expected.distance, rtol=1e-6)
-    np.testing.assert_allclose(found.principal_point, expected.principal_point, atol=1e-4)
+    np.testing.assert_allclose(pinhole.eye, expected.eye, atol=1e-5)
+    np.testing.assert_allclose(pinhole.basis(), expected.basis(), atol=1e-6)
+    np.testing.assert_allclose(pinhole.distance, expected.distance, rtol=1e-6)
+    np.testing.assert_allclose(pinhole.principal_point, expected.principal_point, atol=1e-4)
     view.is_perspective = False
     with pytest.raises(InputError, match="orthographic, no pinhole"):
         live_view.camera_of(region, view)

@@ -92,7 +92,7 @@ def test_without_a_driver_there_is_one_sentence_and_no_file(ball, scene, tmp_pat
 # --- Pictures of light are shown through the scene's view transform, and the scene stays as it is
 
 
-def shown(scene, folder, light):
+def displayed_bytes(scene, folder, light):
     np.save(folder / "light.npy", light)
     displayed.write_png(scene, folder / "light.npy")
     assert [path.name for path in folder.iterdir()] == ["light.png"]
@@ -112,13 +112,13 @@ def test_light_is_shown_as_f12_shows_it(fresh_blender, scene, tmp_path):
     light = np.full((3, 5, 3), 0.18, np.float32)
     light[0, :, 1], light[2] = 0.05, 1.0  # from the lowest row on
     scene.view_settings.view_transform = "Standard"
-    plain = shown(scene, tmp_path, light)
+    plain = displayed_bytes(scene, tmp_path, light)
     np.testing.assert_allclose(plain[1], srgb(0.18), atol=1)
     np.testing.assert_allclose(plain[0, :, 1], srgb(0.05), atol=1)
     scene.view_settings.exposure = 1.0
-    np.testing.assert_allclose(shown(scene, tmp_path, light)[1], srgb(0.36), atol=1)
+    np.testing.assert_allclose(displayed_bytes(scene, tmp_path, light)[1], srgb(0.36), atol=1)
     scene.view_settings.exposure, scene.view_settings.view_transform = 0.0, "AgX"
-    assert plain[2].min() == 255 and shown(scene, tmp_path, light)[2].max() < 250
+    assert plain[2].min() == 255 and displayed_bytes(scene, tmp_path, light)[2].max() < 250
 
 
 def test_the_scenes_own_file_settings_are_given_back(fresh_blender, scene, tmp_path):
@@ -127,5 +127,5 @@ def test_the_scenes_own_file_settings_are_given_back(fresh_blender, scene, tmp_p
         settings.media_type = "MULTI_LAYER_IMAGE"
     settings.file_format = "OPEN_EXR_MULTILAYER"
     images = len(bpy.data.images)
-    shown(scene, tmp_path, np.zeros((2, 2, 3), np.float32))
+    displayed_bytes(scene, tmp_path, np.zeros((2, 2, 3), np.float32))
     assert settings.file_format == "OPEN_EXR_MULTILAYER" and len(bpy.data.images) == images

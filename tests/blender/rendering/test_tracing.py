@@ -44,16 +44,16 @@ def endless(monkeypatch):
 
 def test_every_row_arrives_once_and_in_this_thread():
     here, rows = threading.current_thread(), []
-    for passes, some in bands(lambda: threading.current_thread() is not here):
+    for passes, received in bands(lambda: threading.current_thread() is not here):
         assert passes["Depth"].shape == (30, 40, 1)
-        rows += some
+        rows += received
     assert sorted(rows) == list(range(30))
 
 
 def test_who_cancels_is_heard_before_the_next_band_and_gets_no_error(endless):
     asked = iter([False, False, False])
-    given = list(bands(lambda: next(asked, True)))
-    assert len(given) <= 1 and endless == ["began", "stopped"]
+    received = list(bands(lambda: next(asked, True)))
+    assert len(received) <= 1 and endless == ["began", "stopped"]
 
 
 def test_whether_it_is_cancelled_is_asked_every_twentieth_of_a_second(endless, monkeypatch):
@@ -74,10 +74,10 @@ def test_whether_it_is_cancelled_is_asked_every_twentieth_of_a_second(endless, m
 
 def test_who_takes_no_more_bands_leaves_no_thread_behind(endless):
     before = threading.active_count()
-    given = bands()
-    next(given)
+    received = bands()
+    next(received)
     assert threading.active_count() > before
-    given.close()
+    received.close()
     assert endless == ["began", "stopped"] and threading.active_count() == before
 
 

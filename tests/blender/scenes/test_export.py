@@ -173,8 +173,8 @@ def test_a_scatter_of_geometry_nodes(add, both_sides, mesh_from, node_group):
 
 
 @pytest.mark.parametrize("recenter", [False, True])
-@pytest.mark.parametrize("shown", ["itself", "a collection", "nodes' instances", "nodes' geometry"])
-def test_a_mesh_in_edit_mode_is_also_shown_by_others(add, both_sides, mesh_from, node_group, shown, recenter):
+@pytest.mark.parametrize("is_shown", ["itself", "a collection", "nodes' instances", "nodes' geometry"])
+def test_a_mesh_in_edit_mode_is_also_shown_by_others(add, both_sides, mesh_from, node_group, is_shown, recenter):
     """The mesh that was made of it was freed by the next one, and geometry nodes showed nothing."""
     group, mesh = bpy.data.collections.new("Group"), mesh_from("monkey")
     mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
@@ -185,13 +185,13 @@ def test_a_mesh_in_edit_mode_is_also_shown_by_others(add, both_sides, mesh_from,
     mesh.polygons.foreach_set("material_index", [face.index % 2 for face in mesh.polygons])
     edited = add(mesh, "Edited", collection=group)
     bpy.context.scene.collection.children.link(group)
-    if shown == "a collection":
+    if is_shown == "a collection":
         for i in (-1, 1):
             add(None, f"Instancer {i}", location=(2 * i, 0, 0), instance_type="COLLECTION", instance_collection=group)
-    elif shown != "itself":
+    elif is_shown != "itself":
         tree, source, target = node_group()
         info, scatter = tree.nodes.new("GeometryNodeObjectInfo"), tree.nodes.new("GeometryNodeInstanceOnPoints")
-        info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = edited, "instances" in shown
+        info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = edited, "instances" in is_shown
         tree.links.new(source.outputs[0], scatter.inputs["Points"])
         tree.links.new(info.outputs["Geometry"], scatter.inputs["Instance"])
         tree.links.new(scatter.outputs[0], target.inputs[0])
@@ -201,7 +201,7 @@ def test_a_mesh_in_edit_mode_is_also_shown_by_others(add, both_sides, mesh_from,
     sides = both_sides(recenter=recenter)
     bpy.ops.object.mode_set(mode="OBJECT")
     sides.check()
-    assert sum(len(placed.matrices) for placed in sides.exported.objects) == {"itself": 1, "a collection": 3}.get(shown, 5)
+    assert sum(len(placed.matrices) for placed in sides.exported.objects) == {"itself": 1, "a collection": 3}.get(is_shown, 5)
     assert set(np.unique(sides.cycles["Material Index"])) == {0, 1, 2}
 
 
@@ -210,10 +210,10 @@ def test_a_lawn_of_ten_thousand_tufts_is_one_object_of_as_many_matrices(add, bot
     lawn = add(mesh_from("grid", size=5, x_subdivisions=99, y_subdivisions=99), "Lawn")
     corners = np.array([vertex.co for vertex in lawn.data.vertices])
     tree, source, target = node_group()
-    shown, scatter = tree.nodes.new("GeometryNodeObjectInfo"), tree.nodes.new("GeometryNodeInstanceOnPoints")
-    shown.inputs["Object"].default_value, shown.inputs["As Instance"].default_value = tuft, True
+    object_info, scatter = tree.nodes.new("GeometryNodeObjectInfo"), tree.nodes.new("GeometryNodeInstanceOnPoints")
+    object_info.inputs["Object"].default_value, object_info.inputs["As Instance"].default_value = tuft, True
     tree.links.new(source.outputs[0], scatter.inputs["Points"])
-    tree.links.new(shown.outputs["Geometry"], scatter.inputs["Instance"])
+    tree.links.new(object_info.outputs["Geometry"], scatter.inputs["Instance"])
     tree.links.new(scatter.outputs[0], target.inputs[0])
     lawn.modifiers.new("Scatter", "NODES").node_group = tree
     sides = both_sides()
@@ -325,7 +325,7 @@ def test_a_view_layer_that_is_not_rendered_is_not_compared(two_layers, both_side
 
 def test_strict_names_what_can_not_be_modelled(add, mesh_from):
     add(mesh_from("cube"), "Ghost").is_holdout = True
-    with pytest.raises(NotModelledError, match="'Ghost' can't be modelled, a holdout"):
+    with pytest.raises(NotModelledError, match="'Ghost' can't be modeled, a holdout"):
         jobs.export(Job(strict=True))
 
 
@@ -339,7 +339,7 @@ def test_hair_and_volumes_are_skipped_on_both_sides(add, monkey, both_sides):
     sides.check()
     assert (entry(sides.exported, monkey.name).status, entry(sides.exported, monkey.name).reason) == (
         "approximated",
-        "particle hair is not modelled",
+        "particle hair is not modeled",
     )
     assert entry(sides.exported, "Curves").status == entry(sides.exported, "Volume").status == "skipped"
     assert isinstance(next(iter(sides.exported.geometries.values())), Mesh)
@@ -433,13 +433,13 @@ def folded(mesh_from, seed, kinds):
             new = len(places), len(places) + 1
             places += above
             faces.append((first, second, new[1], new[0]) if "fins" in kinds else (first, *new))
-    made = bpy.data.meshes.new("Folded")
-    made.from_pydata(places, [], faces)
-    made.polygons.foreach_set("use_smooth", ["flat faces" not in kinds or draw.random() > 0.1 for _ in faces])
-    for edge in made.edges if "sharp edges" in kinds else ():
+    folded_mesh = bpy.data.meshes.new("Folded")
+    folded_mesh.from_pydata(places, [], faces)
+    folded_mesh.polygons.foreach_set("use_smooth", ["flat faces" not in kinds or draw.random() > 0.1 for _ in faces])
+    for edge in folded_mesh.edges if "sharp edges" in kinds else ():
         edge.use_edge_sharp = draw.random() < 0.15
-    made.update()
-    return made
+    folded_mesh.update()
+    return folded_mesh
 
 
 FOLDS = [
@@ -557,9 +557,9 @@ def test_real_models(scene, camera, both_sides, models_folder, name):
     model.data.polygons.foreach_set("use_smooth", [True] * len(model.data.polygons))
     scene.render.resolution_x, scene.render.resolution_y = 640, 480
     corners = np.array([model.matrix_world @ Vector(corner) for corner in model.bound_box])
-    centre, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
+    center, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
     group = camera.virtual_pinhole
-    group.look_at, group.eye, group.distance = centre, centre + size * np.array((0.9, -1.8, 0.9)), 640
+    group.look_at, group.eye, group.distance = center, center + size * np.array((0.9, -1.8, 0.9)), 640
     group.enabled = True
     camera.data.clip_start, camera.data.clip_end = size / 100, size * 100
     both_sides().check()

@@ -30,11 +30,11 @@ def monkey(scene, camera_object):
 @pytest.fixture
 def material(monkey):
     """The monkey's material: a Principled surface, and nothing else."""
-    made = bpy.data.materials.new("Skin")
-    if not made.node_tree:  # new materials have one from 5.0 on
-        made.use_nodes = True
-    monkey.data.materials.append(made)
-    return made
+    material = bpy.data.materials.new("Skin")
+    if not material.node_tree:  # new materials have one from 5.0 on
+        material.use_nodes = True
+    monkey.data.materials.append(material)
+    return material
 
 
 def add_node(material, kind, output, socket, node="Material Output"):
@@ -131,8 +131,8 @@ def test_a_box_of_fog_is_left_out_on_both_sides(monkey, material, both_sides):
     box.data.materials.append(fog)
     sides = both_sides()
     sides.check()
-    told = {entry.object: (entry.status, entry.reason) for entry in sides.exported.ledger}
-    assert told[box.name] == ("skipped", "material 'Fog' is a volume without a surface, which is not modelled")
+    reasons = {entry.object: (entry.status, entry.reason) for entry in sides.exported.ledger}
+    assert reasons[box.name] == ("skipped", "material 'Fog' is a volume without a surface, which is not modeled")
     assert [placed.name for placed in sides.exported.objects] == [monkey.name]
     assert fog.node_tree.nodes.get("Transparent BSDF") is None
 
@@ -161,9 +161,9 @@ def test_a_lamp_shines_through_a_box_of_fog_on_both_sides(monkey, material, add_
     make_volume_only(fog)
     bpy.context.object.data.materials.append(fog)
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=16), [tmp_path / "lit.exr"])
-    (theirs,) = read_passes([tmp_path / "lit.exr"])
-    ours = render.render(exported, "direct", 16, threads=2)
-    means = [passes["Combined"][..., :3].mean() for passes in (ours, theirs)]
+    (cycles_passes,) = read_passes([tmp_path / "lit.exr"])
+    traced = render.render(exported, "direct", 16, threads=2)
+    means = [passes["Combined"][..., :3].mean() for passes in (traced, cycles_passes)]
     assert means[0] > 0.05 and means[0] == pytest.approx(means[1], rel=0.05), means  # 16 samples of 1,024 pixels
 
 
@@ -308,7 +308,7 @@ def test_grease_pencil_is_skipped(monkey, both_sides, opengl):
     sides = both_sides()
     sides.check()
     (entry,) = [entry for entry in sides.exported.ledger if entry.object == pencil.name]
-    assert (entry.status, entry.reason) == ("skipped", "Grease Pencil is not modelled")
+    assert (entry.status, entry.reason) == ("skipped", "Grease Pencil is not modeled")
 
 
 def test_what_geometry_nodes_make_without_a_material(monkey, both_sides):
@@ -347,13 +347,13 @@ def test_triangles_that_lie_exactly_where_others_do_are_told(monkey, scene, add_
     from viewcam_addon.blender.jobs import renderer as jobs
     from viewcam_addon.jobs.job import Job
 
-    def told(level="direct"):
+    def reasons(level="direct"):
         ledger = jobs.export(Job(level=level)).ledger
         assert all(entry.status == "exported" for entry in ledger), "where it matters is the comparison's to find"
         return [entry.reason for entry in ledger if "lie exactly" in entry.reason]
 
     add_lamp("SUN")
-    assert not told()
+    assert not reasons()
     double = monkey.copy()
     if kind != "shared data":
         double.data = monkey.data.copy()
@@ -362,18 +362,18 @@ def test_triangles_that_lie_exactly_where_others_do_are_told(monkey, scene, add_
         with bpy.context.temp_override(active_object=monkey, selected_editable_objects=[monkey, double]):
             bpy.ops.object.join()
     for level in ("direct", "geometry"):
-        (reason,) = told(level)
+        (reason,) = reasons(level)
         assert ("others of it" if kind == "one mesh" else "those of") in reason
     if kind != "one mesh":
         double.location.x += 1e-5
-        assert not told()
+        assert not reasons()
 
 
 def test_instances_in_one_place_and_doubles_within_them_are_told(monkey, scene, add):
     from viewcam_addon.blender.jobs import renderer as jobs
     from viewcam_addon.jobs.job import Job
 
-    def told():
+    def reasons():
         reasons = [entry.reason for entry in jobs.export(Job(level="geometry")).ledger]
         return [clause.partition(":")[0] for reason in reasons for clause in reason.split("; ") if "lie exactly" in clause]
 
@@ -386,9 +386,9 @@ def test_instances_in_one_place_and_doubles_within_them_are_told(monkey, scene, 
     collection.objects.link(monkey)
     instance(1, (1, 0, 0))
     instance(2, (-1, 0, 0))
-    assert not told()
+    assert not reasons()
     instance(3, (1, 0, 0))
-    assert told() == ["1 instances lie exactly where others of it do"]
+    assert reasons() == ["1 instances lie exactly where others of it do"]
     bpy.data.objects["Place 3"].location.x = 0
     with bpy.context.temp_override():
         mesh = monkey.data
@@ -400,7 +400,7 @@ def test_instances_in_one_place_and_doubles_within_them_are_told(monkey, scene, 
         twins = [[index + count for index in face] for face in faces[:5]]
         doubled.from_pydata(np.tile(vertices.reshape(-1, 3), (2, 1)).tolist(), [], faces + twins)
         monkey.data = doubled
-    (reason,) = told()
+    (reason,) = reasons()
     assert reason.endswith("triangles lie exactly where others of it do") and 5 <= int(reason.split()[0]) <= 10
 
 
@@ -420,10 +420,10 @@ def test_triangles_of_a_lattice_are_no_doubles_of_one_another(scene, add_lamp, a
     add(mesh, "Lattice")
     add_lamp("SUN")
 
-    def told():
+    def reasons():
         return [entry.reason for entry in jobs.export(Job(level="direct")).ledger if "lie exactly" in entry.reason]
 
-    assert len(mesh.polygons) > 30_000 and not told()
+    assert len(mesh.polygons) > 30_000 and not reasons()
 
 
 # --- Surfaces in one place and things of a pixel, rendered by Cycles: either is right, and each has its own slope
@@ -543,9 +543,9 @@ def test_whichever_surface_cycles_had_shown_would_have_been_right_and_no_third_o
     def compared(test):
         return geometry.compare(Image(sides.traced), Image(test), camera, tracer.surfaces_at)
 
-    found = compared(other)
-    assert found.passed and set(found.in_one_place.pairs()) == {pair}, "\n".join(found.lines())
-    row, column = found.in_one_place.rows[0], found.in_one_place.columns[0]
+    comparison = compared(other)
+    assert comparison.passed and set(comparison.in_one_place.pairs()) == {pair}, "\n".join(comparison.lines())
+    row, column = comparison.in_one_place.rows[0], comparison.in_one_place.columns[0]
     wrong = {**other, "Material Index": other["Material Index"].copy()}
     wrong["Material Index"][row, column] += 7
     assert not compared(wrong).passed
@@ -579,14 +579,14 @@ def test_things_of_a_pixel_are_the_same_picture(both_sides, sheet, add, mesh_fro
         add(mesh, f"{kind.__name__} {number}", location=random.uniform(-2, 2, 3).tolist(), rotation_euler=rotation)
     sides = both_sides()
     sides.check()
-    shown = np.flatnonzero(sides.traced["Object Index"] > 0)
+    pixels = np.flatnonzero(sides.traced["Object Index"] > 0)
     off = {name: values.copy() for name, values in sides.cycles.items()}
-    off["UV"].reshape(-1, off["UV"].shape[-1])[shown, :2] += np.float32(apart)
+    off["UV"].reshape(-1, off["UV"].shape[-1])[pixels, :2] += np.float32(apart)
     tracer = render.Tracer(sides.exported, 2)
-    found = geometry.compare(Image(sides.traced), Image(off), sides.exported.camera, tracer.surfaces_at)
-    assert not found.passed, "\n".join(found.lines())
+    comparison = geometry.compare(Image(sides.traced), Image(off), sides.exported.camera, tracer.surfaces_at)
+    assert not comparison.passed, "\n".join(comparison.lines())
     flipped = replace(Image(sides.cycles), passes={**sides.cycles, "Normal": sides.cycles["Normal"].copy()})
-    flipped["Normal"].reshape(-1, 3)[shown[len(shown) // 2]] *= -1
+    flipped["Normal"].reshape(-1, 3)[pixels[len(pixels) // 2]] *= -1
     assert not geometry.compare(Image(sides.traced), flipped, sides.exported.camera, tracer.surfaces_at).passed
 
 

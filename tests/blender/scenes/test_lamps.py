@@ -25,8 +25,8 @@ def export():
 
     def make():
         exported = jobs.export(Job(level="direct"))
-        told = {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
-        return exported.lamps, told
+        reasons = {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
+        return exported.lamps, reasons
 
     return make
 
@@ -37,16 +37,16 @@ def close(values):
 
 def test_a_sun_shines_along_its_axis(add_lamp, export):
     add_lamp("SUN", rotation=(0.5, 0, 0), energy=3.0, color=(1, 0.5, 0.25), angle=0.1)
-    ((sun,), told) = export()
-    assert isinstance(sun, Sun) and not told and sun.casts_shadow and not sun.hidden_from
+    ((sun,), reasons) = export()
+    assert isinstance(sun, Sun) and not reasons and sun.casts_shadow and not sun.hidden_from
     assert sun.irradiance == close((3.0, 1.5, 0.75)) and sun.angle == close(0.1)
     assert sun.towards == close((0.0, -math.sin(0.5), math.cos(0.5)))
 
 
 def test_a_point_keeps_its_radius_under_scale(add_lamp, export):
     add_lamp("POINT", (1, 2, 3), energy=100.0, shadow_soft_size=0.25, use_soft_falloff=False).scale = (5, 5, 5)
-    ((point,), told) = export()
-    assert isinstance(point, Point) and not told
+    ((point,), reasons) = export()
+    assert isinstance(point, Point) and not reasons
     assert (point.position, point.radius, point.power) == ((1.0, 2.0, 3.0), 0.25, (100.0,) * 3)
     assert not point.soft_falloff
 
@@ -54,8 +54,8 @@ def test_a_point_keeps_its_radius_under_scale(add_lamp, export):
 def test_a_spot_brings_its_whole_matrix(add_lamp, export):
     block = add_lamp("SPOT", (1, 2, 3), (0.1, 0.2, 0.3), spot_size=1.2, spot_blend=0.4, shadow_soft_size=0.0)
     block.scale = (1, 2, 3)
-    ((spot,), told) = export()
-    assert isinstance(spot, Spot) and not told
+    ((spot,), reasons) = export()
+    assert isinstance(spot, Spot) and not reasons
     assert (spot.angle, spot.blend, spot.radius) == (close(1.2), close(0.4), 0.0)
     assert spot.matrix == pytest.approx(np.array(block.matrix_world), abs=1e-6)
 
@@ -66,8 +66,8 @@ def test_a_spot_brings_its_whole_matrix(add_lamp, export):
 )
 def test_an_area_light_has_one_of_four_shapes(add_lamp, export, shape, size, ellipse):
     add_lamp("AREA", shape=shape, size=2.0, size_y=3.0, energy=10.0)
-    ((area,), told) = export()
-    assert isinstance(area, Area) and not told
+    ((area,), reasons) = export()
+    assert isinstance(area, Area) and not reasons
     assert (area.size, area.ellipse, area.power) == (size, ellipse, (10.0,) * 3)
 
 
@@ -103,8 +103,8 @@ def test_lights_without_a_size_are_strong_without_an_area(add_lamp, export):
 def test_what_a_light_hides_from_and_whether_it_casts_shadows(add_lamp, export):
     block = add_lamp("SUN", angle=0.0, use_shadow=False)
     block.visible_camera = block.visible_glossy = False
-    ((sun,), told) = export()
-    assert sun.hidden_from == {"camera", "glossy"} and not sun.casts_shadow and not told
+    ((sun,), reasons) = export()
+    assert sun.hidden_from == {"camera", "glossy"} and not sun.casts_shadow and not reasons
 
 
 def test_lights_come_through_instances_and_parents(add_lamp, export, add):
@@ -115,8 +115,8 @@ def test_lights_come_through_instances_and_parents(add_lamp, export, add):
     for x in (10, 20):
         empty = add(None, f"At {x}", (x, 0, 0))
         empty.instance_type, empty.instance_collection = "COLLECTION", collection
-    lamps, told = export()
-    assert sorted(lamp.position for lamp in lamps) == [(11.0, 0.0, 0.0), (21.0, 0.0, 0.0)] and not told
+    lamps, reasons = export()
+    assert sorted(lamp.position for lamp in lamps) == [(11.0, 0.0, 0.0), (21.0, 0.0, 0.0)] and not reasons
 
 
 def test_nothing_comes_of_lights_that_give_none(add_lamp, export):
@@ -138,8 +138,8 @@ def test_a_constant_emission_is_a_factor(add_lamp, export):
     block = add_lamp("POINT", energy=10.0)
     emission = next(node for node in use_nodes(block.data).nodes if node.type == "EMISSION")
     emission.inputs["Color"].default_value, emission.inputs["Strength"].default_value = (1, 0.5, 0.25, 1), 3.0
-    ((point,), told) = export()
-    assert point.power == close((30.0, 15.0, 7.5)) and not told
+    ((point,), reasons) = export()
+    assert point.power == close((30.0, 15.0, 7.5)) and not reasons
 
 
 def test_emissions_are_mixed_and_added_and_fall_off_as_light_does(add_lamp, export):
@@ -152,15 +152,15 @@ def test_emissions_are_mixed_and_added_and_fall_off_as_light_does(add_lamp, expo
     for number, shader in enumerate((first, second), start=1):
         tree.links.new(shader.outputs[0], mixed.inputs[number])
     tree.links.new(mixed.outputs[0], next(node for node in tree.nodes if node.type == "OUTPUT_LIGHT").inputs["Surface"])
-    ((point,), told) = export()
-    assert point.power == close((30.0, 32.5, 30.0)) and not told
+    ((point,), reasons) = export()
+    assert point.power == close((30.0, 32.5, 30.0)) and not reasons
     twice = tree.nodes.new("ShaderNodeMath")
     twice.operation, twice.inputs[0].default_value, twice.inputs[1].default_value = "MULTIPLY", 2.0, 4.0
     tree.links.new(twice.outputs[0], falloff.inputs["Strength"])
     assert export()[0][0].power == close((60.0, 62.5, 60.0))
     falloff.inputs["Smooth"].default_value = 1.0
-    ((point,), told) = export()
-    assert not told and point.emission is not None
+    ((point,), reasons) = export()
+    assert not reasons and point.emission is not None
 
 
 def test_whatever_nodes_make_the_same_everywhere_colours_a_lamp(add_lamp, export):
@@ -170,11 +170,11 @@ def test_whatever_nodes_make_the_same_everywhere_colours_a_lamp(add_lamp, export
     warm.inputs[0].default_value, half.inputs["Gamma"].default_value = 2000.0, 0.5
     tree.links.new(warm.outputs[0], half.inputs["Color"])
     tree.links.new(half.outputs[0], emission.inputs["Color"])
-    ((point,), told) = export()
+    ((point,), reasons) = export()
     red, green, blue = (power / 10 for power in point.power)
-    assert not told and red > green > blue > 0
-    shown = constant_value(node("blackbody", temperature=2000.0))[0]
-    assert (red**2, green**2, blue**2) == pytest.approx(shown, rel=1e-12)
+    assert not reasons and red > green > blue > 0
+    temperature_color = constant_value(node("blackbody", temperature=2000.0))[0]
+    assert (red**2, green**2, blue**2) == pytest.approx(temperature_color, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -186,13 +186,13 @@ def test_whatever_nodes_make_the_same_everywhere_colours_a_lamp(add_lamp, export
         ("LightPath", "Ray Depth", "says the Ray Depth of a light"),
         ("ObjectInfo", "Random", "says the Random of a light"),
         ("NewGeometry", "Pointiness", "says the Pointiness of a light"),
-        ("TexSky", "Color", "'Sky Texture' that is not modelled"),
+        ("TexSky", "Color", "'Sky Texture' that is not modeled"),
     ],
 )
 def test_what_a_lamps_nodes_say_that_is_not_modelled_is_named(add_lamp, export, kind, output, words):
     attach(add_lamp("SUN"), kind, output)
-    told = export()[1]["Lamp"]
-    assert words in told and "plain light" in told
+    reasons = export()[1]["Lamp"]
+    assert words in reasons and "plain light" in reasons
 
 
 @pytest.mark.parametrize(
@@ -208,11 +208,11 @@ def test_what_a_lamps_nodes_say_that_is_not_modelled_is_named(add_lamp, export, 
 def test_what_makes_a_lamp_uneven_is_its_emission(add_lamp, export, kind, output, type):
     """The lamp keeps its own strength, which the node multiplies."""
     lamp = add_lamp("POINT", energy=10.0)
-    made = attach(lamp, kind, output, "Color")
+    socket = attach(lamp, kind, output, "Color")
     if kind == "TexImage":
-        made.image = bpy.data.images.new("Gobo", 2, 2)
-    ((point,), told) = export()
-    assert not told and point.power == (10.0,) * 3 and point.emission.type == type
+        socket.image = bpy.data.images.new("Gobo", 2, 2)
+    ((point,), reasons) = export()
+    assert not reasons and point.power == (10.0,) * 3 and point.emission.type == type
 
 
 @pytest.mark.parametrize(("scale", "words"), [(1e-30, "nodes that are too much"), (0.0, None)])
@@ -220,16 +220,16 @@ def test_a_lamp_that_is_scaled_to_nothing_has_no_nodes(add_lamp, export, scale, 
     lamp = add_lamp("POINT")
     attach(lamp, "TexCoord", "UV")
     lamp.scale = (scale,) * 3
-    ((point,), told) = export()
-    assert point.emission is None and (words is None or words in told["Lamp"])
+    ((point,), reasons) = export()
+    assert point.emission is None and (words is None or words in reasons["Lamp"])
 
 
 def attach(block, kind, output, to="Strength"):
     tree = use_nodes(block.data)
     emission = next(node for node in tree.nodes if node.type == "EMISSION")
-    made = tree.nodes.new(f"ShaderNode{kind}")
-    tree.links.new(made.outputs[output], emission.inputs[to])
-    return made
+    new_node = tree.nodes.new(f"ShaderNode{kind}")
+    tree.links.new(new_node.outputs[output], emission.inputs[to])
+    return new_node
 
 
 APPROXIMATED = {
@@ -246,15 +246,15 @@ def test_what_is_approximated_is_told(add_lamp, export, what):
     bpy.context.scene.cycles.max_bounces = 12
     block = add_lamp("AREA")
     change(block)
-    (_, told) = export()
-    assert words in told["Lamp"], told
+    (_, reasons) = export()
+    assert words in reasons["Lamp"], reasons
 
 
 @pytest.mark.parametrize("energy", [-1.0, float("nan"), 1e30])
 def test_strengths_that_light_can_not_have_are_left_out(add_lamp, export, energy):
     add_lamp("POINT", energy=energy)
-    lamps, told = export()
-    assert not lamps and "strength" in told["Lamp"]
+    lamps, reasons = export()
+    assert not lamps and "strength" in reasons["Lamp"]
 
 
 def test_a_sheared_area_light_is_told(add_lamp, export, add):

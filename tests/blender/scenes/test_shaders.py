@@ -9,8 +9,8 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.scenes import materials, shaders
 from viewcam_addon.blender.temporary_settings import overridden
-from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material
-from viewcam_addon.tracer.scene.shader_nodes import KINDS, Node, node
+from viewcam_addon.tracer.scene.materials import PLAIN_COLOR, Colour, Material, sum_of
+from viewcam_addon.tracer.scene.shader_nodes import KINDS, SHADERS, Node, node
 
 RED, GREEN = (0.5, 0.25, 0.125), (0.0, 1.0, 0.5)
 
@@ -132,11 +132,11 @@ VALUES = [
 
 @pytest.mark.parametrize("value", VALUES)
 def test_the_stand_in_of_a_value_is_read_as_that_value(diffuse, image, value):
-    made = Material(surface=node("emission", color=value, strength=2.0))
+    material = Material(surface=node("emission", color=value, strength=2.0))
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made, {"Checks": image}))
+        materials.stand_in(overrides, diffuse, shaders.Reading(material, {"Checks": image}))
         read = exactly(diffuse)
-    assert read == made
+    assert read == material
 
 
 def test_every_node_that_makes_values_is_made_for_blender():
@@ -148,26 +148,30 @@ def test_every_node_that_makes_values_is_made_for_blender():
 
 def test_an_ies_text_is_made_for_blender_and_gone_with_the_stand_in(diffuse):
     text = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 100\n0 90\n0\n100 50\n"
-    made = Material(surface=node("emission", color=node("ies", text=text, strength=0.5)))
+    material = Material(surface=node("emission", color=node("ies", text=text, strength=0.5)))
     before = len(bpy.data.texts)
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made))
+        materials.stand_in(overrides, diffuse, shaders.Reading(material))
         read = shaders.read(diffuse)
         assert len(bpy.data.texts) == before + 1
-    assert not read.reasons and read.material == made and len(bpy.data.texts) == before
+    assert not read.reasons and read.material == material and len(bpy.data.texts) == before
 
 
 def test_a_displacement_is_read_as_the_height_that_it_is_made_of(diffuse):
     """And as what it is made into along the normal, where it is a Vector Displacement, or goes along other axes."""
     height = node("noise", vector=node("texture_coordinate"), scale=3.0)
-    made = Material(diffuse=Colour(RED), displacement=height)
+    material = sum_of(diffuse=Colour(RED), displacement=height)
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made))
-        assert exactly(diffuse) == made
+        materials.stand_in(overrides, diffuse, shaders.Reading(material))
+        assert exactly(diffuse) == material
         raised = next(each for each in diffuse.node_tree.nodes if each.type == "DISPLACEMENT")
         raised.space, raised.inputs["Midlevel"].default_value, raised.inputs["Scale"].default_value = "OBJECT", 0.5, 0.25
-        found = exactly(diffuse).displacement
-        assert (found["operation"], found["b"].type, found["a"]["b"]) == ("multiply", "vector_math", (0.25,) * 3)
+        read_height = exactly(diffuse).displacement
+        assert (read_height["operation"], read_height["b"].type, read_height["a"]["b"]) == (
+            "multiply",
+            "vector_math",
+            (0.25,) * 3,
+        )
         diffuse.displacement_method = "BOTH"
         assert exactly(diffuse).displacement is None and materials.departures(diffuse, lit=True) == ["is displaced"]
         diffuse.displacement_method = "BUMP"
@@ -187,13 +191,13 @@ def test_curves_are_drawn_that_have_the_table_again(diffuse, image, kind, extrap
     table.pixels.foreach_set(np.append(wanted, np.ones((1, 257, 1), np.float32), axis=2).ravel())
     settings = {"table": Colour((1.0, 1.0, 1.0), "Table"), "least": -0.25, "most": 1.5, "extrapolate": extrapolate}
     value = node(kind, **{CURVES[kind]: CHECKS}, factor=0.75, **settings)
-    made = Material(surface=node("emission", color=value))
+    material = Material(surface=node("emission", color=value))
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made, {"Checks": image, "Table": table}))
+        materials.stand_in(overrides, diffuse, shaders.Reading(material, {"Checks": image, "Table": table}))
         read = shaders.read(diffuse)
-    found = read.material.surface["color"]
-    assert not read.reasons and {**dict(found.inputs), "table": None} == {**dict(value.inputs), "table": None}
-    assert read.tables[found["table"].image].pixels == pytest.approx(wanted, abs=2e-5)
+    read_color = read.material.surface["color"]
+    assert not read.reasons and {**dict(read_color.inputs), "table": None} == {**dict(value.inputs), "table": None}
+    assert read.tables[read_color["table"].image].pixels == pytest.approx(wanted, abs=2e-5)
 
 
 def test_what_light_path_says_of_light_is_named_where_both_ways_to_find_it_are_told_otherwise(diffuse, make_material):
@@ -214,16 +218,16 @@ def test_what_light_path_says_of_light_is_named_where_both_ways_to_find_it_are_t
 def test_a_value_of_more_nodes_than_are_followed_is_named(diffuse, count, both, words):
     """Each of them feeds the next; or both of its inputs, so that 2^count are asked for."""
     tree = diffuse.node_tree
-    made = tree.nodes.new("ShaderNodeTexCoord").outputs["UV"]
+    value = tree.nodes.new("ShaderNodeTexCoord").outputs["UV"]
     for number in range(count):
         node = tree.nodes.new("ShaderNodeMath")
         for socket in node.inputs[: 1 + both]:
-            tree.links.new(made, socket)
-        made = node.outputs[0]
+            tree.links.new(value, socket)
+        value = node.outputs[0]
         if number == 6:
-            tree.links.new(made, tree.nodes["Shader"].inputs["Color"])
+            tree.links.new(value, tree.nodes["Shader"].inputs["Color"])
             exactly(diffuse)
-    tree.links.new(made, tree.nodes["Shader"].inputs["Color"])
+    tree.links.new(value, tree.nodes["Shader"].inputs["Color"])
     approximately(diffuse, "Math", words)
 
 
@@ -235,7 +239,7 @@ def test_a_normal_node_is_its_direction_and_how_far_another_goes_along_it(diffus
     assert exactly(diffuse).surface["color"] == node("vector_math", operation="dot_product", **unit)
 
 
-@pytest.mark.parametrize("surface", [TEXTURED, *(node(kind) for kind in shaders.SHADERS if kind not in ("mix", "add"))])
+@pytest.mark.parametrize("surface", [TEXTURED, *(node(kind) for kind in SHADERS if kind not in ("mix", "add"))])
 def test_the_stand_in_of_a_shader_is_read_as_that_shader(diffuse, image, surface):
     if surface.type == "metallic" and bpy.app.version < (4, 3):
         return  # it came with 4.3
@@ -244,10 +248,10 @@ def test_the_stand_in_of_a_shader_is_read_as_that_shader(diffuse, image, surface
         read = exactly(diffuse)
     if surface.type in ("diffuse", "emission", "glass", "refraction"):  # which are components while they are not rough
         read = Material(surface=read.closures[0].node)
-    for found, wanted in zip(read.closures, Material(surface=surface).closures, strict=True):
-        assert (found.node.type, found.factors) == (wanted.node.type, wanted.factors)
+    for read_closure, wanted in zip(read.closures, Material(surface=surface).closures, strict=True):
+        assert (read_closure.node.type, read_closure.factors) == (wanted.node.type, wanted.factors)
         for name in KINDS[wanted.node.type].inputs:
-            assert name == "distribution" or rounded(found.node[name]) == rounded(wanted.node[name]), name
+            assert name == "distribution" or rounded(read_closure.node[name]) == rounded(wanted.node[name]), name
 
 
 def rounded(colour):
@@ -263,15 +267,15 @@ def diffuse(make_material):
 
 
 def test_the_shaders_that_are_components_are_read_as_they_are(make_material):
-    assert exactly(make_material("d", "ShaderNodeBsdfDiffuse", Color=colour(RED))) == Material(diffuse=Colour(RED))
+    assert exactly(make_material("d", "ShaderNodeBsdfDiffuse", Color=colour(RED))) == sum_of(diffuse=Colour(RED))
     emission = make_material("e", "ShaderNodeEmission", Color=colour(RED), Strength=4.0)
-    assert exactly(emission) == Material(emission=Colour((2.0, 1.0, 0.5)))
+    assert exactly(emission) == sum_of(emission=Colour((2.0, 1.0, 0.5)))
     mirror = make_material("m", "ShaderNodeBsdfGlossy", Color=colour(RED), Roughness=0.0)
-    assert exactly(mirror) == Material(mirror=Colour(RED))
+    assert exactly(mirror) == sum_of(mirror=Colour(RED))
     glass = make_material("g", "ShaderNodeBsdfGlass", Color=colour(RED), Roughness=0.0, IOR=1.5)
-    assert exactly(glass) == Material(glass=Colour(RED), ior=1.5)
+    assert exactly(glass) == sum_of(glass=Colour(RED), ior=1.5)
     clear = make_material("r", "ShaderNodeBsdfRefraction", Color=colour(RED), Roughness=0.0, IOR=1.25)
-    assert exactly(clear) == Material(refraction=Colour(RED), ior=1.25)
+    assert exactly(clear) == sum_of(refraction=Colour(RED), ior=1.25)
 
 
 @pytest.mark.parametrize(("socket", "value"), [("Specular IOR Level", 0.0), ("IOR", 1.0)])
@@ -279,9 +283,9 @@ def test_a_principled_surface_without_gloss_is_lamberts(make_material, socket, v
     material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED), Roughness=0.3, Anisotropic=0.5)
     inputs = material.node_tree.nodes["Shader"].inputs
     inputs[socket].default_value = value
-    assert exactly(material) == Material(diffuse=Colour(RED))
+    assert exactly(material) == sum_of(diffuse=Colour(RED))
     inputs["Emission Color"].default_value, inputs["Emission Strength"].default_value = colour(GREEN), 2.0
-    assert exactly(material) == Material(diffuse=Colour(RED), emission=Colour((0.0, 2.0, 1.0)))
+    assert exactly(material) == sum_of(diffuse=Colour(RED), emission=Colour((0.0, 2.0, 1.0)))
 
 
 PRINCIPLED = {
@@ -303,7 +307,7 @@ PRINCIPLED = {
 def test_a_principled_surface_is_read_with_what_it_is_given(make_material, name):
     material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED))
     inputs = material.node_tree.nodes["Shader"].inputs
-    socket = shaders.SHADERS["principled"].inputs[name]
+    socket = SHADERS["principled"].inputs[name]
     if socket not in inputs:  # Diffuse Roughness came with 4.3
         assert socket == "Diffuse Roughness" and bpy.app.version < (4, 3)
         return
@@ -323,7 +327,7 @@ def test_what_a_principled_surface_is_beyond_that_is_named_and_left_out(make_mat
 
 @pytest.mark.parametrize("kind", ["diffuse", "glossy", "glass", "refraction"])
 def test_rough_shaders_are_read_as_shaders(make_material, kind):
-    material = make_material("rough", shaders.SHADERS[kind].class_name, Color=colour(RED), Roughness=0.25)
+    material = make_material("rough", SHADERS[kind].class_name, Color=colour(RED), Roughness=0.25)
     read = exactly(material).surface
     assert read.type == kind and read["color"] == Colour(RED) and read["roughness"] == Colour((0.25,) * 3)
 
@@ -367,12 +371,12 @@ def test_shaders_are_mixed_and_added_by_constant_factors(diffuse):
     mixed = add_shader(diffuse, "ShaderNodeMixShader", (1, nodes["Shader"]), (2, added))
     mixed.inputs[0].default_value = 0.25
     show(diffuse, mixed)
-    assert exactly(diffuse) == Material(
+    assert exactly(diffuse) == sum_of(
         diffuse=Colour((0.375, 0.1875, 0.09375)), emission=Colour((0.5,) * 3), mirror=Colour((0.0, 0.25, 0.125))
     )
     both = add_shader(diffuse, "ShaderNodeAddShader", (0, mixed), (1, nodes["Shader"]))
     show(diffuse, both)
-    assert exactly(diffuse).diffuse == Colour((0.875, 0.4375, 0.21875)), "two of a kind add up"
+    assert exactly(diffuse).surface["first"]["second"]["color"] == Colour((0.875, 0.4375, 0.21875)), "two of a kind add up"
 
 
 @pytest.mark.parametrize(("factor", "left"), [(0.0, "first"), (-1.0, "first"), (1.0, "second"), (7.0, "second")])
@@ -382,7 +386,7 @@ def test_what_has_no_weight_in_a_mixture_is_not_looked_at(diffuse, factor, left)
     mixed = add_shader(diffuse, "ShaderNodeMixShader", *enumerate(pair if left == "first" else pair[::-1], start=1))
     mixed.inputs[0].default_value = factor
     show(diffuse, mixed)
-    assert exactly(diffuse) == Material(diffuse=Colour(RED))
+    assert exactly(diffuse) == sum_of(diffuse=Colour(RED))
 
 
 @pytest.mark.parametrize(("socket", "weight"), [("Coat Roughness", "Coat Weight"), ("Sheen Tint", "Sheen Weight")])
@@ -391,7 +395,7 @@ def test_what_makes_an_input_that_does_not_count_is_not_followed(make_material, 
     link(material, "ShaderNodeAmbientOcclusion", 0, socket)
     exactly(material)
     material.node_tree.nodes["Shader"].inputs[weight].default_value = 0.5
-    approximately(material, "'Ambient Occlusion'", "not modelled")
+    approximately(material, "'Ambient Occlusion'", "not modeled")
 
 
 @pytest.mark.parametrize("kind", ["AmbientOcclusion", "TexGabor", "RadialTiling", "TexSky", "Bevel"])
@@ -400,7 +404,7 @@ def test_a_texture_that_is_not_modelled_leaves_the_color_of_the_viewport_and_is_
         pytest.skip(f"Blender {bpy.app.version_string} has no {kind}")
     diffuse.diffuse_color = (*RED, 1.0)
     link(diffuse, f"ShaderNode{kind}", 0, "Color")
-    assert approximately(diffuse, "not modelled") == Material(diffuse=Colour(RED))
+    assert approximately(diffuse, "not modeled") == sum_of(diffuse=Colour(RED))
 
 
 def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
@@ -408,20 +412,20 @@ def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
     mixed.name = "Blend"
     link(diffuse, "ShaderNodeAmbientOcclusion", 0, 0, "Blend")
     show(diffuse, mixed)
-    (closure,) = approximately(diffuse, "'Ambient Occlusion'", "not modelled").closures
+    (closure,) = approximately(diffuse, "'Ambient Occlusion'", "not modeled").closures
     assert closure.node["color"] == Colour(tuple(value / 2 for value in RED)) and not closure.factors
 
 
 def test_other_shaders_are_lamberts_of_their_colour(make_material):
     toon = make_material("t", "ShaderNodeBsdfToon", Color=colour(RED))
-    assert approximately(toon, "'Shader'", "not modelled") == Material(diffuse=Colour(RED))
+    assert approximately(toon, "'Shader'", "not modeled") == sum_of(diffuse=Colour(RED))
 
 
 def test_what_has_no_colour_has_the_viewports(make_material):
     unknown = make_material("s", "ShaderNodeBsdfDiffuse")
     link(unknown, "ShaderNodeAmbientOcclusion", 0, "Color").name = "Wires"
     unknown.diffuse_color = colour(GREEN)
-    assert approximately(unknown, "'Wires'", "not modelled") == Material(diffuse=Colour(GREEN))
+    assert approximately(unknown, "'Wires'", "not modeled") == sum_of(diffuse=Colour(GREEN))
 
 
 def test_constant_nodes_reroutes_muted_nodes_and_groups_are_looked_through(diffuse):
@@ -445,29 +449,29 @@ def test_constant_nodes_reroutes_muted_nodes_and_groups_are_looked_through(diffu
     tree.links.new(muted.outputs[0], reroute.inputs[0])
     tree.links.new(reroute.outputs[0], node.inputs["Tint"])
     show(diffuse, node)
-    assert exactly(diffuse) == Material(emission=Colour((1.0, 0.5, 0.25)))
+    assert exactly(diffuse) == sum_of(emission=Colour((1.0, 0.5, 0.25)))
 
 
 def test_a_value_is_a_grey_and_a_colour_has_a_luminance(make_material):
     material = make_material("e", "ShaderNodeEmission")
     link(material, "ShaderNodeValue", 0, "Color").outputs[0].default_value = 0.5
     link(material, "ShaderNodeRGB", 0, "Strength").outputs[0].default_value = colour((0.0, 1.0, 0.0))
-    assert exactly(material).emission.rgb == pytest.approx((0.5 * 0.7151687,) * 3)
+    assert exactly(material).surface["color"].rgb == pytest.approx((0.5 * 0.7151687,) * 3)
 
 
 @pytest.fixture
 def image(fresh_blender):
-    made = bpy.data.images.new("Checks", 4, 2)
-    made.pixels.foreach_set([0.5, 0.25, 1.0, 1.0] * 8)
-    return made
+    block = bpy.data.images.new("Checks", 4, 2)
+    block.pixels.foreach_set([0.5, 0.25, 1.0, 1.0] * 8)
+    return block
 
 
 def test_an_image_and_the_meshs_colours_are_factors(diffuse, image):
     texture = link(diffuse, "ShaderNodeTexImage", 0, "Color")
     texture.image, texture.interpolation = image, "Closest"
-    assert exactly(diffuse) == Material(diffuse=Colour((1.0, 1.0, 1.0), "Checks", closest=True))
+    assert exactly(diffuse) == sum_of(diffuse=Colour((1.0, 1.0, 1.0), "Checks", closest=True))
     link(diffuse, "ShaderNodeVertexColor", 0, "Color")
-    assert exactly(diffuse) == Material(diffuse=Colour((1.0, 1.0, 1.0), vertex=True))
+    assert exactly(diffuse) == sum_of(diffuse=Colour((1.0, 1.0, 1.0), vertex=True))
 
 
 @pytest.mark.parametrize(
@@ -508,12 +512,12 @@ def test_colours_that_light_can_not_have_are_named(diffuse, value):
 def test_without_nodes_or_without_an_output_the_viewports_colour_counts(diffuse):
     diffuse.diffuse_color = colour(GREEN)
     diffuse.node_tree.nodes.remove(diffuse.node_tree.nodes["Output"])
-    assert shaders.read(diffuse).material == Material(diffuse=Colour(GREEN))
+    assert shaders.read(diffuse).material == sum_of(diffuse=Colour(GREEN))
 
 
 def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image):
     """What Cycles is shown is what the tracer is given, or the shader below would be another."""
-    made = Material(
+    material = sum_of(
         diffuse=Colour(RED),
         emission=Colour((1.0, 2.0, 3.0)),
         mirror=Colour(GREEN),
@@ -523,24 +527,24 @@ def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image
     )
     before = [node.name for node in diffuse.node_tree.nodes]
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made))
-        assert exactly(diffuse) == made
+        materials.stand_in(overrides, diffuse, shaders.Reading(material))
+        assert exactly(diffuse) == material
     assert [node.name for node in diffuse.node_tree.nodes] == before
-    assert exactly(diffuse) == Material(diffuse=Colour(RED))
+    assert exactly(diffuse) == sum_of(diffuse=Colour(RED))
 
 
 def test_products_of_colours_are_read_as_what_they_stand_for(diffuse, image):
-    made = Material(
+    material = sum_of(
         diffuse=Colour((0.5, 0.25, 0.0), image.name_full, closest=True, vertex=True),
         emission=Colour((4.0, 2.0, 1.0), vertex=True),
         mirror=Colour((0.5, 0.5, 0.5), image.name_full),
     )
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made, {image.name_full: image}))
-        assert exactly(diffuse) == made
+        materials.stand_in(overrides, diffuse, shaders.Reading(material, {image.name_full: image}))
+        assert exactly(diffuse) == material
 
 
 def test_the_plain_material_is_the_tracers(fresh_blender):
     with overridden() as overrides:
-        assert exactly(materials.plain(overrides)).diffuse.rgb == pytest.approx(PLAIN.diffuse.rgb, rel=2.0**-24)
+        assert exactly(materials.plain(overrides)).surface["color"].rgb == pytest.approx(PLAIN_COLOR.rgb, rel=2.0**-24)
     assert not bpy.data.materials

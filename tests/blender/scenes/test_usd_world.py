@@ -36,9 +36,9 @@ def test_a_camera_stands_where_blenders_importer_puts_it(tmp_path, head):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.usd_import(filepath=str(tmp_path / "a.usda"))
     (imported,) = (each for each in bpy.data.objects if each.type == "CAMERA")
-    (ours,) = cameras.read(tmp_path / "a.usda", options=Options(size=(640, 360)))
-    theirs = np.array(imported.matrix_world)
-    away = np.abs(theirs[:3, 3]).max()
-    assert np.abs(theirs[:3, 3] - ours.pinhole.eye).max() < 8 * 2**-24 * away  # a chain of float32 matrices
-    turn = theirs[:3, :3] / np.linalg.norm(theirs[:3, :3], axis=0)
-    assert np.abs(turn.T - np.array(ours.pinhole.axes())).max() < 8 * 2**-24
+    (camera,) = cameras.read(tmp_path / "a.usda", options=Options(size=(640, 360)))
+    matrix = np.array(imported.matrix_world)
+    away = np.abs(matrix[:3, 3]).max()
+    assert np.abs(matrix[:3, 3] - camera.pinhole.eye).max() < 8 * 2**-24 * away  # a chain of float32 matrices
+    turn = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    assert np.abs(turn.T - np.array(camera.pinhole.axes())).max() < 8 * 2**-24

@@ -31,14 +31,14 @@ def background_of(world):
 
 def test_no_world_is_dark(scene, export):
     scene.world = None
-    exported, told = export()
-    assert exported.world == World() and not told
+    exported, reasons = export()
+    assert exported.world == World() and not reasons
 
 
 def test_a_constant_background_is_the_world(set_world, export):
     set_world((1.0, 0.5, 0.25), 2.0)
-    exported, told = export()
-    assert exported.world.radiance == (2.0, 1.0, 0.5) and not told
+    exported, reasons = export()
+    assert exported.world.radiance == (2.0, 1.0, 0.5) and not reasons
 
 
 def test_the_world_hides_from_rays_as_it_is_told_to(set_world, export):
@@ -57,8 +57,8 @@ def test_the_view_layers_own_world_counts(set_world, scene, export):
 def test_a_world_without_nodes_has_its_plain_colour(set_world, export):
     world = set_world()
     world.use_nodes, world.color = False, (0.25, 0.5, 1.0)
-    exported, told = export()
-    assert exported.world.radiance == (0.25, 0.5, 1.0) and not told
+    exported, reasons = export()
+    assert exported.world.radiance == (0.25, 0.5, 1.0) and not reasons
 
 
 @pytest.fixture
@@ -83,8 +83,8 @@ def sky(set_world):
 
 
 def test_an_image_is_wrapped_around_the_world(sky, export):
-    exported, told = export()
-    assert exported.world == World((2.0, 2.0, 2.0), image="Sky") and not told
+    exported, reasons = export()
+    assert exported.world == World((2.0, 2.0, 2.0), image="Sky") and not reasons
     assert exported.images["Sky"].values[:, 0].tolist() == [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
 
 
@@ -92,8 +92,8 @@ def test_a_mapping_turns_the_image(sky, export):
     _, texture, feed = sky
     texture.interpolation = "Closest"
     feed("ShaderNodeMapping").inputs["Rotation"].default_value = (0.25, 0.5, 1.0)
-    exported, told = export()
-    assert exported.world == World((2.0, 2.0, 2.0), image="Sky", closest=True, rotation=(0.25, 0.5, 1.0)) and not told
+    exported, reasons = export()
+    assert exported.world == World((2.0, 2.0, 2.0), image="Sky", closest=True, rotation=(0.25, 0.5, 1.0)) and not reasons
 
 
 def ask_for_camera(tree, kind, name, *sides):
@@ -117,10 +117,10 @@ def test_what_the_camera_sees_may_be_another_world_than_what_lights(sky, export)
     other = tree.nodes.new("ShaderNodeBackground")
     other.inputs["Color"].default_value = (1.0, 0.5, 0.25, 1.0)
     output = next(node for node in tree.nodes if node.type == "OUTPUT_WORLD")
-    shown = ask_for_camera(tree, "ShaderNodeMixShader", "Shader", background.outputs[0], other.outputs[0])
-    tree.links.new(shown, output.inputs["Surface"])
-    exported, told = export()
-    assert exported.world == World((2.0, 2.0, 2.0), image="Sky", backdrop=World((1.0, 0.5, 0.25))) and not told
+    mixed = ask_for_camera(tree, "ShaderNodeMixShader", "Shader", background.outputs[0], other.outputs[0])
+    tree.links.new(mixed, output.inputs["Surface"])
+    exported, reasons = export()
+    assert exported.world == World((2.0, 2.0, 2.0), image="Sky", backdrop=World((1.0, 0.5, 0.25))) and not reasons
 
 
 @pytest.mark.parametrize("kind", ["ShaderNodeMix", "ShaderNodeMixRGB"])
@@ -131,17 +131,17 @@ def test_so_may_its_colour_and_its_strength(set_world, export, kind):
     tree.links.new(color, background.inputs["Color"])
     if kind == "ShaderNodeMix":
         tree.links.new(ask_for_camera(tree, kind, "Strength", 4.0, 2.0), background.inputs["Strength"])
-    exported, told = export()
+    exported, reasons = export()
     lit, seen = (4.0, 2.0) if kind == "ShaderNodeMix" else (1.0, 1.0)
-    assert exported.world == World((lit, lit / 2, lit / 4), backdrop=World((0.0, 0.0, seen))) and not told
+    assert exported.world == World((lit, lit / 2, lit / 4), backdrop=World((0.0, 0.0, seen))) and not reasons
 
 
 def test_an_image_in_a_coordinate_of_the_camera_is_its_mean_over_the_sphere(sky, export):
     _, _, feed = sky
     feed("ShaderNodeTexCoord", "Window")
-    exported, told = export()
+    exported, reasons = export()
     assert exported.world.radiance == pytest.approx((1.0, 0.5, 0.0)) and exported.world.image is None
-    assert "'Environment Texture' that varies" in told["World"] and "constant" in told["World"]
+    assert "'Environment Texture' that varies" in reasons["World"] and "constant" in reasons["World"]
 
 
 @pytest.mark.parametrize("is_named", [True, False])
@@ -152,10 +152,10 @@ def test_an_image_that_is_missing_is_the_magenta_that_cycles_shows(set_world, ex
     if is_named:
         texture.image = bpy.data.images.new("Gone", 4, 4)
         texture.image.source, texture.image.filepath = "FILE", str(tmp_path / "gone.hdr")
-    exported, told = export()
-    assert exported.world.radiance == (2.0, 0.0, 2.0) and exported.world.image is None and not told
-    (said,) = (entry.reason for entry in exported.ledger if entry.object == world.name)
-    assert said.startswith("the world ") and said.endswith("magenta, as Cycles has it")
+    exported, reasons = export()
+    assert exported.world.radiance == (2.0, 0.0, 2.0) and exported.world.image is None and not reasons
+    (reason,) = (entry.reason for entry in exported.ledger if entry.object == world.name)
+    assert reason.startswith("the world ") and reason.endswith("magenta, as Cycles has it")
 
 
 def test_cycles_is_shown_a_constant_world_where_the_image_is_missing(set_world):
@@ -194,24 +194,24 @@ def test_a_volume_in_the_world_is_left_out_and_its_light_is_not(set_world, expor
     world = set_world((1.0, 0.5, 0.25))
     output = next(node for node in world.node_tree.nodes if node.type == "OUTPUT_WORLD")
     world.node_tree.links.new(world.node_tree.nodes.new("ShaderNodeVolumeScatter").outputs[0], output.inputs["Volume"])
-    exported, told = export()
-    assert exported.world.radiance == (1.0, 0.5, 0.25) and "has a volume" in told["World"]
+    exported, reasons = export()
+    assert exported.world.radiance == (1.0, 0.5, 0.25) and "has a volume" in reasons["World"]
 
 
 def test_film_and_bounces_are_the_scenes(scene, export):
     scene.cycles.pixel_filter_type, scene.cycles.film_exposure, scene.render.film_transparent = "BOX", 1.5, True
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces = 7, 3
     scene.cycles.glossy_bounces, scene.cycles.transmission_bounces = 2, 5
-    exported, told = export()
+    exported, reasons = export()
     assert exported.film == Film("BOX", scene.cycles.filter_width, True, 1.5)
-    assert exported.bounces == Bounces(7, 3, 2, 5) and not told
+    assert exported.bounces == Bounces(7, 3, 2, 5) and not reasons
 
 
 def test_every_filter_of_cycles_is_modelled(scene, export):
     for each in type(scene.cycles).bl_rna.properties["pixel_filter_type"].enum_items:
         scene.cycles.pixel_filter_type = each.identifier
-        exported, told = export()
-        assert exported.film.filter == each.identifier and not told
+        exported, reasons = export()
+        assert exported.film.filter == each.identifier and not reasons
 
 
 def test_what_of_film_and_bounces_is_approximated_is_told(scene, export):

@@ -86,11 +86,11 @@ def directions(width):
 
 def test_each_pixel_is_what_the_world_shows_in_the_middle_of_its_directions(tree, export):
     tree.colour(shifted_direction(tree))
-    exported, told = export()
+    exported, reasons = export()
     pixels = exported.images[exported.world.image].pixels
     assert exported.world.radiance == (1, 1, 1) and exported.world.backdrop is None and not exported.lamps
     assert np.abs(pixels - directions(64) - 2).max() < 1e-6  # float32, and 3e-6 of a pixel
-    assert "both sides show an image of it, 64 × 32 pixels, that Cycles renders" in told
+    assert "both sides show an image of it, 64 × 32 pixels, that Cycles renders" in reasons
     assert not exported.not_modelled
 
 
@@ -111,16 +111,16 @@ def test_a_world_that_tells_other_rays_apart_is_what_diffuse_ones_see_and_is_nam
     tree.link(tree.add("ShaderNodeLightPath").outputs["Is Diffuse Ray"], mix.inputs[0])
     mix.inputs[1].default_value, mix.inputs[2].default_value = (0, 0, 1, 1), (0.5, 0, 0, 1)
     tree.colour(mix.outputs[0])
-    exported, told = export()
+    exported, reasons = export()
     lights, seen = (exported.images[each.image].pixels for each in (exported.world, exported.world.backdrop))
     assert (lights == (0.5, 0, 0)).all() and (seen == (0, 0, 1)).all()
-    assert "all but the camera's see what diffuse ones do" in told
+    assert "all but the camera's see what diffuse ones do" in reasons
 
 
 def test_the_sun_of_a_sky_is_a_lamp_of_its_direction_and_size(tree, export):
     sky = tree.add("ShaderNodeTexSky", sky_type=WITH_SUN, sun_elevation=0.5, sun_rotation=1.0, sun_size=0.02)
     tree.colour(sky.outputs[0])
-    exported, told = export()
+    exported, reasons = export()
     (sun,) = exported.lamps
     stated = (math.cos(0.5) * math.sin(1.0), math.cos(0.5) * math.cos(1.0), math.sin(0.5))
     # The middle of a disc of some 200 × 200 pixels in the picture from near.
@@ -128,7 +128,7 @@ def test_the_sun_of_a_sky_is_a_lamp_of_its_direction_and_size(tree, export):
     assert sun.angle == pytest.approx(0.02, rel=1e-6) and sun.name == "World (sun)" and not sun.hidden_from
     # No pixel of the image has the disc, whose radiance is thousands of times that of the sky.
     assert exported.images[exported.world.image].pixels.max() < 0.01 * min(sun.irradiance) / (math.pi * 0.01**2)
-    assert "lamps that shine evenly for its suns" in told
+    assert "lamps that shine evenly for its suns" in reasons
 
 
 def test_the_light_of_a_sun_goes_with_what_is_done_to_the_sky(tree, export):
@@ -148,9 +148,9 @@ def test_links_that_go_in_a_circle_are_none(tree, export):
     tree.link(first.outputs[0], second.inputs[0])
     tree.colour(second.outputs[0])
     tree.link(second.outputs[0], first.inputs[0])
-    exported, told = export()
+    exported, reasons = export()
     assert (exported.images[exported.world.image].pixels == 0.5).all()
-    assert ("go in a circle" in told) == NEWER
+    assert ("go in a circle" in reasons) == NEWER
 
 
 def test_neither_export_nor_render_changes_what_is_open(tree, export, scene, tmp_path):
@@ -159,10 +159,10 @@ def test_neither_export_nor_render_changes_what_is_open(tree, export, scene, tmp
     kinds = ("worlds", "objects", "lights", "scenes", "cameras", "libraries")
 
     def state():
-        found = {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds}
-        found["images"] = [image.name for image in bpy.data.images if image.type != "RENDER_RESULT"]
+        names = {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds}
+        names["images"] = [image.name for image in bpy.data.images if image.type != "RENDER_RESULT"]
         links = [(link.from_node.name, link.to_node.name) for link in sky.id_data.links]
-        return found, links, [node.name for node in sky.id_data.nodes], sky.sun_disc, sky.sun_size
+        return names, links, [node.name for node in sky.id_data.nodes], sky.sun_disc, sky.sun_size
 
     before = state()
     scene.render.resolution_x, scene.render.resolution_y = 8, 8
@@ -180,8 +180,8 @@ def test_a_transparent_film_shows_no_sun(tree, export, scene):
 @pytest.mark.usefixtures("other_blender_fails")
 def test_where_no_other_blender_renders_it_a_constant_world_stands_in(tree, export):
     tree.colour(tree.add("ShaderNodeTexSky").outputs[0])
-    exported, told = export()
-    assert exported.world.image is None and "can't be rendered by another Blender" in told and "constant" in told
+    exported, reasons = export()
+    assert exported.world.image is None and "can't be rendered by another Blender" in reasons and "constant" in reasons
 
 
 @pytest.mark.parametrize("obstacle", ["a coordinate of the camera", "painted pixels", "a script"])
@@ -198,8 +198,8 @@ def test_what_an_image_cannot_stand_in_for_is_named(tree, export, obstacle, monk
         tree.colour(node.outputs[0])
     else:
         tree.colour(shifted_direction(tree, "Camera"))
-    exported, told = export()
-    assert exported.world.image is None and "that more than a direction and the file decides" in told
+    exported, reasons = export()
+    assert exported.world.image is None and "that more than a direction and the file decides" in reasons
 
 
 @pytest.mark.parametrize("kind", ["PREETHAM", "HOSEK_WILKIE", WITH_SUN])
@@ -215,13 +215,13 @@ def test_cycles_shows_the_same_image_and_nearly_the_sky_itself(tree, camera_obje
 
     picture = cycles.LightSettings(exported.film, Bounces(0, 0, 0, 0), 1)
     cycles.render(scene, bpy.context.view_layer, camera_object, tmp_path / "sky.exr", light=picture)
-    shown, true = (passes["Environment"] for passes in read_passes([tmp_path / "image.exr", tmp_path / "sky.exr"]))
-    ours = render.render(exported, "direct", 1, threads=2)["Environment"]
-    error = np.abs(ours - shown) / shown
+    environment, true = (passes["Environment"] for passes in read_passes([tmp_path / "image.exr", tmp_path / "sky.exr"]))
+    traced = render.render(exported, "direct", 1, threads=2)["Environment"]
+    error = np.abs(traced - environment) / environment
     assert np.percentile(error, 50) <= 1e-6 and np.percentile(error, 99) <= 2e-5
     # Calibrated, at the horizon: 2e-3 (Hosek and Wilkie) and 2e-5.
-    assert np.percentile(np.abs(shown - true) / true, 99) < 5e-3 and abs(shown.mean() / true.mean() - 1) < 1e-4
-    turned = np.abs(np.roll(ours, 1, axis=1) - shown) / shown  # by a pixel
+    assert np.percentile(np.abs(environment - true) / true, 99) < 5e-3 and abs(environment.mean() / true.mean() - 1) < 1e-4
+    turned = np.abs(np.roll(traced, 1, axis=1) - environment) / environment  # by a pixel
     assert np.percentile(turned, 50) > 1e-6
 
 
@@ -235,8 +235,8 @@ def test_each_of_many_renders_shows_the_camera_its_own_image(tree, camera_object
     tree.colour(add.outputs[0])
     addresses = []
 
-    def watched(*given, **how):
-        image = image_of(*given, **how)
+    def watched(*arguments, **how):
+        image = image_of(*arguments, **how)
         addresses.append(image.as_pointer())
         return image
 
@@ -244,6 +244,6 @@ def test_each_of_many_renders_shows_the_camera_its_own_image(tree, camera_object
     scene.render.resolution_x, scene.render.resolution_y = 16, 9
     paths = [tmp_path / f"{seed}.exr" for seed in range(4)]
     jobs.both_sides(Job(level="direct", samples=8), paths)
-    found = [passes["Environment"][..., :3].mean(axis=(0, 1)) for passes in read_passes(paths)]
-    assert np.allclose(found, found[0], rtol=0.1), found
+    means = [passes["Environment"][..., :3].mean(axis=(0, 1)) for passes in read_passes(paths)]
+    assert np.allclose(means, means[0], rtol=0.1), means
     assert len(addresses) == 8 and len({*addresses}) == 2, "Cycles tells images by their address"

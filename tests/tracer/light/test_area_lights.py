@@ -82,11 +82,11 @@ def test_a_disc_over_a_parallel_and_a_perpendicular_surface(make_lighting, off_b
     lighting = make_lighting(down(1, size=(2 * radius, 2 * radius), ellipse=True))
     z = 1 + aside**2 + radius**2
     root = np.sqrt(z * z - 4 * aside**2 * radius**2)
-    found = lighting.irradiance((aside, 0, 0), (0, 0, 1))
-    assert abs(off_by(found, np.pi * (1 - (1 + aside**2 - radius**2) / root) / 2, 0.04)) <= 3, found
+    irradiance = lighting.irradiance((aside, 0, 0), (0, 0, 1))
+    assert abs(off_by(irradiance, np.pi * (1 - (1 + aside**2 - radius**2) / root) / 2, 0.04)) <= 3, irradiance
     if aside > radius:
-        found = lighting.irradiance((aside, 0, 0), (-1, 0, 0))
-        assert abs(off_by(found, np.pi / (2 * aside) * (z / root - 1), 0.04)) <= 3, found
+        irradiance = lighting.irradiance((aside, 0, 0), (-1, 0, 0))
+        assert abs(off_by(irradiance, np.pi / (2 * aside) * (z / root - 1), 0.04)) <= 3, irradiance
 
 
 @pytest.mark.parametrize("ellipse", [False, True])

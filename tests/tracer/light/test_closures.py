@@ -75,10 +75,10 @@ def test_samples_fall_as_often_as_their_density_says(name, behind):
     kept = drawn.sampled_pdf > 0
     kept &= drawn.sampled_pdf < np.inf
     expected = count * np.bincount(cells(directions), there.pdf * angle, 128)
-    found = np.bincount(cells(drawn.sampled[:, kept]), minlength=128)
+    values = np.bincount(cells(drawn.sampled[:, kept]), minlength=128)
     many = expected > 20
-    expected, found = np.append(expected[many], expected[~many].sum()), np.append(found[many], found[~many].sum())
-    squares = ((found - expected) ** 2 / np.maximum(expected, 1)).sum()
+    expected, values = np.append(expected[many], expected[~many].sum()), np.append(values[many], values[~many].sum())
+    squares = ((values - expected) ** 2 / np.maximum(expected, 1)).sum()
     freedom = len(expected)
     assert squares < freedom + 5 * np.sqrt(2 * freedom) + 5, f"χ² is {squares:.0f} of {freedom}"
     assert abs(expected.sum() - kept.sum()) < 5 * np.sqrt(count), "the density's integral is the share of samples that are kept"
@@ -123,14 +123,14 @@ def test_light_goes_both_ways_alike(name):
     if shader.type == "metallic":
         shader = node("metallic", **dict(shader.inputs) | {"distribution": "ggx"})
     rng = np.random.default_rng(3)
-    one, other = (rng.normal(size=(3, COUNT)) for _ in range(2))
-    for each in (one, other):
+    first, other = (rng.normal(size=(3, COUNT)) for _ in range(2))
+    for each in (first, other):
         each[2] = np.abs(each[2]) + 0.05
         each /= np.linalg.norm(each, axis=0)
     forth, back = (
         np.stack([ScatteredBy(shader, -seen[:, i], lit[:, i], np.zeros((3, 1))).light[:, 0] for i in range(COUNT)], axis=1)
         / lit[2]
-        for seen, lit in ((one, other), (other, one))
+        for seen, lit in ((first, other), (other, first))
     )
     np.testing.assert_allclose(forth, back, rtol=1e-12)
 

@@ -74,11 +74,11 @@ def test_a_floor_gets_what_its_sky_gives(make_lit, make_mesh, room, surface, sha
     above = 2 * (looked_up(room, directions) * directions[:, 2:]).mean(axis=0)
     below = 2 * (looked_up(room, directions * (1, 1, -1)) * directions[:, 2:]).mean(axis=0)
     passes = light_of(make_lit, make_mesh, surface, World(WHITE, image="room"), room)
-    found = passes["Combined"][..., :3].reshape(-1, 3).astype(np.float64)
-    error = found.std(axis=0) / np.sqrt(len(found))
+    values = passes["Combined"][..., :3].reshape(-1, 3).astype(np.float64)
+    error = values.std(axis=0) / np.sqrt(len(values))
     expected = share * above + (1 - share) * below
     assert (error < 0.01 * expected).all(), "the window is found"
-    assert (np.abs(found.mean(axis=0) - expected) < 4 * error).all(), (found.mean(axis=0), expected, error)
+    assert (np.abs(values.mean(axis=0) - expected) < 4 * error).all(), (values.mean(axis=0), expected, error)
 
 
 @pytest.mark.parametrize("roughness", [0.5, 0.8])
@@ -89,10 +89,10 @@ def test_a_rough_mirror_shows_what_its_integral_over_the_image_is(make_lit, make
     expected = 2 * np.pi * (light * looked_up(room, directions)).mean(axis=0)
     far = Pinhole((0, 0, 2), (0, 0, 0), (0, 1, 0), 1e5, 32, 32)  # so that all of the picture is seen straight from above
     passes = light_of(make_lit, make_mesh, surface, World(WHITE, image="room"), room, camera=far)
-    found = passes["Combined"][..., :3].reshape(-1, 3).astype(np.float64)
-    error = found.std(axis=0) / np.sqrt(len(found))
-    assert (error < 0.01 * expected).all() and (np.abs(found.mean(axis=0) - expected) < 4 * error).all(), (
-        found.mean(axis=0),
+    values = passes["Combined"][..., :3].reshape(-1, 3).astype(np.float64)
+    error = values.std(axis=0) / np.sqrt(len(values))
+    assert (error < 0.01 * expected).all() and (np.abs(values.mean(axis=0) - expected) < 4 * error).all(), (
+        values.mean(axis=0),
         expected,
     )
 
@@ -123,8 +123,8 @@ def test_an_encoded_image_of_bytes_is_sampled_as_one_whose_pixels_are_beside_byt
     )
     # Of an encoded level k of 255 the light changes by 2.4/k of a level's change, and at most by 1/12.92 of it for dark ones.
     np.testing.assert_allclose(of_bytes["Combined"], beside["Combined"], rtol=0.02)
-    found = of_bytes["Combined"][..., :3].reshape(-1, 3)
-    assert (found.std(axis=0) < 0.1 * found.mean(axis=0)).all(), "the window is found"
+    actual = of_bytes["Combined"][..., :3].reshape(-1, 3)
+    assert (actual.std(axis=0) < 0.1 * actual.mean(axis=0)).all(), "the window is found"
 
 
 @pytest.mark.parametrize("srgb", [False, True])
@@ -138,13 +138,13 @@ def test_an_image_of_small_numbers_is_sampled_to_the_bit_as_its_floats_are_on_an
         levels = rng.integers(0, 2**24, (64, 128, 1), dtype) | (rng.integers(128, 138, (64, 128, 1), dtype) << 24)
     small = Picture(levels / np.float16(64) if dtype == np.float16 else levels, srgb)
     surface, world = node("diffuse", color=WHITE), World(WHITE, image="room")
-    found = {
+    result = {
         light_of(make_lit, make_mesh, surface, world, picture, samples=4, threads=threads)["Combined"].tobytes()
         for picture in (small, Picture(small.values, srgb))
         for threads in (1, 2, 5)
     }
-    assert len(found) == 1
+    assert len(result) == 1
     pixels = small.values.copy()
     pixels[-9:] *= 1.5
     other = light_of(make_lit, make_mesh, surface, world, Picture(pixels, srgb), samples=4)["Combined"].tobytes()
-    assert other not in found
+    assert other not in result

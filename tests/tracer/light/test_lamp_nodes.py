@@ -11,7 +11,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import ies, scene_file
 from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun
-from viewcam_addon.tracer.scene.materials import Colour, Material, Picture
+from viewcam_addon.tracer.scene.materials import Colour, Material, Picture, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 DOWN = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 32, 24)
@@ -36,7 +36,7 @@ def ies_text(across, up, values, kind=1, factor=1.0):
 
 
 def lambert(albedo) -> Material:
-    return Material(diffuse=Colour((albedo,) * 3))
+    return sum_of(diffuse=Colour((albedo,) * 3))
 
 
 def square(make_mesh, half=1.0):
@@ -78,18 +78,18 @@ FALLOFFS = {
 def test_light_falls_off_as_its_way_says(floor, falloff):
     """E = P/(4π) · f(r) · cos θ, of which a white floor shows E/π."""
     emission, falls_off = FALLOFFS[falloff]
-    shown, squared, cosine = floor(replace(LAMP, emission=emission))
+    rendered, squared, cosine = floor(replace(LAMP, emission=emission))
     expected = POWER / (4 * np.pi**2) * falls_off(squared) * cosine
-    np.testing.assert_allclose(shown, expected, rtol=EXACT)
+    np.testing.assert_allclose(rendered, expected, rtol=EXACT)
 
 
 @pytest.mark.parametrize("falloff", ["linear", "constant", "smooth"])
 def test_a_falloff_that_is_a_little_wrong_is_found(floor, falloff):
     emission, falls_off = FALLOFFS[falloff]
     wrong = node("math", operation="power", a=emission, b=1.00001)
-    shown, squared, cosine = floor(replace(LAMP, emission=wrong))
+    rendered, squared, cosine = floor(replace(LAMP, emission=wrong))
     with pytest.raises(AssertionError):
-        np.testing.assert_allclose(shown, POWER / (4 * np.pi**2) * falls_off(squared) * cosine, rtol=EXACT)
+        np.testing.assert_allclose(rendered, POWER / (4 * np.pi**2) * falls_off(squared) * cosine, rtol=EXACT)
 
 
 @pytest.mark.parametrize(
@@ -108,28 +108,28 @@ def test_a_table_of_one_candela_is_a_plain_lamp(floor, kind, across, up):
     shines = node(
         "ies", text=text, strength=0.5, vector=(-0.3, 0.2, -1.0) if kind != 1 else node("geometry", output="incoming")
     )
-    shown, *_ = floor(replace(LAMP, emission=shines))
+    rendered, *_ = floor(replace(LAMP, emission=shines))
     plain, *_ = floor(replace(LAMP, power=(POWER * 25.0 / CANDELA,) * 3))
-    np.testing.assert_allclose(shown, plain, rtol=EXACT)
+    np.testing.assert_allclose(rendered, plain, rtol=EXACT)
 
 
 def test_between_the_angles_of_a_table_light_goes_on_as_it_grows(floor):
     """Where three steps are even, Catmull's and Rom's cubics are straight; the floor is seen below 32°."""
     up = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 90.0]
-    shown, _, cosine = floor(replace(LAMP, emission=node("ies", text=ies_text([0.0], up, [angle + 10.0 for angle in up]))))
+    rendered, _, cosine = floor(replace(LAMP, emission=node("ies", text=ies_text([0.0], up, [angle + 10.0 for angle in up]))))
     plain, *_ = floor(replace(LAMP, power=(POWER / CANDELA,) * 3))
     angle = np.degrees(np.arccos(cosine))
     inner = angle > 10  # below, the table is mirrored at its pole
-    np.testing.assert_allclose(shown[inner], (plain * (angle + 10))[inner], rtol=1e-6)
+    np.testing.assert_allclose(rendered[inner], (plain * (angle + 10))[inner], rtol=1e-6)
 
 
 def test_a_table_turns_about_the_lamp(floor):
     """A lobe at an angle across is where x sinks and y rises with it: 90° is towards −x, as in Cycles."""
     across = [0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0, 360.0]
     values = [[100.0 if angle == 90.0 else 0.0] * 2 for angle in across]
-    shown, *_ = floor(replace(LAMP, emission=node("ies", text=ies_text(across, [0.0, 90.0], values))))
+    rendered, *_ = floor(replace(LAMP, emission=node("ies", text=ies_text(across, [0.0, 90.0], values))))
     middle = DOWN.width // 2
-    assert shown[:, :middle].sum() > 20 * shown[:, middle:].sum()
+    assert rendered[:, :middle].sum() > 20 * rendered[:, middle:].sum()
 
 
 HALF = node("math", operation="greater_than", a=node("separate", color=node("geometry"), output="x"), b=0.0)
@@ -143,18 +143,18 @@ def test_a_panel_that_is_half_dark_is_half_a_panel(make_mesh, make_lit):
     narrow = Area("panel", matrix=half, size=(1.0, 1.0), power=(POWER / 2,) * 3)
     floor = square(make_mesh, 9.0), lambert(0.5)
     expected = render(make_lit(DOWN, floor, lamps=(narrow,)), "direct", 1024, threads=1)["Combined"][..., :3].mean()
-    shown = render(make_lit(DOWN, floor, lamps=(panel,)), "direct", 256, threads=1)
-    error = np.sqrt(shown["Variance"][..., :3].astype(np.float64).sum()) / shown["Variance"][..., :3].size
+    rendered = render(make_lit(DOWN, floor, lamps=(panel,)), "direct", 256, threads=1)
+    error = np.sqrt(rendered["Variance"][..., :3].astype(np.float64).sum()) / rendered["Variance"][..., :3].size
     assert error < 0.002 * expected
-    assert abs(shown["Combined"][..., :3].mean() - expected) < 4 * error  # of both sides, of which the other has less
+    assert abs(rendered["Combined"][..., :3].mean() - expected) < 4 * error  # of both sides, of which the other has less
 
 
 def test_a_panel_shows_what_lights(make_mesh, make_lit):
     """Its radiance is P/(π A), and a camera sees the half that shines."""
     matrix = np.diag([1.0, -1.0, -1.0, 1.0])  # shines upwards
     panel = Area("panel", matrix=matrix, size=(2.0, 1.0), power=(POWER,) * 3, emission=HALF)
-    shown = render(make_lit(DOWN, lamps=(panel,)), "direct", 1, threads=1)["Combined"][..., 0]
-    row = shown[DOWN.height // 2]
+    rendered = render(make_lit(DOWN, lamps=(panel,)), "direct", 1, threads=1)["Combined"][..., 0]
+    row = rendered[DOWN.height // 2]
     middle = DOWN.width // 2
     np.testing.assert_allclose(row[middle : middle + 9], POWER / (2 * np.pi), rtol=EXACT)
     assert not row[:middle].any()
@@ -171,12 +171,12 @@ def test_a_lamp_that_nodes_colour_everywhere_alike_is_that_coloured_lamp(floor):
 def test_lamps_with_nodes_light_what_each_does(floor, count):
     """Of few lamps each is asked, of more one by chance, whose nodes are no part of the choice."""
     lamps = [replace(LAMP, name=str(number), emission=(WAY, SQUARED)[number % 2]) for number in range(count)]
-    shown = floor(*lamps, samples=1 if count == 2 else 256)[0]
+    rendered = floor(*lamps, samples=1 if count == 2 else 256)[0]
     alone = count // 2 * (floor(lamps[0])[0] + floor(lamps[1])[0])
     if count == 2:
-        np.testing.assert_allclose(shown, alone, rtol=EXACT)
+        np.testing.assert_allclose(rendered, alone, rtol=EXACT)
     else:  # a linear falloff brings a third of a constant one here: half of that from the mean, by √(256 · pixels)
-        assert abs(shown.sum() / alone.sum() - 1) < 4 * 0.5 / np.sqrt(256 * shown.size)
+        assert abs(rendered.sum() / alone.sum() - 1) < 4 * 0.5 / np.sqrt(256 * rendered.size)
 
 
 def test_a_file_gives_back_a_lamps_nodes_and_a_displacement(make_mesh, make_lit, tmp_path):
@@ -189,9 +189,9 @@ def test_a_file_gives_back_a_lamps_nodes_and_a_displacement(make_mesh, make_lit,
         Area("area", matrix=np.eye(4), emission=HALF),
     )
     material = replace(lambert(0.5), displacement=node("noise", scale=3.0))
-    made = make_lit(DOWN, (square(make_mesh), material), lamps=lamps, images={"gobo": Picture(np.ones((2, 2, 3), np.float32))})
+    scene = make_lit(DOWN, (square(make_mesh), material), lamps=lamps, images={"gobo": Picture(np.ones((2, 2, 3), np.float32))})
     path = tmp_path / "scene.json"
-    scene_file.write(made, path)
+    scene_file.write(scene, path)
     read = scene_file.read(path)
     assert [lamp.emission for lamp in read.lamps] == [lamp.emission for lamp in lamps]
     assert read.materials["material 0"] == material
@@ -214,9 +214,9 @@ def test_a_file_gives_back_a_lamps_nodes_and_a_displacement(make_mesh, make_lit,
     ],
 )
 def test_what_is_none_is_refused_in_a_sentence(make, words):
-    with pytest.raises(InputError, match=words) as told:
+    with pytest.raises(InputError, match=words) as caught:
         make()
-    assert str(told.value).count(": ") >= 1
+    assert str(caught.value).count(": ") >= 1
 
 
 def test_a_lamp_names_an_image_of_the_scene(make_mesh, make_lit):
@@ -235,8 +235,8 @@ def test_a_displacement_turns_the_floor_as_its_slope_says(make_mesh, make_lit):
     sun = Sun("sun", towards=(0.6, 0.0, 0.8), irradiance=(np.pi,) * 3)
     camera = Pinhole((0.2, 0.1, 4), (0, 0, 0), (0, 1, 0), 40, 16, 12)
 
-    def show(**given):
-        scene = make_lit(camera, (square(make_mesh, 9.0), replace(lambert(0.5), **given)), lamps=(sun,))
+    def show(**keywords):
+        scene = make_lit(camera, (square(make_mesh, 9.0), replace(lambert(0.5), **keywords)), lamps=(sun,))
         return render(scene, "direct", 1, threads=1)["Combined"][..., 0].astype(np.float64)
 
     cosine = (0.8 - 0.6 * slope) / np.sqrt(1 + slope**2)

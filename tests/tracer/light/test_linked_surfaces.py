@@ -11,22 +11,22 @@ from viewcam_addon.tracer.render import Keeper, render
 from viewcam_addon.tracer.scene import Scene
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import MOST_LINKS, Area, Point, Sun
-from viewcam_addon.tracer.scene.materials import Colour, Material
+from viewcam_addon.tracer.scene.materials import Colour, Material, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import Node
 
 DOWN = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 32, 24)
 UP = Pinhole((0, 0, 4), (0, 0, 8), (0, 1, 0), 40, 32, 24)
 LEFT, RIGHT, LIGHT, SCREEN = "object 0", "object 1", "object 2", "object 3"
-WHITE = Material(diffuse=Colour((1.0, 1.0, 1.0)))
-BLACK = Material(diffuse=Colour((0.0, 0.0, 0.0)))
-CHROME = Material(mirror=Colour((1.0, 1.0, 1.0)))
+WHITE = sum_of(diffuse=Colour((1.0, 1.0, 1.0)))
+BLACK = sum_of(diffuse=Colour((0.0, 0.0, 0.0)))
+CHROME = sum_of(mirror=Colour((1.0, 1.0, 1.0)))
 SATIN = Material(surface=Node("glossy", (("color", Colour((1.0, 1.0, 1.0))), ("roughness", 0.5))))
 PANE = Material(surface=Node("transparent", (("color", Colour((0.5, 0.5, 0.5))),)))
 ROUNDING = 2e-7  # of float32, in which pictures are; the sums of float64 differ by their order alone
 
 
 def glow(strength):
-    return Material(emission=Colour((strength,) * 3))
+    return sum_of(emission=Colour((strength,) * 3))
 
 
 @pytest.fixture
@@ -50,7 +50,9 @@ def halves(square, make_lit):
 
 
 def linked(scene: Scene, name=LIGHT, **links) -> Scene:
-    return replace(scene, objects=tuple(replace(one, **links) if one.name == name else one for one in scene.objects))
+    return replace(
+        scene, objects=tuple(replace(placed, **links) if placed.name == name else placed for placed in scene.objects)
+    )
 
 
 def red(scene, samples=4, level="path"):
@@ -63,9 +65,9 @@ def seen(scene, samples=4):
     return picture[:, :15].mean(), picture[:, 17:].mean()
 
 
-def same(one, other, samples=16, level="path"):
+def same(first, second, samples=16, level="path"):
     """True if two scenes' pictures are the same but for float32's rounding."""
-    return np.allclose(red(one, samples, level), red(other, samples, level), rtol=ROUNDING, atol=0)
+    return np.allclose(red(first, samples, level), red(second, samples, level), rtol=ROUNDING, atol=0)
 
 
 @pytest.fixture(params=["mesh", "spheres"])
@@ -126,9 +128,9 @@ def test_a_matte_floor_receives_what_shines_on_it(halves, square):
     # Where the square's points are apart, so are their cosines to the fourth, by 4 r s / d²; the rest is a pixel's own size.
     tolerance = 4 * 2 * SIDE / FAR**2 + 4 * 0.1**2 / FAR**2
     for receivers, lit in (({LEFT}, (1, 0)), ({LEFT, RIGHT}, (1, 1)), ((), (0, 0))):
-        found = red(linked(scene, receivers=receivers, blockers={LEFT}))
+        actual = red(linked(scene, receivers=receivers, blockers={LEFT}))
         for half, factor in zip((np.s_[:, :15], np.s_[:, 17:]), lit, strict=True):
-            assert np.allclose(found[half], factor * expected[half], rtol=tolerance, atol=0)
+            assert np.allclose(actual[half], factor * expected[half], rtol=tolerance, atol=0)
 
 
 @pytest.mark.parametrize("floor", [WHITE, SATIN, CHROME], ids=["matte", "rough", "mirror"])
@@ -182,9 +184,11 @@ def test_of_many_shining_surfaces_each_half_gets_those_that_light_it(square, mak
     floor = [(square(-9, 0, -9, 9, 0), WHITE), (square(0, 9, -9, 9, 0), WHITE)]
     panels = [square(-0.5 + i / count, 0.5 + i / count, -0.5, 0.5, 5 + i / 100) for i in range(count)]
 
-    def lit(shown, receivers):
-        scene = make_lit(DOWN, *floor, *[(panels[i], glow(3.0 + i % 3)) for i in shown])
-        lights = (replace(one, receivers=receivers(i), blockers=()) for one, i in zip(scene.objects[2:], shown, strict=True))
+    def lit(lights_of, receivers):
+        scene = make_lit(DOWN, *floor, *[(panels[i], glow(3.0 + i % 3)) for i in lights_of])
+        lights = (
+            replace(light, receivers=receivers(i), blockers=()) for light, i in zip(scene.objects[2:], lights_of, strict=True)
+        )
         return seen(replace(scene, objects=(*scene.objects[:2], *lights)), 256)
 
     left, right = lit(range(count), lambda i: {LEFT} if i % 2 else {RIGHT})
@@ -216,7 +220,9 @@ def test_links_of_surfaces_to_what_is_not_there_and_too_many_are_refused(halves,
     names = [f"object {number}" for number in range(8)]
     sets = [frozenset(name for bit, name in enumerate(names) if number >> bit & 1) for number in range(MOST_LINKS[what] + 1)]
     floor = tuple(replace(scene.objects[0], name=name) for name in names)
-    lights = tuple(replace(scene.objects[2], name=f"light {i}", **{what: some}) for i, some in enumerate(sets[:-1]))
+    lights = tuple(
+        replace(scene.objects[2], name=f"light {i}", **{what: linked_names}) for i, linked_names in enumerate(sets[:-1])
+    )
     sun = Sun("sun", **{what: sets[-1]})
     replace(scene, objects=(*floor, *lights), lamps=(replace(sun, **{what: sets[0]}),))
     with pytest.raises(InputError, match=f"different sets of {what}"):

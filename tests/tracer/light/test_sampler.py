@@ -93,8 +93,8 @@ def test_pixels_are_independent_of_their_neighbours_and_dimensions_of_one_anothe
     numbers = Sampler(2, 64).numbers(pixels, sample, 0, 12)
     others = Sampler(2, 64).numbers(pixels + apart, sample, 0, 12)
     for scale in (1, 16):  # the numbers, and what is left of them beyond their first four digits
-        found = np.array([[correlation(a * scale % 1, b * scale % 1) for b in others] for a in numbers])
-        assert np.abs(found).max() < 4.5, f"correlated by {np.abs(found).max():.1f} standard errors"  # the largest of 144
+        values = np.array([[correlation(a * scale % 1, b * scale % 1) for b in others] for a in numbers])
+        assert np.abs(values).max() < 4.5, f"correlated by {np.abs(values).max():.1f} standard errors"  # the largest of 144
 
 
 def test_the_error_of_one_pixel_says_nothing_about_that_of_its_neighbours():
@@ -123,10 +123,10 @@ def test_dimensions_of_different_scatterings_are_independent_in_each_pixels_samp
 
 
 @given(SEEDS, SEEDS)
-def test_seeds_give_numbers_of_their_own(one, other):
+def test_seeds_give_numbers_of_their_own(first, second):
     pixels = np.arange(4096)
-    a, b = (Sampler(seed, 4).numbers(pixels, 0, 0, 2) for seed in (one, other))
-    if one % 2**32 == other % 2**32:
+    a, b = (Sampler(seed, 4).numbers(pixels, 0, 0, 2) for seed in (first, second))
+    if first % 2**32 == second % 2**32:
         np.testing.assert_array_equal(a, b)
     else:
         assert np.abs(a - b).min(axis=0).max() > 0.5

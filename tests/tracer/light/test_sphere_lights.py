@@ -50,8 +50,8 @@ def test_a_sun_of_any_size_above_the_horizon_gives_as_much_as_one_without(make_l
     rng = np.random.default_rng(seed)
     towards, angle = unit(rng), share * (np.pi - diameter) / 2
     lighting = make_lighting(Sun("sun", towards=towards, irradiance=(3, 2, 1), angle=diameter))
-    found = lighting.irradiance((1, 2, 3), tilted(rng, towards, angle))
-    assert abs(off_by(found, 3 * np.cos(angle), 0.05 if share > 0.9 else 0.02)) <= 3, found
+    irradiance = lighting.irradiance((1, 2, 3), tilted(rng, towards, angle))
+    assert abs(off_by(irradiance, 3 * np.cos(angle), 0.05 if share > 0.9 else 0.02)) <= 3, irradiance
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7, 1.5, 2.5])
@@ -59,8 +59,8 @@ def test_a_sun_of_half_the_sky_fades_as_it_sets(make_lighting, off_by, angle):
     """The part of a hemisphere that is above a tilted horizon: (1 + cos)/2, by Lambert's law of the lune."""
     rng = np.random.default_rng(1)
     lighting = make_lighting(Sun("sun", towards=(1, 2, 3), irradiance=(3, 2, 1), angle=np.pi))
-    found = lighting.irradiance((1, 2, 3), tilted(rng, np.array((1, 2, 3)) / np.sqrt(14), angle))
-    assert abs(off_by(found, 3 * (1 + np.cos(angle)) / 2, 0.1)) <= 3, found
+    irradiance = lighting.irradiance((1, 2, 3), tilted(rng, np.array((1, 2, 3)) / np.sqrt(14), angle))
+    assert abs(off_by(irradiance, 3 * (1 + np.cos(angle)) / 2, 0.1)) <= 3, irradiance
 
 
 def test_the_disc_of_a_sun_is_as_wide_and_as_bright_as_it_should_be(make_lighting):
@@ -95,8 +95,8 @@ def test_a_sphere_above_the_horizon_gives_as_much_as_a_point(make_lighting, off_
     size = 10.0**scale
     towards, angle = unit(rng), share * np.arccos(radius)
     lighting = make_lighting(point(7.0, towards * size, radius=radius * size))
-    found = lighting.irradiance((0, 0, 0), tilted(rng, towards, angle))
-    assert abs(off_by(found, 7 / (4 * np.pi * size**2) * np.cos(angle), 0.05)) <= 3, found
+    irradiance = lighting.irradiance((0, 0, 0), tilted(rng, towards, angle))
+    assert abs(off_by(irradiance, 7 / (4 * np.pi * size**2) * np.cos(angle), 0.05)) <= 3, irradiance
 
 
 @pytest.mark.parametrize("angle", [1.2, 1.5, 1.7, 1.9])
@@ -109,8 +109,8 @@ def test_a_sphere_that_is_partly_set_gives_what_is_above_the_horizon(make_lighti
     form = (np.cos(angle) * np.arccos(-root * cotangent) - root * rest) / ratio**2 + np.arctan(rest / root)
     rng = np.random.default_rng(2)
     lighting = make_lighting(point(7.0, (0, 0, 2), radius=1.2))
-    found = lighting.irradiance((0, 0, 0), tilted(rng, np.array((0.0, 0.0, 1.0)), angle))
-    assert abs(off_by(found, form * 7 / (4 * np.pi**2 * 1.2**2), 0.05)) <= 3, found
+    irradiance = lighting.irradiance((0, 0, 0), tilted(rng, np.array((0.0, 0.0, 1.0)), angle))
+    assert abs(off_by(irradiance, form * 7 / (4 * np.pi**2 * 1.2**2), 0.05)) <= 3, irradiance
 
 
 @given(seed=SEEDS, radius=st.floats(1.001, 100))
@@ -128,8 +128,8 @@ def test_a_soft_falloff_makes_a_disc_that_faces_the_point(make_lighting, off_by,
     rng = np.random.default_rng(3)
     lighting = make_lighting(point(7.0, (0, 0, 2), radius=radius, soft_falloff=True))
     angle = min(angle, np.arctan(2 / max(radius, 1e-9)))
-    found = lighting.irradiance((0, 0, 0), tilted(rng, np.array((0.0, 0.0, 1.0)), angle))
-    assert abs(off_by(found, 7 / (4 * np.pi * (4 + radius**2)) * np.cos(angle))) <= 3, found
+    irradiance = lighting.irradiance((0, 0, 0), tilted(rng, np.array((0.0, 0.0, 1.0)), angle))
+    assert abs(off_by(irradiance, 7 / (4 * np.pi * (4 + radius**2)) * np.cos(angle))) <= 3, irradiance
 
 
 @settings(max_examples=30)
@@ -271,14 +271,14 @@ NEAR = (0, 0, 2), (0, 0.3, 1), 7 / (16 * np.pi) / np.hypot(0.3, 1)
 def test_one_percent_of_a_constant_is_told(make_lighting, off_by):
     place, normal, expected = NEAR
     for radius in (0.0, 0.7):
-        found = make_lighting(point(7.0 * 1.01, place, radius=radius)).irradiance((0, 0, 0), normal)
-        assert abs(off_by(found, expected)) > 3, radius
+        irradiance = make_lighting(point(7.0 * 1.01, place, radius=radius)).irradiance((0, 0, 0), normal)
+        assert abs(off_by(irradiance, expected)) > 3, radius
 
 
 def test_samples_that_are_not_spread_evenly_are_told(make_lighting, off_by):
     place, normal, expected = NEAR
-    found = make_lighting(point(7.0, place, radius=1.6)).irradiance((0, 0, 0), normal, skew=1.2)
-    assert abs(off_by(found, expected)) > 3, found
+    irradiance = make_lighting(point(7.0, place, radius=1.6)).irradiance((0, 0, 0), normal, skew=1.2)
+    assert abs(off_by(irradiance, expected)) > 3, irradiance
 
 
 @settings(max_examples=40)

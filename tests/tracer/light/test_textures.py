@@ -13,7 +13,7 @@ from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.colours import RGBE
 from viewcam_addon.tracer.scene.film import Film
-from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material, Picture
+from viewcam_addon.tracer.scene.materials import PLAIN_COLOR, Colour, Picture, sum_of
 
 CAMERA = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 10, 8, 8)
 SEEDS = st.integers(0, 2**32 - 1)
@@ -50,8 +50,8 @@ def test_at_the_centres_of_pixels_an_image_shows_its_pixels_however_far_it_repea
 
 def test_rows_count_from_the_bottom_and_columns_from_the_left():
     picture = grey([[0.1, 0.2], [0.3, 0.4]])
-    found = looked_up(picture, at([0.1, 0.9, 0.1, 0.9], [0.1, 0.1, 0.9, 0.9]), closest=True)
-    np.testing.assert_allclose(found[0], [0.1, 0.2, 0.3, 0.4], atol=1e-7)
+    hits = looked_up(picture, at([0.1, 0.9, 0.1, 0.9], [0.1, 0.1, 0.9, 0.9]), closest=True)
+    np.testing.assert_allclose(hits[0], [0.1, 0.2, 0.3, 0.4], atol=1e-7)
 
 
 def test_a_ramp_of_four_pixels_is_straight_between_their_centres_and_falls_back_over_the_border():
@@ -69,8 +69,8 @@ def test_between_four_pixels_of_a_checkerboard_an_image_is_their_mean():
 
 def test_the_closest_pixel_changes_half_way_between_centres():
     picture = grey([[0.0, 1.0]])
-    found = looked_up(picture, at([0.499999, 0.5, 0.999999, 1.0, -1e-9, -1e-20], 0.5), True)[0]
-    np.testing.assert_array_equal(found, [0, 1, 1, 0, 1, 1])
+    colors = looked_up(picture, at([0.499999, 0.5, 0.999999, 1.0, -1e-9, -1e-20], 0.5), True)[0]
+    np.testing.assert_array_equal(colors, [0, 1, 1, 0, 1, 1])
 
 
 def stood_for(pixels):
@@ -101,10 +101,10 @@ def test_an_image_of_small_numbers_shows_the_bits_that_its_floats_show(dtype, sr
     small, large, other = Picture(pixels, srgb), Picture(floats, srgb), Picture(np.nextafter(floats, 9), srgb)
     assert small.pixels.dtype == dtype and small.values.tobytes() == floats.tobytes()
     for closest in (False, True):
-        found, expected, beside = (looked_up(each, uv, closest).tobytes() for each in (small, large, other))
-        assert found == expected
+        hits, expected, beside = (looked_up(each, uv, closest).tobytes() for each in (small, large, other))
+        assert hits == expected
         if not (srgb and channels == 4):  # which are multiplied in whole bytes
-            assert found != beside, "a rounding is seen"
+            assert hits != beside, "a rounding is seen"
 
 
 def test_each_byte_pair_of_bytes_and_half_float_is_the_number_that_it_stands_for():
@@ -116,9 +116,9 @@ def test_each_byte_pair_of_bytes_and_half_float_is_the_number_that_it_stands_for
         (halves[np.isfinite(halves)], halves[np.isfinite(halves)]),
     ):
         picture = Picture(np.repeat(each[None, :, None], 3, axis=2))
-        found = looked_up(picture, at((np.arange(len(each)) + 0.5) / len(each), 0.5), closest=True)[2]
-        np.testing.assert_array_equal(found, picture.values[0, :, 2])
-        np.testing.assert_allclose(found, np.float64(expected), rtol=0 if each.dtype == np.float16 else 2.0**-23)
+        hits = looked_up(picture, at((np.arange(len(each)) + 0.5) / len(each), 0.5), closest=True)[2]
+        np.testing.assert_array_equal(hits, picture.values[0, :, 2])
+        np.testing.assert_allclose(hits, np.float64(expected), rtol=0 if each.dtype == np.float16 else 2.0**-23)
 
 
 @given(st.integers(0, 2**24 - 1), st.integers(0, 187))
@@ -127,9 +127,9 @@ def test_whatever_radiances_files_can_say_is_kept_in_four_bytes_and_shown_to_the
     written = Picture(np.full((1, 1, 1), colours | exponent << 24, RGBE))
     kept = Picture.compact(np.concatenate([written.values, np.full((1, 1, 3), 2.0**-100, np.float32)]))
     assert kept.pixels.dtype == RGBE
-    found = np.array([looked_up(picture, at(0.5, 0.25), closest=True)[:, 0] for picture in (written, kept)])
-    np.testing.assert_array_equal(found, 2 * [stood_for(written.pixels)[0, 0].astype(np.float64)])
-    assert colours == 0 or (found[0] != stood_for(written.pixels + np.uint32(1 << 24))[0, 0]).any(), "an exponent is seen"
+    hits = np.array([looked_up(picture, at(0.5, 0.25), closest=True)[:, 0] for picture in (written, kept)])
+    np.testing.assert_array_equal(hits, 2 * [stood_for(written.pixels)[0, 0].astype(np.float64)])
+    assert colours == 0 or (hits[0] != stood_for(written.pixels + np.uint32(1 << 24))[0, 0]).any(), "an exponent is seen"
 
 
 @pytest.mark.parametrize("value", [-1.0, 257.0, np.nextafter(np.float32(1), np.float32(2)), 2.0**-137, 2.0**-149])
@@ -193,8 +193,8 @@ def test_an_interpolated_image_is_continuous_and_stays_between_its_pixels(seed, 
 def test_srgb_is_decoded_after_pixels_are_blended():
     """Half-way between 0 and 1 is the sRGB value ½, 0.2140; blending light would give ½."""
     pixels = grey([[0.0, 1.0]]).pixels
-    found = looked_up(Picture(pixels, srgb=True), at([0.25, 0.5, 0.75], 0.5), False)[0]
-    np.testing.assert_allclose(found, [0, 0.21404114, 1], atol=1e-7)
+    colors = looked_up(Picture(pixels, srgb=True), at([0.25, 0.5, 0.75], 0.5), False)[0]
+    np.testing.assert_allclose(colors, [0, 0.21404114, 1], atol=1e-7)
     assert looked_up(Picture(pixels), at(0.5, 0.5), False)[0, 0] == 0.5
 
 
@@ -212,8 +212,8 @@ def test_colours_that_are_not_finite_nowhere_come_from_uv_that_is_not():
     picture = grey([[0.25, 1.0], [1.0, 1.0]])
     uv = at([np.nan, np.inf, -np.inf, 1e30, -1e300], [0.3, np.nan, 0.3, 1e30, 0.25])
     for closest in (False, True):
-        found = looked_up(picture, uv, closest)
-        assert np.isfinite(found).all() and found.min() >= 0.25
+        hits = looked_up(picture, uv, closest)
+        assert np.isfinite(hits).all() and hits.min() >= 0.25
 
 
 def shown(*materials, pass_name="Diffuse Color", images=None, uv=None, vertex_colours=None):
@@ -225,29 +225,29 @@ def shown(*materials, pass_name="Diffuse Color", images=None, uv=None, vertex_co
         corner_uvs=None if uv is None else np.full((1, 3, 2), uv, np.float32),
         corner_colours=None if vertex_colours is None else np.full((1, 3, 3), vertex_colours, np.float32),
     )
-    found = []
+    result = []
     for number, material in enumerate(materials):
         names = ("",) if material is None else (f"material {number}",)
         table = {f"material {k}": each for k, each in enumerate(materials) if each is not None}
         placed = Object("triangle", "mesh", np.eye(4), materials=names)
         scene = Scene(CAMERA, {"mesh": triangle}, (placed,), materials=table, images=images or {})
-        found.append(render(scene, "direct", 1, threads=1)[pass_name][4, 4])
-    return np.array(found)
+        result.append(render(scene, "direct", 1, threads=1)[pass_name][4, 4])
+    return np.array(result)
 
 
 def test_each_surface_has_the_colour_of_its_material_and_black_where_its_material_has_none():
-    materials = None, Material(diffuse=RED), Material(emission=GREEN)
-    np.testing.assert_allclose(shown(*materials), [PLAIN.diffuse.rgb, RED.rgb, (0, 0, 0)], rtol=1e-7)
+    materials = None, sum_of(diffuse=RED), sum_of(emission=GREEN)
+    np.testing.assert_allclose(shown(*materials), [PLAIN_COLOR.rgb, RED.rgb, (0, 0, 0)], rtol=1e-7)
     np.testing.assert_allclose(shown(*materials, pass_name="Emission"), [(0, 0, 0), (0, 0, 0), GREEN.rgb], rtol=1e-7)
 
 
 def test_images_and_vertex_colours_multiply_the_colour_where_their_material_is_and_nowhere_else():
     images = {"ramp": grey([[0.5, 0.25]])}
-    textured = Material(diffuse=Colour((1.0, 0.5, 0.0), image="ramp", closest=True, vertex=True))
-    of_red = Material(diffuse=RED)
+    textured = sum_of(diffuse=Colour((1.0, 0.5, 0.0), image="ramp", closest=True, vertex=True))
+    of_red = sum_of(diffuse=RED)
     for u, expected in ((0.1, (0.5, 0.125, 0)), (0.9, (0.25, 0.0625, 0))):
-        found = shown(textured, of_red, images=images, uv=(u, 0.5), vertex_colours=(1.0, 0.5, 0.25))
-        np.testing.assert_allclose(found, [expected, RED.rgb], rtol=1e-6)
+        actual = shown(textured, of_red, images=images, uv=(u, 0.5), vertex_colours=(1.0, 0.5, 0.25))
+        np.testing.assert_allclose(actual, [expected, RED.rgb], rtol=1e-6)
 
 
 # --- Filters

@@ -7,7 +7,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene.film import Bounces, Film
 from viewcam_addon.tracer.scene.lamps import Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, Material
+from viewcam_addon.tracer.scene.materials import Colour, Material, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 DOWN = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 32, 24)
@@ -32,15 +32,15 @@ def half(colour=(1.0, 1.0, 1.0), share=0.5):
 @pytest.mark.parametrize("panes", [0, 1, 3])
 def test_panes_multiply_their_colours_on_the_way_to_the_eye_and_to_the_sun(make_mesh, make_lit, panes, level):
     things = [(square(make_mesh, 0.5 + number / 4), surface("transparent", color=TINT)) for number in range(panes)]
-    scene = make_lit(DOWN, (square(make_mesh, 0.0), Material(diffuse=Colour((0.5, 0.5, 0.5)))), *things, lamps=(SUN,))
+    scene = make_lit(DOWN, (square(make_mesh, 0.0), sum_of(diffuse=Colour((0.5, 0.5, 0.5)))), *things, lamps=(SUN,))
     expected = 0.5 * np.array(TINT) ** (2 * panes)
-    shown = render(scene, level, 2, threads=1)["Combined"][..., :3]
-    assert np.abs(shown - expected).max() <= ROUNDED, (shown[0, 0], expected)
+    rendered = render(scene, level, 2, threads=1)["Combined"][..., :3]
+    assert np.abs(rendered - expected).max() <= ROUNDED, (rendered[0, 0], expected)
 
 
 def test_a_shadow_is_black_where_shadow_rays_do_not_go_through(make_mesh, make_lit):
     pane = Material(surface=node("transparent", color=TINT), transparent_shadow=False)
-    things = (square(make_mesh, 0.0), Material(diffuse=Colour((0.5, 0.5, 0.5)))), (square(make_mesh, 1.0), pane)
+    things = (square(make_mesh, 0.0), sum_of(diffuse=Colour((0.5, 0.5, 0.5)))), (square(make_mesh, 1.0), pane)
     assert not render(make_lit(DOWN, *things, lamps=(SUN,)), "path", 2, threads=1)["Combined"][..., :3].any()
 
 
@@ -49,7 +49,7 @@ def test_beyond_the_limit_all_is_dark(make_mesh, make_lit, cycles):
     """As Cycles counts: of three panes before a light the last must not be more than the limit, or one more before 5.0."""
     things = [(square(make_mesh, 0.5 + number / 4), surface("transparent")) for number in range(3)]
     for most in (1, 2, 3):
-        glowing = (square(make_mesh, 0.0), Material(emission=Colour((1, 1, 1))))
+        glowing = (square(make_mesh, 0.0), sum_of(emission=Colour((1, 1, 1))))
         scene = make_lit(DOWN, glowing, *things, bounces=Bounces(transparent=most), cycles=cycles)
         is_seen = most + (cycles < (5, 0)) >= 3
         assert render(scene, "path", 1, threads=1)["Combined"][..., :3].mean() == is_seen, most
@@ -69,15 +69,15 @@ def test_a_white_furnace_stays_white(closed_ball, make_lit, share):
     passes = render(
         make_lit(camera, (closed_ball(6), half(share=share)), world=World((1, 1, 1)), bounces=lots), "path", 64, threads=1
     )
-    shown, error = passes["Combined"][..., :3].astype(float), np.sqrt(passes["Variance"].sum()) / passes["Variance"].size
-    assert abs(shown.mean() - 1) <= 4 * error + ROUNDED and error < 0.01, (shown.mean(), error)
+    radiance, error = passes["Combined"][..., :3].astype(float), np.sqrt(passes["Variance"].sum()) / passes["Variance"].size
+    assert abs(radiance.mean() - 1) <= 4 * error + ROUNDED and error < 0.01, (radiance.mean(), error)
 
 
 def test_the_bits_are_the_same_for_any_number_of_threads(closed_ball, make_lit):
     camera = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 64, 40)
     scene = make_lit(camera, (closed_ball(6), half()), lamps=(SUN,), world=World((0.5, 0.6, 0.7)))
-    one, three = (render(scene, "path", 4, threads=threads)["Combined"] for threads in (1, 3))
-    assert np.array_equal(one, three)
+    single, three = (render(scene, "path", 4, threads=threads)["Combined"] for threads in (1, 3))
+    assert np.array_equal(single, three)
 
 
 # --- Things that stand exactly on others show what they show a little above them, in whatever order they are in the scene
@@ -121,9 +121,9 @@ def seen(make_lit, make_mesh):
     return trace
 
 
-def differing(found, expected):
+def differing(actual, expected):
     """The share of the pixels that differ by a thousandth of the brightest one: a shift by a gap goes across an edge in few."""
-    return (np.abs(found - expected).max(axis=1) > 1e-3 * expected.max()).mean()
+    return (np.abs(actual - expected).max(axis=1) > 1e-3 * expected.max()).mean()
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.2])

@@ -108,10 +108,10 @@ def test_an_array_whose_header_is_malformed_or_lies_is_damaged(refused, member):
 def test_a_size_in_the_archive_that_its_packed_bytes_can_not_hold_is_damaged(refused, tmp_path):
     """The archive's own table lies: 2³¹ bytes in a few, where Deflate packs a thousand into one at most."""
     shape = (2**31 // 24, 3)
-    told = header(f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}}}")
-    refused(document(), {"v.npy": told})
+    text = header(f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}}}")
+    refused(document(), {"v.npy": text})
     data = bytearray((tmp_path / "scene.npz").read_bytes())
-    size, lie = (length.to_bytes(4, "little") for length in (len(told), len(told) + shape[0] * 24))
+    size, lie = (length.to_bytes(4, "little") for length in (len(text), len(text) + shape[0] * 24))
     (tmp_path / "scene.npz").write_bytes(data.replace(size, lie))
     with pytest.raises(InputError, match="the array 'v' is damaged"):
         scene_file.read(tmp_path / "scene.json")

@@ -14,7 +14,7 @@ from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import RAYS, Area, Point, Spot, Sun, World
 from viewcam_addon.tracer.scene.levels import least_level
-from viewcam_addon.tracer.scene.materials import Colour, Material, components
+from viewcam_addon.tracer.scene.materials import Colour, simplified, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 CAMERA = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 4, 4)
@@ -89,11 +89,11 @@ def scene(make_scene, make_mesh):
     """scene(material, field=value, …) → a Scene of one triangle of this material, "object 1"."""
 
     def build(material=None, **changes):
-        made = make_scene(Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 4, 4), make_mesh(np.eye(3), [[0, 1, 2]]))
+        scene = make_scene(Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 4, 4), make_mesh(np.eye(3), [[0, 1, 2]]))
         if material:
-            placed = replace(made.objects[0], materials=("M",))
-            made = replace(made, objects=(placed,), materials={"M": material})
-        return replace(made, **changes)
+            placed = replace(scene.objects[0], materials=("M",))
+            scene = replace(scene, objects=(placed,), materials={"M": material})
+        return replace(scene, **changes)
 
     return build
 
@@ -104,7 +104,7 @@ def scene(make_scene, make_mesh):
         {},
         {"lamps": (replace(SUN, irradiance=(0.0, 0.0, 0.0)), Point("Off", power=(0.0, 0.0, 0.0)))},
         {"world": World(hidden_from={"camera"})},
-        {"material": Material(emission=BLACK)},
+        {"material": sum_of(emission=BLACK)},
     ],
 )
 def test_without_light_there_is_only_geometry(scene, changes):
@@ -117,7 +117,7 @@ def test_without_light_there_is_only_geometry(scene, changes):
     [
         ({"lamps": (SUN,)}, "the lamp 'Sun'"),
         ({"lamps": (Area("Panel", matrix=np.eye(4)),)}, "the lamp 'Panel'"),
-        ({"material": Material(emission=WHITE, diffuse=WHITE)}, "the surface of 'object 1'"),
+        ({"material": sum_of(emission=WHITE, diffuse=WHITE)}, "the surface of 'object 1'"),
         ({"world": World((0.0, 0.5, 0.0))}, "the world"),
         ({"world": World(backdrop=World((0.0, 0.5, 0.0)))}, "the world"),
     ],
@@ -129,7 +129,7 @@ def test_light_on_a_surface_that_reflects_needs_paths(scene, changes, words):
 
 @pytest.mark.parametrize(
     ("material", "words"),
-    [(Material(mirror=WHITE), "mirrors"), (Material(glass=WHITE), "is clear"), (Material(refraction=WHITE), "is clear")],
+    [(sum_of(mirror=WHITE), "mirrors"), (sum_of(glass=WHITE), "is clear"), (sum_of(refraction=WHITE), "is clear")],
 )
 def test_mirrors_and_glass_need_paths(scene, material, words):
     level, reason = least_level(scene(material, lamps=(SUN,)))
@@ -140,11 +140,11 @@ def test_mirrors_and_glass_need_paths(scene, material, words):
     ("material", "bounces", "words"),
     [
         (None, Bounces().none, "allows no bounces"),
-        (Material(emission=WHITE), Bounces(), "nothing reflects"),
-        (Material(diffuse=BLACK), Bounces(), "nothing reflects"),
-        (Material(diffuse=WHITE), Bounces(diffuse=0), "of the kinds"),
-        (Material(mirror=WHITE), Bounces(glossy=0), "of the kinds"),
-        (Material(glass=WHITE), Bounces(transmission=0, glossy=0), "of the kinds"),
+        (sum_of(emission=WHITE), Bounces(), "nothing reflects"),
+        (sum_of(diffuse=BLACK), Bounces(), "nothing reflects"),
+        (sum_of(diffuse=WHITE), Bounces(diffuse=0), "of the kinds"),
+        (sum_of(mirror=WHITE), Bounces(glossy=0), "of the kinds"),
+        (sum_of(glass=WHITE), Bounces(transmission=0, glossy=0), "of the kinds"),
     ],
 )
 def test_without_bounces_light_is_direct(scene, material, bounces, words):
@@ -153,12 +153,12 @@ def test_without_bounces_light_is_direct(scene, material, bounces, words):
 
 
 def test_glass_that_only_reflects_needs_paths(scene):
-    assert least_level(scene(Material(glass=WHITE), lamps=(SUN,), bounces=Bounces(transmission=0)))[0] == "path"
+    assert least_level(scene(sum_of(glass=WHITE), lamps=(SUN,), bounces=Bounces(transmission=0)))[0] == "path"
 
 
 def test_materials_that_nothing_shows_do_not_count(scene):
-    made = scene(Material(emission=WHITE))
-    unused = replace(made, materials=made.materials | {"Mirror": Material(mirror=WHITE)})
+    material = scene(sum_of(emission=WHITE))
+    unused = replace(material, materials=material.materials | {"Mirror": sum_of(mirror=WHITE)})
     assert least_level(unused)[0] == "direct"
 
 
@@ -179,32 +179,32 @@ def mixed(factor, first, second):
 
 
 @given(st.dictionaries(st.sampled_from(["diffuse", "emission", "mirror", "glass", "refraction"]), COLOURS))
-def test_the_components_of_what_a_material_adds_up_are_its_own(given):
-    material = Material(**given, ior=1.3)
-    tree = added(*(closure.node for closure in material.closures)) if given else None
-    found = components(tree)
-    assert Material(**found).colours == given
-    assert found.get("ior", 1.3) == 1.3
+def test_the_components_of_what_a_material_adds_up_are_its_own(stated):
+    material = sum_of(**stated, ior=1.3)
+    tree = added(*(closure.node for closure in reversed(material.closures))) if stated else None
+    assert simplified(tree) == material.surface
 
 
 def test_a_mixture_shares_out_colours_and_adds_those_that_are_alike():
     red, blue = node("diffuse", color=RED), node("diffuse", color=BLUE)
-    assert components(mixed(0.25, red, None)) == {"diffuse": Colour((0.375, 0.1875, 0.09375))}
-    assert components(mixed(0.5, red, blue)) == {"diffuse": Colour((0.25, 0.25, 0.5625))}
-    assert components(mixed(0.0, red, node("sheen"))) == {"diffuse": RED}
+    assert simplified(mixed(0.25, red, None)) == sum_of(diffuse=Colour((0.375, 0.1875, 0.09375))).surface
+    assert simplified(mixed(0.5, red, blue)) == sum_of(diffuse=Colour((0.25, 0.25, 0.5625))).surface
+    assert simplified(mixed(0.0, red, node("sheen"))) == sum_of(diffuse=RED).surface
     wood = node("diffuse", color=WOOD)
-    assert components(mixed(0.25, wood, wood)) == {"diffuse": WOOD}
+    assert simplified(mixed(0.25, wood, wood)) == sum_of(diffuse=WOOD).surface
 
 
 def test_a_principled_surface_without_gloss_is_diffuse_and_may_shine():
     plain = {"base_color": RED, "roughness": 0.3, "specular_ior_level": 0.0}
-    assert components(node("principled", **plain)) == {"diffuse": RED}
-    assert components(node("principled", base_color=RED, ior=1.0)) == {"diffuse": RED}
+    assert simplified(node("principled", **plain)) == sum_of(diffuse=RED).surface
+    assert simplified(node("principled", base_color=RED, ior=1.0)) == sum_of(diffuse=RED).surface
     shining = node("principled", **plain, emission_color=BLUE, emission_strength=2.0)
-    assert components(shining) == {"diffuse": RED, "emission": Colour((0.0, 0.5, 2.0))}
+    assert simplified(shining) == sum_of(diffuse=RED, emission=Colour((0.0, 0.5, 2.0))).surface
     for name in ("metallic", "transmission_weight", "coat_weight", "sheen_weight", "diffuse_roughness", "specular_ior_level"):
-        assert components(node("principled", **(plain | {name: 0.1}))) is None, name
-    assert components(node("principled", **plain, alpha=0.9)) is None
+        glossy = node("principled", **(plain | {name: 0.1}))
+        assert simplified(glossy) is glossy, name
+    clear = node("principled", **plain, alpha=0.9)
+    assert simplified(clear) is clear
 
 
 @pytest.mark.parametrize(
@@ -224,8 +224,8 @@ def test_a_principled_surface_without_gloss_is_diffuse_and_may_shine():
         node("transparent"),
     ],
 )
-def test_what_components_can_not_say_is_none(tree):
-    assert components(tree) is None
+def test_what_components_can_not_say_stays(tree):
+    assert simplified(tree) is tree
 
 
 # --- What lamps may be: hostile values become a sentence, and what gives no light is known

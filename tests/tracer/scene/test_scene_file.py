@@ -41,8 +41,8 @@ def assert_same_scene(first, second):
                 pairs = [(each, read_back[key]) for key, each in array.items()]
             else:
                 pairs = [] if array is None else [(array, read_back)]
-            for one, again in pairs:
-                assert one.dtype == again.dtype and np.array_equal(one, again), f"{field} of {name}"
+            for left, again in pairs:
+                assert left.dtype == again.dtype and np.array_equal(left, again), f"{field} of {name}"
     for placed, other in zip(first.objects, second.objects, strict=True):
         assert np.array_equal(placed.matrix, other.matrix)
         assert (placed.name, placed.color) == (other.name, other.color)
@@ -141,7 +141,7 @@ def test_a_plane_is_two_triangles_with_a_uv_map_along_its_edges(example, read_do
         (["format"], "something else", ["'format'", "no scene file"]),
         (["version"], 2, ["'version'", "2"]),
         (["version"], "1", ["'version'", "'1'"]),
-        (["colour"], 1, ["unknown key 'colour'"]),
+        (["color"], 1, ["unknown key 'color'"]),
         (["camera"], None, ["'camera'"]),
         (["camera"], 5, ["'camera'", "object"]),
         (["camera", "eye"], None, ["'camera'", "'eye'"]),
@@ -172,7 +172,7 @@ def test_a_plane_is_two_triangles_with_a_uv_map_along_its_edges(example, read_do
         (["geometries", "beads", "radii"], "many", ["'radii' of geometry 'beads'"]),
         (["geometries", "beads", "centers"], [[0, 0, 0], [1, 1]], ["'centers' of geometry 'beads'"]),
         (["geometries", "beads", "materials"], [0, 1], ["'beads'", "material_indices"]),
-        (["geometries", "beads", "colour"], [1], ["geometry 'beads'", "unknown key 'colour'"]),
+        (["geometries", "beads", "color"], [1], ["geometry 'beads'", "unknown key 'color'"]),
         (["geometries", "tent", "triangles"], [[0, 1, 5]], ["geometry 'tent'", "0 … 4"]),
         (["geometries", "tent", "triangles"], [[0, 1, 0.5]], ["'triangles' of geometry 'tent'", "whole"]),
         (["geometries", "tent", "triangles"], [[0, 1, 2**40]], ["'triangles' of geometry 'tent'"]),

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from viewcam_addon.tracer.scene import scene_file
 from viewcam_addon.tracer.scene.film import FILTERS, Bounces, Film
 from viewcam_addon.tracer.scene.lamps import RAYS, Area, Point, Spot, Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, Material, Picture
+from viewcam_addon.tracer.scene.materials import COMPONENTS, Colour, Material, Picture, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import DISTRIBUTIONS, node
 
 DOCUMENTATION = Path(__file__).parents[3] / "docs" / "scene-file.md"
@@ -42,8 +42,8 @@ def differences(first, second, where="scene"):
         for key in first:
             yield from differences(first[key], second[key], f"{where}[{key!r}]")
     elif isinstance(first, tuple) and len(first) == len(second):
-        for index, (one, other) in enumerate(zip(first, second, strict=True)):
-            yield from differences(one, other, f"{where}[{index}]")
+        for index, (left, other) in enumerate(zip(first, second, strict=True)):
+            yield from differences(left, other, f"{where}[{index}]")
     elif first != second:
         yield f"{where}: {first!r} became {second!r}"
 
@@ -116,7 +116,7 @@ shaders = st.recursive(
     max_leaves=4,
 )
 materials = st.builds(Material, surface=shaders, displacement=made) | st.builds(
-    Material,
+    sum_of,
     **{name: st.none() | colours for name in ("diffuse", "emission", "mirror", "glass", "refraction")},
     ior=st.floats(1e-3, 1e3),
 )
@@ -187,8 +187,8 @@ def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mes
     path = tmp_path_factory.mktemp("scene") / "light.json"
     scene_file.write(scene, path)
     back = scene_file.read(path)
-    found = list(differences(scene, back))
-    assert not found, "\n".join(found)
+    errors = list(differences(scene, back))
+    assert not errors, "\n".join(errors)
 
 
 def test_in_a_list_numbers_are_what_they_say_and_in_an_array_bytes_are_shares_of_255(random_scene, tmp_path):
@@ -217,9 +217,9 @@ def test_a_scene_without_light_has_no_key_of_it(random_scene, tmp_path):
 def test_the_documented_light_is_what_it_says(example, read_document):
     scene = read_document(example)
     wall, board = scene.materials["wall"], scene.materials["board"]
-    assert wall == Material(diffuse=Colour((0.7, 0.7, 0.7)))
-    assert board.diffuse == Colour((1.0, 1.0, 1.0), "checks", closest=True) and scene.images["checks"].srgb
-    assert scene.materials["pane"] == Material(glass=Colour((1.0, 1.0, 1.0)), ior=1.5)
+    assert wall == sum_of(diffuse=Colour((0.7, 0.7, 0.7)))
+    assert board == sum_of(diffuse=Colour((1.0, 1.0, 1.0), "checks", closest=True)) and scene.images["checks"].srgb
+    assert scene.materials["pane"] == sum_of(glass=Colour((1.0, 1.0, 1.0)), ior=1.5)
     sun, lamp, panel = scene.lamps
     assert isinstance(sun, Sun) and sun.angle == 0.00918 and np.linalg.norm(sun.towards) == pytest.approx(1, abs=1e-15)
     assert isinstance(lamp, Point) and (lamp.position, lamp.radius) == ((1.0, -2.0, 3.0), 0.1)
@@ -232,16 +232,15 @@ def test_the_documented_light_is_what_it_says(example, read_document):
 
 def test_every_key_of_light_is_documented():
     text = DOCUMENTATION.read_text(encoding="utf-8")
-    keys = {
-        each.name for kind in (Sun, Point, Spot, Area, World, Film, Bounces, Material, Colour, Picture) for each in fields(kind)
-    }
+    kinds = (Sun, Point, Spot, Area, World, Film, Bounces, Material, Colour, Picture)
+    keys = {*COMPONENTS, "ior", *(each.name for kind in kinds for each in fields(kind))}
     missing = [key for key in sorted(keys) if f"`{key}`" not in text]
     assert not missing, missing
 
 
 def in_a_row(count):
     """So many nodes, each of which feeds the next."""
-    return functools.reduce(lambda made, _: {"type": "math", "a": made}, range(count), 0.5)
+    return functools.reduce(lambda node, _: {"type": "math", "a": node}, range(count), 0.5)
 
 
 @pytest.mark.parametrize(

@@ -93,9 +93,9 @@ class BackgroundBatch:
         if status is None:
             return None
         self._process.end()
-        said = (self._temporary / _SAID).read_text(encoding="utf-8", errors="replace")
+        output = (self._temporary / _SAID).read_text(encoding="utf-8", errors="replace")
         self._clear()
-        return status, comparing.failure(said, status) if status else ""
+        return status, comparing.failure(output, status) if status else ""
 
     def cancel(self) -> None:
         """End it at once; what is there stays."""

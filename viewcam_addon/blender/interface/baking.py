@@ -171,7 +171,7 @@ def _write(flight: _Flight) -> None:
 
 
 def _agreement(flight: _Flight, baked: Sequence[Pinhole], times: list[float]) -> BakedAgreement:
-    errors = [conversion_error(live, found, np.array([reach])) for (live, reach), found in zip(flight.live, baked, strict=True)]
+    errors = [conversion_error(live, keyed, np.array([reach])) for (live, reach), keyed in zip(flight.live, baked, strict=True)]
     off = np.array([error.largest for error in errors])
     ok = all(error.share <= _SHARE_OF_ROUNDING for error in errors[::2])
     if len(off) == 1:
@@ -293,8 +293,8 @@ class VIEWCAM_OT_bake_camera(CameraOperator, bpy.types.Operator):
         if self.selected:
             also = (item for item in bpy.context.selected_objects if item.type == "CAMERA" and item.virtual_pinhole.enabled)
             chosen |= {item.name: item for item in also if item.name in scene.objects}
-        for found in bake(list(chosen.values()), scene, self.frame_start, self.frame_end, self.keys_per_frame):
-            self.report({"INFO"} if found.ok else {"WARNING"}, found.sentence())
+        for flight in bake(list(chosen.values()), scene, self.frame_start, self.frame_end, self.keys_per_frame):
+            self.report({"INFO"} if flight.ok else {"WARNING"}, flight.sentence())
 
 
 class VIEWCAM_OT_delete_keyframes(CameraOperator, bpy.types.Operator):
@@ -310,15 +310,15 @@ class VIEWCAM_OT_delete_keyframes(CameraOperator, bpy.types.Operator):
         return context.window_manager.invoke_confirm(self, event)
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
-        found = causes.keyed(camera_object, versions.action_curves)
-        if not found:
+        curves = causes.keyed(camera_object, versions.action_curves)
+        if not curves:
             raise InputError(
                 f"no action of camera {camera_object.name!r} has keyframes of its own channels: look into its NLA tracks"
             )
-        for block, _ in found:
+        for block, _ in curves:
             check_editable(block)
             check_own_action(block)
-        for block, path in found:
+        for block, path in curves:
             versions.remove_curves(block, path)
         if camera_object.virtual_pinhole.enabled:
             cameras.CameraSync.of(camera_object).edited(scene)

@@ -75,15 +75,15 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, file_menu.IntoScene, bpy.types.O
 
         try:
             paths = self._paths()
-            found, notes, kinds = [], [], set()
+            read_cameras, notes, kinds = [], [], set()
             for path in paths:
                 kinds.add(formats.recognised(path))
-                more, told = read(path, context.scene, self.distance, self)
-                found, notes = found + more, notes + told
+                more, more_notes = read(path, context.scene, self.distance, self)
+                read_cameras, notes = read_cameras + more, notes + more_notes
             as_flight = self.made == "FLIGHT" or (self.made == "BY_FILE" and kinds == {"trajectories"})
             folder = paths[0] if paths[0].is_dir() else paths[0].parent
             imported = import_cameras.import_cameras(
-                found,
+                read_cameras,
                 file_menu.text(paths[0].stem) or "Cameras",
                 context.scene,
                 folder if self.backgrounds else None,
@@ -97,12 +97,18 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, file_menu.IntoScene, bpy.types.O
             file_menu.select(imported.objects, imported.objects[0], context)
         notes = list(dict.fromkeys((*notes, *imported.notes)))
         title = ", ".join(formats.FORMATS[kind].TITLE for kind in sorted(kinds))
-        what = f"a flight of {len(found)} poses" if as_flight else "1 camera" if len(found) == 1 else f"{len(found)} cameras"
+        what = (
+            f"a flight of {len(read_cameras)} poses"
+            if as_flight
+            else "1 camera"
+            if len(read_cameras) == 1
+            else f"{len(read_cameras)} cameras"
+        )
         pictures = f", {imported.pictures} with pictures" if imported.pictures else ""
-        told = f"; {len(notes)} notes" if len(notes) > 1 else "; 1 note" if notes else ""
+        more_notes = f"; {len(notes)} notes" if len(notes) > 1 else "; 1 note" if notes else ""
         for note in notes[:_MOST_NOTES]:
             self.report({"WARNING"}, file_menu.text(note))
-        self.report({"INFO"}, file_menu.text(f"{paths[0].name}: {what}{pictures} ({title}){told}"))
+        self.report({"INFO"}, file_menu.text(f"{paths[0].name}: {what}{pictures} ({title}){more_notes}"))
         if notes and not bpy.app.background:
             file_menu.show(file_menu.lines_of([(note, "INFO") for note in notes]), "Imported Cameras", context)
         return {"FINISHED"}
@@ -142,10 +148,10 @@ def read(
         base = cameras.read(camera_object, scene)
         notes.append(f"Where the file does not say how the camera sees, it sees as {camera_object.name}")
     options = properties.chosen(size=size, size_fits=True, pixel_aspect=aspect, view_plane=plane, base=base)
-    found = formats.read(path, options=options)
-    if base is None and plane is None and not all(camera.size_stated for camera in found):
+    read_cameras = formats.read(path, options=options)
+    if base is None and plane is None and not all(camera.size_stated for camera in read_cameras):
         notes.append(f"The file does not say how many pixels its pictures have: {width} × {height} of the scene were taken")
-    return found, notes
+    return read_cameras, notes
 
 
 class VIEWCAM_OT_export_cameras(WorldOptions, ExportHelper, bpy.types.Operator):
@@ -193,34 +199,34 @@ class VIEWCAM_OT_export_cameras(WorldOptions, ExportHelper, bpy.types.Operator):
                 raise InputError("the cameras have no file name: give one")
             if suffix and self.format != "sidecar" and not path.suffix:
                 path = path.with_suffix(suffix)
-            found = self._at_each_frame(context.scene) if self.which == "FRAMES" else self._cameras(context)
-            written = formats.save(found, path, self.format, self.chosen())
+            exported = self._at_each_frame(context.scene) if self.which == "FRAMES" else self._cameras(context)
+            written = formats.save(exported, path, self.format, self.chosen())
         except InputError as error:
             self.report({"ERROR"}, file_menu.text(datablocks.sentence(error)))
             return {"CANCELLED"}
-        count = "1 camera" if len(found) == 1 else f"{len(found)} cameras"
+        count = "1 camera" if len(exported) == 1 else f"{len(exported)} cameras"
         files = "" if len(written) == 1 else f", {len(written)} files"
         self.report({"INFO"}, file_menu.text(f"{path.name}: {count} ({formats.FORMATS[self.format].TITLE}{files})"))
         return {"FINISHED"}
 
     def _at_each_frame(self, scene: bpy.types.Scene) -> list[formats.Camera]:
         frames = makers.frames(f"{scene.frame_start}..{scene.frame_end}")[:: scene.frame_step]
-        found = dataset_cameras.of_frames(scene, [(job.name, job.frame) for job in frames])
+        result = dataset_cameras.of_frames(scene, [(job.name, job.frame) for job in frames])
         frame = datablocks.frame_of(scene)
-        return [dataclasses.replace(each, pinhole=picture.at_full_size(each.pinhole, frame)) for each in found]
+        return [dataclasses.replace(each, pinhole=picture.at_full_size(each.pinhole, frame)) for each in result]
 
     def _cameras(self, context: bpy.types.Context) -> list[formats.Camera]:
         return [clipboard.camera_of(each, context.scene) for each in self._chosen_objects(context)]
 
     def _chosen_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         if self.which == "SCENE":
-            found = [datablocks.render_camera(context.scene)]
+            result = [datablocks.render_camera(context.scene)]
         else:
             objects = context.selected_objects if self.which == "SELECTED" else context.scene.objects
-            found = [each for each in objects if each.type == "CAMERA"]
-        if found in ([], [None]):
+            result = [each for each in objects if each.type == "CAMERA"]
+        if result in ([], [None]):
             raise InputError("there is no such camera: select one, or choose All")
-        return sorted(found, key=lambda each: each.name)
+        return sorted(result, key=lambda each: each.name)
 
 
 class VIEWCAM_FH_cameras(bpy.types.FileHandler):

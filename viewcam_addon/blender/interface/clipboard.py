@@ -62,8 +62,8 @@ class VIEWCAM_OT_copy_camera(WorldOptions, CameraOperator, bpy.types.Operator):
         own = self.format == OWN
         text = text_of(camera_object, scene, self.format, formats.Options() if own and not self.ask else self.chosen())
         bpy.context.window_manager.clipboard = text
-        told = "" if self.axes == "as_is" and self.scale == 1 else f", axes {self.axes}, scale {self.scale:.7g}"
-        self.report({"INFO"}, f"Copied {text}" if own else f"Copied {camera_object.name} as {self._title()}{told}")
+        how = "" if self.axes == "as_is" and self.scale == 1 else f", axes {self.axes}, scale {self.scale:.7g}"
+        self.report({"INFO"}, f"Copied {text}" if own else f"Copied {camera_object.name} as {self._title()}{how}")
 
     def _title(self) -> str:
         return formats.FORMATS[self.format].TITLE
@@ -129,10 +129,10 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
             return self.execute(context)
         try:
             camera_object = bpy.data.objects.get(self.camera) or datablocks.camera_in(context)
-            found = self._found(text, camera_object, datablocks.scene_of(camera_object))
-            if len(found) == 1 or self.named:
+            read = self._found(text, camera_object, datablocks.scene_of(camera_object))
+            if len(read) == 1 or self.named:
                 return self.execute(context)
-            cls.names, cls.question = [camera.name for camera in found], f"The text has {len(found)} cameras: name one of them"
+            cls.names, cls.question = [camera.name for camera in read], f"The text has {len(read)} cameras: name one of them"
         except InputError as error:
             cls.names, cls.question = [], datablocks.sentence(error)
         return context.window_manager.invoke_props_dialog(self, width=_DIALOG_WIDTH)
@@ -149,11 +149,11 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         type(self).question = ""  # it is answered, and the panel of the last operation shows the same properties
         text = self.text or _clipboard()
-        found = formats.choose(self._found(text, camera_object, scene), self.named or None)
+        camera = formats.choose(self._found(text, camera_object, scene), self.named or None)
         before = _present(camera_object, scene)
-        findings = paste(found, before, camera_object, scene, self.set_size)
-        self.report({"INFO"}, f"Pasted {_said(found.pinhole, before)} on {camera_object.name}")
-        is_lying = found.pinhole.up == _Y_UP != before.up == preferences.up_axis()
+        findings = paste(camera, before, camera_object, scene, self.set_size)
+        self.report({"INFO"}, f"Pasted {_said(camera.pinhole, before)} on {camera_object.name}")
+        is_lying = camera.pinhole.up == _Y_UP != before.up == preferences.up_axis()
         if is_lying and self.axes == "as_is" and formats.recognised(text) != OWN:
             findings.append("In this text y is up, and in the scene it is not: the arrow beside Paste has Paste Upright")
         for finding in findings:  # after it, since the status bar shows what was reported last
@@ -220,8 +220,8 @@ def camera_of(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> format
     """
     frame = datablocks.frame_of(scene)
     stated = cameras.stated(camera_object, scene)
-    shown = stated or cameras.as_it_stands(camera_object, scene, in_use=False)
-    whole = picture.at_full_size(shown, frame)
+    pinhole = stated or cameras.as_it_stands(camera_object, scene, in_use=False)
+    whole = picture.at_full_size(pinhole, frame)
     if stated:  # as it was typed
         across = targets.values(camera_object).distance_at_full_size(frame, camera_object.data.sensor_fit)
         upwards = across * (frame.pixel_aspect_x / frame.pixel_aspect_y)
@@ -243,7 +243,7 @@ def text_of(
 
 
 def paste(
-    found: formats.Camera, present: Pinhole, camera_object: bpy.types.Object, scene: bpy.types.Scene, set_size: bool = False
+    camera: formats.Camera, present: Pinhole, camera_object: bpy.types.Object, scene: bpy.types.Scene, set_size: bool = False
 ) -> list[str]:
     """State what a text says in the camera's values, and move it there; its view plane as well, if the text says one.
 
@@ -255,16 +255,16 @@ def paste(
         as `apply` does. Nothing has changed then.
     """
     frame = datablocks.frame_of(scene)
-    if found.pinhole.plane == picture.at_full_size(present, frame).plane:  # the text says none
-        pinhole = dataclasses.replace(present, **_pose(found.pinhole), mirrored=found.pinhole.mirrored)
-        return [*found.notes, *cameras.apply(camera_object, pinhole, scene)]
+    if camera.pinhole.plane == picture.at_full_size(present, frame).plane:  # the text says none
+        pinhole = dataclasses.replace(present, **_pose(camera.pinhole), mirrored=camera.pinhole.mirrored)
+        return [*camera.notes, *cameras.apply(camera_object, pinhole, scene)]
     with contextlib.ExitStack() as undo:
         if set_size:
-            picture.set_size(Overrides(undo), scene, found.pinhole)
-        pinhole, notes = picture.fitted(found.pinhole, datablocks.frame_of(scene))
-        said = [*found.notes, *notes, *cameras.apply(camera_object, pinhole, scene)]
+            picture.set_size(Overrides(undo), scene, camera.pinhole)
+        pinhole, notes = picture.fitted(camera.pinhole, datablocks.frame_of(scene))
+        messages = [*camera.notes, *notes, *cameras.apply(camera_object, pinhole, scene)]
         undo.pop_all()
-    return said
+    return messages
 
 
 def _pose(pinhole: Pinhole) -> dict[str, tuple]:

@@ -77,10 +77,10 @@ class Outcome:
 
         And of everything, where not all of it is modeled: the artist's own picture, of which the others show stand-ins.
         """
-        found = {name: self._there(file) for name, file in _PICTURES.items()}
+        paths = {name: self._there(file) for name, file in _PICTURES.items()}
         everything = self._there(SIDES["everything"])
         more = {"everything": everything} if everything else {}
-        return more | found if all(found.values()) else {}
+        return more | paths if all(paths.values()) else {}
 
     def is_of(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
         """True if the camera is still the one that was compared."""
@@ -206,8 +206,14 @@ class RunningComparison:
             except (OSError, InputError) as error:
                 return Outcome(*of, None, f"The report can't be kept in {self._keep_in} ({error}): choose another folder")
         drawn = result.get("difference", {})
-        told = result["answer"], result["sentence"], headline(result), tuple(figures(result)), tuple(lacking(result["ledger"]))
-        return Outcome(*of, *told, folder, drawn.get("colours", ""), drawn.get("scale", {}), temporary)
+        verdict = (
+            result["answer"],
+            result["sentence"],
+            headline(result),
+            tuple(figures(result)),
+            tuple(lacking(result["ledger"])),
+        )
+        return Outcome(*of, *verdict, folder, drawn.get("colours", ""), drawn.get("scale", {}), temporary)
 
     def _said(self) -> str:
         return (self.folder / _SAID).read_text(encoding="utf-8", errors="replace")
@@ -218,7 +224,7 @@ def _step(event: Mapping[str, Any], pictures: int) -> tuple[int, str]:
     if event["name"] == "rendering":
         number = event["number"]
         if number > pictures:
-            return pictures, "Rendering what is not modelled"
+            return pictures, "Rendering what is not modeled"
         return number - 1, "Rendering with Cycles" + (f", {number} of {pictures}" if pictures > 1 else "")
     return (pictures, "Tracing") if event["name"] == "tracing" else (pictures + 1, "Comparing")
 
@@ -302,7 +308,7 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
             rows.append(("Light, to Tracer's", ratio))
     ledger = result["ledger"]
     whole = sum(entry["status"] == "exported" for entry in ledger)
-    return [*rows, ("Modelled", f"{whole} of {len(ledger)} objects")]
+    return [*rows, ("Modeled", f"{whole} of {len(ledger)} objects")]
 
 
 def failure(printed: str, status: int) -> str:
@@ -398,8 +404,8 @@ def _remove(path: Path) -> None:
 def _percentiles(row: dict[str, Any], unit: str) -> list[tuple[str, str]]:
     """The percentiles of a row of a table that has any, as JSON has it."""
     names = (("Median", "p50"), ("99.9 % within", "p99.9"))
-    found = row["percentiles"]
-    return [(label, f"{plain(found[name]['value'])} {unit}") for label, name in names if name in found]
+    percentiles = row["percentiles"]
+    return [(label, f"{plain(percentiles[name]['value'])} {unit}") for label, name in names if name in percentiles]
 
 
 def _copy_whole(source: str, target: str) -> None:

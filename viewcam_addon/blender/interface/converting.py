@@ -45,7 +45,9 @@ def convert_keyframes(camera_object: bpy.types.Object, scene: bpy.types.Scene, f
         for block, path in keyed:
             versions.remove_curves(block, path)
         _key(camera_object, scene, seen, is_sensor_keyed=any(path.startswith("sensor") for _, path in keyed))
-        off = [frame for frame, one in zip(frames, seen, strict=True) if _differs_at(camera_object, scene, frame, one.pinhole)]
+        off = [
+            frame for frame, state in zip(frames, seen, strict=True) if _differs_at(camera_object, scene, frame, state.pinhole)
+        ]
     finally:
         scene.frame_set(before[0], subframe=before[1])
     what = f"the camera differs at {len(off)} of them, first at {off[0]}" if off else "the camera stands the same at each"
@@ -138,8 +140,8 @@ def _check_keyed(camera_object: bpy.types.Object) -> list[tuple[bpy.types.ID, st
 
 def track_to_of(camera_object: bpy.types.Object) -> bpy.types.Constraint | None:
     """The Track To that turns a camera, the last of several."""
-    found = [each for each in pose.active_constraints(camera_object) if each.type == "TRACK_TO" and each.target]
-    return found[-1] if found else None
+    constraints = [each for each in pose.active_constraints(camera_object) if each.type == "TRACK_TO" and each.target]
+    return constraints[-1] if constraints else None
 
 
 def convert_track_to(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
@@ -195,16 +197,16 @@ class VIEWCAM_OT_convert_keyframes(CameraOperator, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Ask, since keyframes are deleted."""
-        found = self.found(context)
-        if found is None:
+        camera_object = self.target_camera(context)
+        if camera_object is None:
             return self.execute(context)
-        self._complete(found, context.scene)
+        self._complete(camera_object, context.scene)
         return context.window_manager.invoke_props_dialog(self, width=400)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        if found := self.found(context):
-            paths = ", ".join(dict.fromkeys(path for _, path in causes.keyed(found, versions.action_curves)))
+        if camera_object := self.target_camera(context):
+            paths = ", ".join(dict.fromkeys(path for _, path in causes.keyed(camera_object, versions.action_curves)))
             layout.label(text=f"Keyframes that are deleted: {paths}", icon="ERROR", translate=False)
         layout.use_property_split = True
         for name in ("frame_start", "frame_end"):

@@ -57,11 +57,11 @@ _drag: _Drag | None = None
 
 def camera_in(context: bpy.types.Context) -> bpy.types.Object | None:
     """The camera that has handles in the context's viewport: the active object, if its values are in use and can be edited."""
-    found = context.view_layer.objects.active
-    if not found or not found.is_editable:
+    active = context.view_layer.objects.active
+    if not active or not active.is_editable:
         return None
-    is_seen = overlay.is_shown(found, context) or overlay.looked_through(context) == found
-    return found if is_seen and found.virtual_pinhole.show_handles else None
+    is_seen = overlay.is_shown(active, context) or overlay.looked_through(context) == active
+    return active if is_seen and active.virtual_pinhole.show_handles else None
 
 
 def place(camera_object: bpy.types.Object, name: str) -> Triple | None:
@@ -71,12 +71,12 @@ def place(camera_object: bpy.types.Object, name: str) -> Triple | None:
         return None
     eye, look_at, up, _ = group.numbers()
     if name != "up":
-        found = {"eye": eye, "look_at": look_at}[name]
+        point = {"eye": eye, "look_at": look_at}[name]
     elif eye == look_at or not any(up):
         return None
     else:
-        found = diagrams.up_tip(eye, look_at, up, group.plane_at)
-    return found if np.isfinite(found).all() else None
+        point = diagrams.up_tip(eye, look_at, up, group.plane_at)
+    return point if np.isfinite(point).all() else None
 
 
 def drag(camera_object: bpy.types.Object, name: str, value: Triple) -> None:
@@ -109,7 +109,7 @@ def _end_if_over() -> float | None:
 
 
 def end_drag() -> None:
-    """End a drag: what was dragged becomes a keyframe, where auto keying asks for one, and a step of undo; what was cancelled
+    """End a drag: what was dragged becomes a keyframe, where auto keying asks for one, and a step of undo; what was canceled
     does not."""
     global _drag
     ended, _drag = _drag, None

@@ -18,10 +18,10 @@ def state(camera_object: bpy.types.Object) -> dict[str, object]:
     values = [each.identifier for each in stored if not each.is_readonly and each.type != "POINTER"]
     paths = [*_CHANNELS, *(f"data.{name}" for name in _LENS)]
     paths += [f"virtual_pinhole.{name}" for name in values]
-    found = {path: camera_object.path_resolve(path) for path in paths}
+    state = {path: camera_object.path_resolve(path) for path in paths}
     return {
         path: tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
-        for path, value in found.items()
+        for path, value in state.items()
     }
 
 

@@ -80,7 +80,7 @@ class VIEWCAM_OT_look_at_selection(_SelectionMove, bpy.types.Operator):
     bl_label = "Look at Selection"
     bl_description = "Bring the selection's center into the middle of the view. The camera turns and stays where it is"
 
-    centre: bpy.props.EnumProperty(
+    center: bpy.props.EnumProperty(
         name="Center",
         description="Which point of the selection the camera looks at",
         items=(
@@ -92,7 +92,7 @@ class VIEWCAM_OT_look_at_selection(_SelectionMove, bpy.types.Operator):
     def moved(self, pinhole: Pinhole, camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
         points = selection.points(bpy.context, camera_object)
         return replace(
-            pinhole, look_at=selection.median(points) if self.centre == "MEDIAN" else selection.bounds_centre(points)
+            pinhole, look_at=selection.median(points) if self.center == "MEDIAN" else selection.bounds_center(points)
         )
 
 
@@ -143,11 +143,11 @@ class VIEWCAM_OT_dolly_camera(_Move, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Ask for the distance: at the one that there is nothing would be seen to happen."""
-        found = self.found(context)
-        if found is None or self.properties.is_property_set("reach"):
+        camera_object = self.target_camera(context)
+        if camera_object is None or self.properties.is_property_set("reach"):
             return self.execute(context)
         with contextlib.suppress(InputError):  # which is told where the distance is confirmed
-            pinhole = _pinhole(found, datablocks.scene_of(found))
+            pinhole = _pinhole(camera_object, datablocks.scene_of(camera_object))
             self.reach = math.dist(pinhole.eye, pinhole.look_at)
         return context.window_manager.invoke_props_dialog(self)
 
@@ -221,11 +221,11 @@ class VIEWCAM_OT_drag_camera(_Move, bpy.types.Operator):
         return dragging.moved(pinhole, self.kind, tuple(self.amount))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        found = self.found(context)
+        camera_object = self.target_camera(context)
         try:
-            if found is None:
+            if camera_object is None:
                 raise InputError("there is no camera: select one")
-            self._drag = dragging.Drag(found, datablocks.scene_of(found), self.kind)
+            self._drag = dragging.Drag(camera_object, datablocks.scene_of(camera_object), self.kind)
         except InputError as error:
             self.report({"ERROR"}, datablocks.sentence(error))
             return {"CANCELLED"}
@@ -294,7 +294,7 @@ class VIEWCAM_OT_frame_selection(_SelectionMove, bpy.types.Operator):
     def moved(self, pinhole: Pinhole, camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
         points = selection.points(bpy.context, camera_object)
         if self.center and "look-at" not in targets.names(camera_object):
-            center = selection.bounds_centre(points)
+            center = selection.bounds_center(points)
             pinhole = replace(pinhole, look_at=center) if self.by == "DISTANCE" else moves.trucked_to(pinhole, center)
         frame = moves.framed_by_distance if self.by == "DISTANCE" else moves.framed_by_eye
         return frame(pinhole, points, self.margin / 100)

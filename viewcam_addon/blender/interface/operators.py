@@ -24,13 +24,13 @@ class NamesCamera:
         options={"SKIP_SAVE"},
     )
 
-    def found(self, context: bpy.types.Context) -> bpy.types.Object | None:
+    def target_camera(self, context: bpy.types.Context) -> bpy.types.Object | None:
         """The object that is meant, if there is one."""
         return bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
 
     def one(self, context: bpy.types.Context) -> bpy.types.Object:
         """The object that is meant, or InputError."""
-        result = self.found(context)
+        result = self.target_camera(context)
         if result is None:
             raise InputError(f"there is no camera {self.camera!r}: name another")
         return result
@@ -50,10 +50,10 @@ class CameraOperator(NamesCamera):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            found = self.found(context)
-            if found is None:
+            camera_object = self.target_camera(context)
+            if camera_object is None:
                 raise InputError(f"there is no camera {self.camera!r}" if self.camera else "there is no camera: select one")
-            self.work(found, datablocks.scene_of(found))
+            self.work(camera_object, datablocks.scene_of(camera_object))
         except InputError as error:
             self.report({"ERROR"}, datablocks.sentence(error))
             return {"CANCELLED"}

@@ -51,8 +51,8 @@ def looked_through(context: bpy.types.Context) -> bpy.types.Object | None:
     """The enabled camera that the context's viewport looks through."""
     if not _is_viewport(context) or context.region_data.view_perspective != "CAMERA":
         return None
-    found = context.space_data.camera if context.space_data.use_local_camera else context.scene.camera
-    return found if found and found.type == "CAMERA" and found.virtual_pinhole.enabled else None
+    camera_object = context.space_data.camera if context.space_data.use_local_camera else context.scene.camera
+    return camera_object if camera_object and camera_object.type == "CAMERA" and camera_object.virtual_pinhole.enabled else None
 
 
 def _is_viewport(context: bpy.types.Context) -> bool:
@@ -81,8 +81,8 @@ def _figures(context: bpy.types.Context) -> Iterator[tuple[Pinhole, Triple, floa
 
 @functools.lru_cache(maxsize=512)
 def _diagram(pinhole: Pinhole, up: Triple, share: float) -> diagrams.Diagram | None:
-    found = diagrams.diagram(pinhole, up, share)
-    return found if found.is_drawable() else None
+    drawing = diagrams.diagram(pinhole, up, share)
+    return drawing if drawing.is_drawable() else None
 
 
 @functools.lru_cache(maxsize=512)
@@ -194,10 +194,10 @@ def _clearest(lines: list[Vector]) -> Vector:
 
 def mark(context: bpy.types.Context) -> Vector | None:
     """The place in the context's region of the look-at point of the camera that its viewport looks through."""
-    found = looked_through(context)
-    if found is None or not found.virtual_pinhole.show_overlay or not context.space_data.overlay.show_overlays:
+    camera_object = looked_through(context)
+    if camera_object is None or not camera_object.virtual_pinhole.show_overlay or not context.space_data.overlay.show_overlays:
         return None
-    look_at = found.virtual_pinhole.numbers()[1]
+    look_at = camera_object.virtual_pinhole.numbers()[1]
     return _pixel(look_at, context) if np.isfinite(look_at).all() else None
 
 

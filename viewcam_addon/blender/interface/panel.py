@@ -80,14 +80,14 @@ def _draw_standing(layout: bpy.types.UILayout, camera_object: bpy.types.Object, 
 def standing(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[tuple[str, tuple[str, ...]]]:
     """(label, texts) of a camera's values as it stands, whatever is stored; none where it is no pinhole."""
     try:
-        found = cameras.as_it_stands(camera_object, scene, in_use=False)
+        pinhole = cameras.as_it_stands(camera_object, scene, in_use=False)
     except InputError:
         return []
-    roll = math.degrees(rolls.angle_from(preferences.up_axis(), found))
+    roll = math.degrees(rolls.angle_from(preferences.up_axis(), pinhole))
     return [
-        ("Camera", tuple(datablocks.length(number, scene, digits=4) for number in readouts.rounded(found.eye))),
-        ("Look At", tuple(datablocks.length(number, scene, digits=4) for number in readouts.rounded(found.look_at))),
-        ("Up", tuple(f"{number:.4g}" for number in readouts.rounded(found.up))),
+        ("Camera", tuple(datablocks.length(number, scene, digits=4) for number in readouts.rounded(pinhole.eye))),
+        ("Look At", tuple(datablocks.length(number, scene, digits=4) for number in readouts.rounded(pinhole.look_at))),
+        ("Up", tuple(f"{number:.4g}" for number in readouts.rounded(pinhole.up))),
         ("Lens", (f"{camera_object.data.lens:.6g} mm",)),
         ("Roll", (f"{round(roll, 3) + 0.0:g}°",)),
     ]
@@ -231,9 +231,9 @@ class _ReadOutsPanel(SubPanel):
 
     def draw(self, context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
-        for readout in shown(datablocks.camera_in(context), context.scene):
-            share = 0.4 if len(readout.shown) == 1 else 0.1
-            row = panel_rows.described(column, context, readout.label, readout.shown, share)
+        for readout in readouts_of(datablocks.camera_in(context), context.scene):
+            share = 0.4 if len(readout.texts) == 1 else 0.1
+            row = panel_rows.described(column, context, readout.label, readout.texts, share)
             button = row.operator("viewcam.copy_readout", text="", icon="COPYDOWN", emboss=False)
             button.label, button.text = readout.label, readout.exact
 
@@ -244,13 +244,13 @@ def notices(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[Not
         stated = cameras.stated(camera_object, scene)
         if stated is None:
             cameras.read(camera_object, scene)
-            found = []
+            result = []
         else:
-            found = _doubts(camera_object, stated)
-            found += map(_notice, cameras.check(camera_object, stated, scene))
+            result = _doubts(camera_object, stated)
+            result += map(_notice, cameras.check(camera_object, stated, scene))
     except InputError as error:
         return [Notice(datablocks.sentence(error))]
-    return [*found, *map(Notice, datablocks.beyond_pinhole(camera_object, scene))]
+    return [*result, *map(Notice, datablocks.beyond_pinhole(camera_object, scene))]
 
 
 def _notice(finding: findings.Finding) -> Notice:
@@ -263,27 +263,27 @@ def _notice(finding: findings.Finding) -> Notice:
 
 def _doubts(camera_object: bpy.types.Object, stated: Pinhole) -> list[Notice]:
     """The warnings about the values, wherever the camera is."""
-    found = []
+    result = []
     if sentence := readouts.roll_warning(stated, camera_object.virtual_pinhole.precision()):
         up = readouts.vector(readouts.certain_up(stated))
-        found.append(Notice(sentence, ("viewcam.choose_up", iface("Use Up {up}").format(up=up))))
+        result.append(Notice(sentence, ("viewcam.choose_up", iface("Use Up {up}").format(up=up))))
     sentences = (readouts.distance_warning(stated), hold.obstacle(camera_object), *targets.warnings(camera_object))
-    return found + [Notice(sentence) for sentence in sentences if sentence]
+    return result + [Notice(sentence) for sentence in sentences if sentence]
 
 
-def shown(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[readouts.Readout]:
+def readouts_of(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[readouts.Readout]:
     """The read-outs of a camera; none where it is no pinhole, which a notice says."""
     group = camera_object.virtual_pinhole
     try:
-        found = cameras.read(camera_object, scene)
+        pinhole = cameras.read(camera_object, scene)
     except InputError:
         return []
     eye, look_at, _, _ = group.numbers()
     reach = math.dist(eye, look_at) if group.enabled else math.nan
     length = datablocks.length(reach, scene) if math.isfinite(reach) else None
     frame = datablocks.frame_of(scene)
-    at_full_size = found.distance[0] * (frame.resolution_x / frame.size[0])
-    return readouts.readouts(found, camera_object.data.lens, at_full_size, (length, reach) if length else None)
+    at_full_size = pinhole.distance[0] * (frame.resolution_x / frame.size[0])
+    return readouts.readouts(pinhole, camera_object.data.lens, at_full_size, (length, reach) if length else None)
 
 
 def _draw_focus(blenders: bpy.types.Panel, context: bpy.types.Context) -> None:

@@ -122,7 +122,7 @@ class Drawing:
         return photo_match.from_points(self.places, self.ends, self.like, self.exact, distance)
 
 
-def told(match: photo_match.Match, lens: float) -> list[str]:
+def summary_of(match: photo_match.Match, lens: float) -> list[str]:
     """The lines of the viewport about a match. lens : millimeters."""
     low, high = match.distance_between
     d = match.pinhole.distance[0]
@@ -210,12 +210,12 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
         global _drawn
         try:
             space = context.space_data
-            self.found = space.camera if space.use_local_camera else context.scene.camera
-            self.drawing = begun(self.found, context)
+            self.camera_object = space.camera if space.use_local_camera else context.scene.camera
+            self.drawing = begun(self.camera_object, context)
         except InputError as error:
             self.report({"ERROR"}, datablocks.sentence(error))
             return {"CANCELLED"}
-        self.before, self.result, self.sentence = kept.state(self.found), None, ""
+        self.before, self.result, self.sentence = kept.state(self.camera_object), None, ""
         self.frame = None  # of the picture in the region, once it has been drawn
         _drawn = self
         context.window_manager.modal_handler_add(self)
@@ -268,11 +268,11 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
         """The camera goes where what is drawn says; where it says nothing, it is as it was."""
         try:
             self.result = self.drawing.match()
-            cameras.apply(self.found, self.result.pinhole, context.scene)
+            cameras.apply(self.camera_object, self.result.pinhole, context.scene)
             self.sentence = ""
         except InputError as error:
             self.result, self.sentence = None, datablocks.sentence(error)
-            kept.restore(self.found, self.before)
+            kept.restore(self.camera_object, self.before)
 
     def _tell(self, context: bpy.types.Context) -> None:
         axis = f"   Axis: {self.drawing.axis}" if self.drawing.kind == EDGES else ""
@@ -286,9 +286,9 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
         if context.area:
             context.area.tag_redraw()
         if cancelled:
-            kept.restore(self.found, self.before)
+            kept.restore(self.camera_object, self.before)
             return {"CANCELLED"}
-        self.report({"INFO"}, told(self.result, self.found.data.lens)[0])
+        self.report({"INFO"}, summary_of(self.result, self.camera_object.data.lens)[0])
         return {"FINISHED"}
 
 
@@ -350,7 +350,7 @@ def _draw() -> None:
     import gpu
     from gpu_extras.batch import batch_for_shader
 
-    match.frame = frame_in(context, match.found)
+    match.frame = frame_in(context, match.camera_object)
     left, bottom, right, top = match.frame
     drawing, scale = match.drawing, context.preferences.system.ui_scale
     size = np.array([(right - left) / drawing.like.width, (top - bottom) / drawing.like.height])
@@ -380,7 +380,9 @@ def _draw() -> None:
             square = [(x - r, y - r), (x + r, y - r), (x - r, y + r), (x + r, y + r)]
             batch_for_shader(flat, "TRI_STRIP", {"pos": square}).draw(flat)
     gpu.state.blend_set("NONE")
-    words = told(match.result, match.found.data.lens) if match.result else [match.sentence] if match.sentence else []
+    words = (
+        summary_of(match.result, match.camera_object.data.lens) if match.result else [match.sentence] if match.sentence else []
+    )
     blf.size(0, _LETTERS * scale)
     # Along the lower edge: above are the header, the names of view and camera, and left the tools.
     x, y = max(left, _TOOLS * scale) + 10 * scale, max(bottom, 0.0) + 0.8 * _LETTERS * scale
@@ -429,7 +431,7 @@ def register() -> None:
 def unregister() -> None:
     global _drawn
     if _drawn:  # Blender takes a modal operator that is unregistered away without its cancel()
-        kept.restore(_drawn.found, _drawn.before)
+        kept.restore(_drawn.camera_object, _drawn.before)
         bpy.context.workspace.status_text_set(None)
     _drawn = None
     bpy.types.SpaceView3D.draw_handler_remove(_handler(), "WINDOW")

@@ -94,7 +94,7 @@ class VIEWCAM_OT_compare_with_cycles(StartsForCamera, bpy.types.Operator):
     )
     background, busy = background, "A comparison is on its way"
 
-    _shown = ("", 0)  # the step and the second that were drawn last
+    _last_drawn = ("", 0)  # the step and the second that were drawn last
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background:
@@ -148,9 +148,9 @@ class VIEWCAM_OT_compare_with_cycles(StartsForCamera, bpy.types.Operator):
     def _show(self, context: bpy.types.Context) -> None:
         """Draw what has changed since the last look."""
         step, second = background.running.progress()[1], int(background.running.seconds)
-        if (step, second) != self._shown:
-            _redraw(context, status_bar=step != self._shown[0])
-        self._shown = step, second
+        if (step, second) != self._last_drawn:
+            _redraw(context, status_bar=step != self._last_drawn[0])
+        self._last_drawn = step, second
 
     def _leave(self, context: bpy.types.Context) -> None:
         _stop_timer()

@@ -39,7 +39,7 @@ _SECONDS = 0.3  # from a picture to its packing, and from a new editor to its si
 _BELOW = 64  # points below the picture, for the legend
 
 _handlers = []
-_shown: Outcome | None = None
+_loaded: Outcome | None = None
 
 
 def composed(sides: Mapping[str, NDArray[np.float32]], view: str, swipe: float = 0.5) -> NDArray[np.float32]:
@@ -48,15 +48,15 @@ def composed(sides: Mapping[str, NDArray[np.float32]], view: str, swipe: float =
     sides : "cycles", "tracer", "difference" and, where there is more, "everything", (height, width, 4) of one size. view : one
     of VIEWS. swipe : where the line is, from 0 at the left to 1.
     """
-    shown = _shown_in(view, sides)
+    picture = _pictures_in(view, sides)
     if view == "SWIPE":
         at = round(swipe * sides["cycles"].shape[1])
-        return np.hstack([sides[shown[0]][:, :at], sides[shown[1]][:, at:]])
+        return np.hstack([sides[picture[0]][:, :at], sides[picture[1]][:, at:]])
     gap = np.zeros((len(sides["cycles"]), _GAP, 4), np.float32)
-    return np.hstack([part for name in shown for part in (gap, sides[name])][1:])
+    return np.hstack([part for name in picture for part in (gap, sides[name])][1:])
 
 
-def _shown_in(view: str, sides: Collection[str]) -> list[str]:
+def _pictures_in(view: str, sides: Collection[str]) -> list[str]:
     """The pictures of a view, of those that there are."""
     if view == "ALL":
         return [name for name in _SIDES if name in sides]
@@ -68,7 +68,7 @@ def _shown_in(view: str, sides: Collection[str]) -> list[str]:
 def labels(view: str, sides: Collection[str]) -> list[str]:
     """The names of the pictures of a view, from left to right."""
     stand_ins = " with stand-ins" if "everything" in sides else ""
-    return [_SIDES[name] + (stand_ins if name in ("cycles", "tracer") else "") for name in _shown_in(view, sides)]
+    return [_SIDES[name] + (stand_ins if name in ("cycles", "tracer") else "") for name in _pictures_in(view, sides)]
 
 
 def begins(number: int, count: int, width: int) -> float:
@@ -78,7 +78,7 @@ def begins(number: int, count: int, width: int) -> float:
 
 def load(outcome: Outcome, view: str = "ALL", swipe: float = 0.5) -> bpy.types.Image:
     """The image of a comparison: one datablock, packed, whose content is that view of the outcome."""
-    global _shown
+    global _loaded
     sides = {name: _pixels(path) for name, path in outcome.pictures.items()}
     height, width = (min(side.shape[axis] for side in sides.values()) for axis in (0, 1))
     # Where pictures are wider than a screen, what differs is made smaller by another rule, and may have a pixel less.
@@ -93,7 +93,7 @@ def load(outcome: Outcome, view: str = "ALL", swipe: float = 0.5) -> bpy.types.I
     image.scale(picture.shape[1], picture.shape[0])
     image.pixels.foreach_set(picture.ravel())
     image.update()
-    _shown = outcome
+    _loaded = outcome
     if bpy.app.background:
         _pack()
     elif not bpy.app.timers.is_registered(_pack):  # a swipe asks for many pictures, and keeps the last
@@ -188,10 +188,10 @@ def draw_view(row: bpy.types.UILayout, context: bpy.types.Context) -> None:
 def _draw_labels() -> None:
     """Draw each picture's name, the line of the swipe, and the legend, in the pixels of the context's Image Editor."""
     context = bpy.context
-    if _shown is None or not _is_shown_in(context.space_data):
+    if _loaded is None or not _is_shown_in(context.space_data):
         return
     settings, scale = context.window_manager.virtual_pinhole_proof, context.preferences.system.ui_scale
-    at, words = context.region.view2d.view_to_region, labels(settings.view, _shown.pictures)
+    at, words = context.region.view2d.view_to_region, labels(settings.view, _loaded.pictures)
     swiped, width = settings.view == "SWIPE", context.space_data.image.size[0]
     for number, label in enumerate(words):
         x, y = at(number * settings.swipe if swiped else begins(number, len(words), width), 0.0, clip=False)
@@ -204,17 +204,17 @@ def _draw_labels() -> None:
 
 def _draw_legend(x: float, y: float, scale: float) -> None:
     """The strip of the difference's colors, with the ends of its scale below."""
-    told = _shown.scale
-    if not told:
+    legend = _loaded.scale
+    if not legend:
         return
-    colours = (pictures.signed_scale() if told["kind"] == "signed" else pictures.colour_scale()) / 255.0
+    colours = (pictures.signed_scale() if legend["kind"] == "signed" else pictures.colour_scale()) / 255.0
     width, height = (size * scale for size in _STRIP)
     x = max(_MARGIN * scale, min(x, bpy.context.region.width - width - 2 * _MARGIN * scale))  # whole, where there is room
     for number, colour in enumerate(colours):
         fill(x + width * number / len(colours), y, width / len(colours) + 1, height, (*colour, 1.0))
-    signed = told["kind"] == "signed"
-    low = f"−{plain(-told['low'])}: tracer brighter" if signed else f"{plain(told['low'])} {told['unit']}"
-    high = f"{plain(told['high'])}: Cycles brighter" if signed else f"{plain(told['high'])} {told['unit']}"
+    signed = legend["kind"] == "signed"
+    low = f"−{plain(-legend['low'])}: tracer brighter" if signed else f"{plain(legend['low'])} {legend['unit']}"
+    high = f"{plain(legend['high'])}: Cycles brighter" if signed else f"{plain(legend['high'])} {legend['unit']}"
     below = y - (_LETTERS + 4) * scale
     write(low, x, below, scale)
     write(high, x + width, below, scale, before=not signed)
@@ -252,8 +252,8 @@ def register() -> None:
 
 
 def unregister() -> None:
-    global _shown
-    _shown = None
+    global _loaded
+    _loaded = None
     _pixels.cache_clear()
     for later in (_pack, _fit):
         if bpy.app.timers.is_registered(later):

@@ -13,10 +13,10 @@ _CHARACTER = 6.8  # pixels, in the mean of a panel's text
 
 
 class Readout(NamedTuple):
-    """A row. shown : one text, or three for the vectors. exact : what is copied, with all digits and without units."""
+    """A row. texts : one text, or three for the vectors. exact : what is copied, with all digits and without units."""
 
     label: str
-    shown: tuple[str, ...]
+    texts: tuple[str, ...]
     exact: str
 
 

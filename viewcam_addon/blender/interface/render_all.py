@@ -1,7 +1,7 @@
 """Render › Render All Cameras: every camera of the scene in its own picture, as a batch in a process beside this one.
 
 A copy of the file as it stands is rendered, as comparing.py does it, so that the artist works on; the pictures and the contact
-sheet go into a new folder, named by file and time. What is there when it is cancelled stays: each picture is written whole.
+sheet go into a new folder, named by file and time. What is there when it is canceled stays: each picture is written whole.
 A timer looks how far it is; the status bar shows it, and has Cancel. Rejected: rendering in Blender's own process (a window
 that waits, and a scene whose camera and resolution change under the artist's hands).
 """

@@ -132,7 +132,7 @@ def lamp_settings(lamp: bpy.types.Light) -> Iterator[str]:
     yield from (name for name in ("exposure", "normalize") if hasattr(lamp, name))
     from ..scenes.lamps import KINDS  # here, since Blender starts without
 
-    yield from KINDS[lamp.type].shown(lamp)
+    yield from KINDS[lamp.type].settings_shown(lamp)
     yield "use_shadow"
 
 

@@ -27,10 +27,10 @@ def of_scene(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 def beside(camera_object: bpy.types.Object | None, scene: bpy.types.Scene, step: int) -> bpy.types.Object | None:
     """The next (step 1) or the previous (−1) camera of the scene, around; None where there is none."""
-    found = of_scene(scene)
-    if camera_object not in found:
-        return found[0] if found else None
-    return found[(found.index(camera_object) + step) % len(found)]
+    cameras = of_scene(scene)
+    if camera_object not in cameras:
+        return cameras[0] if cameras else None
+    return cameras[(cameras.index(camera_object) + step) % len(cameras)]
 
 
 def choose(camera_object: bpy.types.Object, context: bpy.types.Context) -> None:
@@ -125,10 +125,10 @@ class VIEWCAM_OT_step_camera(_SceneOperator, bpy.types.Operator):
         return "Go back to the previous camera of the scene" if properties.step < 0 else cls.bl_description
 
     def work(self, context: bpy.types.Context) -> None:
-        found = beside(datablocks.camera_in(context), context.scene, self.step)
-        if found is None:
+        neighbor = beside(datablocks.camera_in(context), context.scene, self.step)
+        if neighbor is None:
             raise InputError("there is no camera: add one")
-        choose(found, context)
+        choose(neighbor, context)
 
 
 class VIEWCAM_OT_make_camera_active(_SceneOperator, bpy.types.Operator):
@@ -143,10 +143,10 @@ class VIEWCAM_OT_make_camera_active(_SceneOperator, bpy.types.Operator):
     )
 
     def work(self, context: bpy.types.Context) -> None:
-        found = context.scene.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
-        if found is None or found.type != "CAMERA":
+        camera_object = context.scene.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
+        if camera_object is None or camera_object.type != "CAMERA":
             raise InputError(f"scene {context.scene.name!r} has no camera {self.camera!r}: name another")
-        context.scene.camera = found
+        context.scene.camera = camera_object
         own_picture.switch(context.scene)
 
 
@@ -261,16 +261,16 @@ class VIEWCAM_PT_sidebar_cameras(SubPanel, BelowSidebar, bpy.types.Panel):
 
 
 def _chosen(_manager: bpy.types.WindowManager) -> int:
-    found = datablocks.camera_in(bpy.context)
-    return bpy.context.scene.objects.find(found.name) if found else -1
+    camera_object = datablocks.camera_in(bpy.context)
+    return bpy.context.scene.objects.find(camera_object.name) if camera_object else -1
 
 
 def _choose(_manager: bpy.types.WindowManager, index: int) -> None:
     context = bpy.context
     if context.mode == "OBJECT" and 0 <= index < len(context.scene.objects):
-        found = context.scene.objects[index]
-        if context.view_layer.objects.get(found.name) == found:
-            choose(found, context)
+        camera_object = context.scene.objects[index]
+        if context.view_layer.objects.get(camera_object.name) == camera_object:
+            choose(camera_object, context)
             bpy.ops.ed.undo_push(message="Choose Camera")
 
 

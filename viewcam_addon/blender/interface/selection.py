@@ -40,10 +40,10 @@ def points(context: bpy.types.Context, camera_object: bpy.types.Object) -> Array
     blocks, depsgraph = objects(context, camera_object), context.evaluated_depsgraph_get()
     parts = _PARTS.get(context.mode)
     if parts:
-        found = [_placed(_rows(parts(block)), block.evaluated_get(depsgraph).matrix_world) for block in blocks]
+        placed = [_placed(_rows(parts(block)), block.evaluated_get(depsgraph).matrix_world) for block in blocks]
     else:
-        found = list(_points_of_objects(blocks, depsgraph))
-    everything = np.concatenate([np.empty((0, 3)), *found])
+        placed = list(_points_of_objects(blocks, depsgraph))
+    everything = np.concatenate([np.empty((0, 3)), *placed])
     everything = everything[np.isfinite(everything).all(axis=1)]  # what is nowhere is drawn nowhere
     if not len(everything):
         what = "no vertex, control point or bone" if parts else "nothing but the camera, or nothing at all,"
@@ -51,7 +51,7 @@ def points(context: bpy.types.Context, camera_object: bpy.types.Object) -> Array
     return everything
 
 
-def bounds_centre(points: Array) -> Triple:
+def bounds_center(points: Array) -> Triple:
     """The middle of the box about the points, along the world's axes. Pure."""
     return tuple((points.min(axis=0) / 2 + points.max(axis=0) / 2).tolist())
 
@@ -74,19 +74,19 @@ def _points_of_objects(blocks: list[bpy.types.Object], depsgraph: bpy.types.Deps
         yield rotation.float64(block.evaluated_get(depsgraph).matrix_world.translation)[None]
 
 
-def _local_points(shown: bpy.types.Object) -> Array:
+def _local_points(evaluated: bpy.types.Object) -> Array:
     """(n, 3): the points of an evaluated object, in its own space; none of an object without geometry."""
-    if shown.type == "MESH":
-        return export_geometry.read(shown.data.vertices, "co", np.float32, 3)
-    if shown.type in ("CURVE", "SURFACE", "FONT", "META"):
-        mesh = shown.to_mesh()
+    if evaluated.type == "MESH":
+        return export_geometry.read(evaluated.data.vertices, "co", np.float32, 3)
+    if evaluated.type in ("CURVE", "SURFACE", "FONT", "META"):
+        mesh = evaluated.to_mesh()
         vertices = export_geometry.read(mesh.vertices, "co", np.float32, 3) if mesh else _rows([])
-        shown.to_mesh_clear()
+        evaluated.to_mesh_clear()
         return vertices
-    if shown.type in ("POINTCLOUD", "CURVES"):
-        positions = shown.data.attributes.get("position")
+    if evaluated.type in ("POINTCLOUD", "CURVES"):
+        positions = evaluated.data.attributes.get("position")
         return export_geometry.read(positions.data, "vector", np.float32, 3) if positions else _rows([])
-    return _rows(shown.bound_box if shown.type in _BOXED else [])
+    return _rows(evaluated.bound_box if evaluated.type in _BOXED else [])
 
 
 def _placed(local: Array, matrix: bpy.types.bpy_prop_array) -> Array:

@@ -40,10 +40,10 @@ def pinhole_of(area: bpy.types.Area, like: Pinhole, scene: bpy.types.Scene) -> P
     space = area.spaces.active
     view = space.region_3d
     if view.view_perspective == "CAMERA":
-        shown = space.camera if space.use_local_camera else scene.camera
-        if shown is None:
+        camera_object = space.camera if space.use_local_camera else scene.camera
+        if camera_object is None:
             raise InputError("the viewport looks through a camera that is gone: leave the camera's view")
-        return cameras.as_it_stands(shown, scene, in_use=shown.virtual_pinhole.enabled)
+        return cameras.as_it_stands(camera_object, scene, in_use=camera_object.virtual_pinhole.enabled)
     if view.view_perspective == "ORTHO":
         raise InputError("the viewport is orthographic, no pinhole: switch it to perspective")
     _, v, w = rotation.from_quaternion(view.view_rotation).T
@@ -53,7 +53,7 @@ def pinhole_of(area: bpy.types.Area, like: Pinhole, scene: bpy.types.Scene) -> P
     region = [region for region in area.regions if region.type == "WINDOW"][-1]  # in a quad view the last one is the user's
     sides = zip((like.width, like.height), like.distance, (region.width, region.height), strict=True)
     largest = max(region.width, region.height)
-    zoom = min(side / distance * space.lens / _SENSOR * largest / shown for side, distance, shown in sides)
+    zoom = min(side / distance * space.lens / _SENSOR * largest / camera_object for side, distance, camera_object in sides)
     return replace(
         like,
         eye=eye,

@@ -91,10 +91,10 @@ class Checker:
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
         clip = data.clip_start, data.clip_end
         entries, path = export.scene.ledger, self._files.file_of(export.scene)
-        found = self._tracing.compare(
+        comparison = self._tracing.compare(
             path, [image], of, pinhole, clip, stated, entries, everything=everything, may_be_empty=True
         )
-        return _brief(found, entries)
+        return _brief(comparison, entries)
 
     def check(
         self,
@@ -154,20 +154,20 @@ class Checker:
                 sides = tests[:1] if level == LEVELS[0] else tests
                 whole = everything if everything.exists() else None
                 about = (camera, clip, stated, ledger, written, whole)
-                found = self._tracing.compare(path, sides, part, *about, is_first_round=number == 0)
-                traced += found["seconds"]
-                if "undecided" not in found:
+                comparison = self._tracing.compare(path, sides, part, *about, is_first_round=number == 0)
+                traced += comparison["seconds"]
+                if "undecided" not in comparison:
                     break
-                self._forecast(found["undecided"], TOTALS[number], part.samples or 0, time.perf_counter() - begun)
+                self._forecast(comparison["undecided"], TOTALS[number], part.samples or 0, time.perf_counter() - begun)
         for path in sorted(Path(written.sides).glob("*.npy")) if written and written.sides else ():
             displayed.write_png(scene, path)
-        told = {"result": found["result"], "lines": found["lines"], "level": level}
-        told["seconds"] = {"rendered": rendered, "traced": traced}
-        if "find" in found["result"]:
-            found["result"]["find"]["seconds"] = round(time.perf_counter() - started, 3)
+        result = {"result": comparison["result"], "lines": comparison["lines"], "level": level}
+        result["seconds"] = {"rendered": rendered, "traced": traced}
+        if "find" in comparison["result"]:
+            comparison["result"]["find"]["seconds"] = round(time.perf_counter() - started, 3)
         if job.level == "auto":
-            told["reason"] = least_level(exported)[1]
-        return _brief(found, ledger) | told
+            result["reason"] = least_level(exported)[1]
+        return _brief(comparison, ledger) | result
 
     def both_sides(self, stage: Stage, job: Job, paths: Sequence[Path], everything: Path | None = None) -> Scene:
         """The scene for the tracer, and the engine's pictures at these paths, from one state of the file.
@@ -224,9 +224,9 @@ def _numbered(scene_path: str | None) -> tuple[str, ...]:
     return tuple(kind for kind, has in has_numbers.items() if has)
 
 
-def _brief(found: dict[str, Any], ledger: Sequence[LedgerEntry]) -> dict[str, Any]:
+def _brief(comparison: dict[str, Any], ledger: Sequence[LedgerEntry]) -> dict[str, Any]:
     """The part of a comparison that a sidecar keeps."""
     lacking = [f"{entry.object}: {entry.reason}" for entry in ledger if not entry.is_modelled]
     more = [f"and {len(lacking) - _MOST_TOLD} more, which viewcam check tells"] if len(lacking) > _MOST_TOLD else []
-    told = {key: found[key] for key in ("passed", "answer", "not_modelled", "figures")}
-    return {**told, "verdict": found["sentence"], "ledger": lacking[:_MOST_TOLD] + more}
+    result = {key: comparison[key] for key in ("passed", "answer", "not_modelled", "figures")}
+    return {**result, "verdict": comparison["sentence"], "ledger": lacking[:_MOST_TOLD] + more}

@@ -35,7 +35,7 @@ _OF_RENDER = (
 
 def engine_name(engine: str) -> str:
     """An engine of Blender's as a shot calls it, or as Blender does where no shot could."""
-    return next((ours for ours, theirs in _ENGINES.items() if theirs == engine), engine)
+    return next((name for name, blender_name in _ENGINES.items() if blender_name == engine), engine)
 
 
 class JobSettings:
@@ -82,12 +82,12 @@ class JobSettings:
 
     def frame_of(self, shot: Job) -> intrinsics.Frame:
         """The picture of a shot."""
-        said: dict[str, float] = {}
+        values: dict[str, float] = {}
         if shot.width is not None:
-            said |= {"resolution_x": shot.width, "resolution_y": shot.height, "percentage": 100}
+            values |= {"resolution_x": shot.width, "resolution_y": shot.height, "percentage": 100}
         if shot.pixel_aspect is not None:
-            said |= _pixel_aspects(shot.pixel_aspect)
-        return dataclasses.replace(self._frame_of_file, **said)
+            values |= _pixel_aspects(shot.pixel_aspect)
+        return dataclasses.replace(self._frame_of_file, **values)
 
     def set(self, shot: Job) -> None:
         """Set the scene to a shot, but for its camera. What stands so already is not touched, so that nothing is built anew.
@@ -195,14 +195,14 @@ def _pixel_aspects(aspect: float) -> dict[str, float]:
 
 def _samples(scene: bpy.types.Scene) -> dict[str, tuple[bpy.types.bpy_struct, str]]:
     """The property that says how many samples a pixel gets, by engine."""
-    found = {"VIEWCAM": (scene.virtual_pinhole_reference, "samples"), versions.EEVEE: (scene.eevee, "taa_render_samples")}
-    return found | ({"CYCLES": (scene.cycles, "samples")} if hasattr(scene, "cycles") else {})
+    places = {"VIEWCAM": (scene.virtual_pinhole_reference, "samples"), versions.EEVEE: (scene.eevee, "taa_render_samples")}
+    return places | ({"CYCLES": (scene.cycles, "samples")} if hasattr(scene, "cycles") else {})
 
 
 def _seeds(scene: bpy.types.Scene) -> dict[str, bpy.types.bpy_struct]:
     """The block that has the seed, by engine. EEVEE has none."""
-    found = {"VIEWCAM": scene.virtual_pinhole_reference}
-    return found | ({"CYCLES": scene.cycles} if hasattr(scene, "cycles") else {})
+    places = {"VIEWCAM": scene.virtual_pinhole_reference}
+    return places | ({"CYCLES": scene.cycles} if hasattr(scene, "cycles") else {})
 
 
 def _file_outputs(scene: bpy.types.Scene) -> Iterator[bpy.types.Node]:

@@ -51,13 +51,13 @@ def obstacles(
             else:
                 _check_storable(stated(shot, settings.frame_of(shot)), settings.frame_of(shot), own().data)
         except InputError as error:
-            yield f"the shot {checks.shown(shot.name)}: {error}"
+            yield f"the shot {checks.quoted(shot.name)}: {error}"
 
 
 def cameras_of(scene: bpy.types.Scene, own: bpy.types.Object | None) -> dict[str, bpy.types.Object]:
     """The scene's cameras but for the batch's own, by name, sorted."""
-    found = {each.name: each for each in scene.objects if each.type == "CAMERA" and each != own}
-    return dict(sorted(found.items()))
+    cameras = {each.name: each for each in scene.objects if each.type == "CAMERA" and each != own}
+    return dict(sorted(cameras.items()))
 
 
 def camera_of(

@@ -218,8 +218,8 @@ def _caches_of_unbaked() -> set[tuple[str, int]]:
 
 
 def _is_cache_of(path: Path, caches: set[tuple[str, int]]) -> bool:
-    found = _POINT_CACHE.fullmatch(path.name)
-    return bool(found) and (found[1], int(found[2])) in caches
+    match = _POINT_CACHE.fullmatch(path.name)
+    return bool(match) and (match[1], int(match[2])) in caches
 
 
 def _imports() -> Iterator[tuple[str, str]]:
@@ -285,7 +285,7 @@ def _usd_layers(path: Path) -> list[Path] | None:
             content = file.read()
     except OSError:
         return []
-    assets = (one or other for one, other in _USD_ASSET.findall(content))
+    assets = (quoted or other for quoted, other in _USD_ASSET.findall(content))
     names = [
         asset.decode("utf-8", errors="surrogateescape").partition("[")[0] for asset in assets
     ]  # without what is in a .usdz
@@ -303,7 +303,7 @@ def _colours() -> tuple[list[Path], Path]:
     stated = _COLOURS_FOLDERS.search(text)
     folders = re.split(r"[:\n]", stated[1]) if stated else []
     folders = [config.parent / os.path.expandvars(folder.strip(" \t-\"'")) for folder in ["", *folders]]
-    names = [os.path.expandvars("".join(found)) for found in _COLOURS_FILE.findall(text)]
+    names = [os.path.expandvars("".join(match)) for match in _COLOURS_FILE.findall(text)]
     tables = (folder / name for name in dict.fromkeys(names) for folder in dict.fromkeys(folders))
     return [config, *(table for table in tables if table.is_file())], config.parent
 

@@ -111,10 +111,10 @@ class BlenderRenderer:
         shot = Job("pinhole", camera=name, width=width, height=height, frame=frame)
         camera_object = obstacles.camera_of(shot, self.scene, obstacles.cameras_of(self.scene, self._own), self._settings)
         self._settings.set(shot)
-        found = cameras.as_it_stands(camera_object, self.scene, in_use=camera_object.virtual_pinhole.enabled)
+        pinhole = cameras.as_it_stands(camera_object, self.scene, in_use=camera_object.virtual_pinhole.enabled)
         picture = self._settings.frame_of(shot)
         column, row, _, _ = picture.window
-        return found.cropped(-column, -row, *picture.size)
+        return pinhole.cropped(-column, -row, *picture.size)
 
     def made_from(self) -> dict[str, Any]:
         """The origins of the pictures, beside the jobs: hashes of the .blend and of all that it links; versions.

@@ -33,7 +33,7 @@ class Stage:
     is_chosen : whether Blender is told so; else it chooses its own once more, and one that it is not is a difference.
     level : what is modeled, never "auto".
     ledger : of what is on this stage.
-    origin, names, told : of the file that a recentered stage stands for, see recentering.py; told is the file's ledger.
+    origin, names, file_ledger : of the file that a recentered stage stands for (recentering.py).
     """
 
     scene: bpy.types.Scene
@@ -44,7 +44,7 @@ class Stage:
     ledger: Ledger = field(default_factory=Ledger)
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     names: dict[str, str] = field(default_factory=dict)
-    told: Ledger | None = None
+    file_ledger: Ledger | None = None
 
     @property
     def is_lit(self) -> bool:
@@ -53,9 +53,9 @@ class Stage:
     def entries(self, strict: bool) -> tuple[LedgerEntry, ...]:
         """The ledger's entries of the file; NotModelledError if `strict` and anything is approximated or left out."""
         ledger = self.ledger
-        if self.told:
-            self.told.add(self.ledger, self.names)
-            ledger = self.told
+        if self.file_ledger:
+            self.file_ledger.add(self.ledger, self.names)
+            ledger = self.file_ledger
         if strict:
             ledger.check_strict()
         return ledger.entries()
@@ -82,7 +82,7 @@ class Stage:
         everything : for one more picture of Cycles, like the first but with all that has a stand-in, or is left out, in the
         others.
         """
-        camera = self.camera if self.is_chosen or self.told else None
+        camera = self.camera if self.is_chosen or self.file_ledger else None
         share = max((job.samples or SAMPLES) // len(paths), 1)
         with overridden() as lasting:
             for number, path in enumerate([*paths, *([everything] if everything is not None else [])]):
@@ -97,7 +97,7 @@ class Stage:
                 if job.engine in ("EEVEE", "WORKBENCH"):
                     rasters.render(*of, job.engine, remedies, job.threads)
                 else:
-                    kept = keep and not self.told
+                    kept = keep and not self.file_ledger
                     cycles.render(*of, remedies, job.threads, settings, kept, job.device, is_of_everything, lasting)
             if keep and lasting.is_shared:  # Cycles must not know it when it is gone
                 persistent_data.drop(self.scene)
@@ -124,9 +124,11 @@ def staged(
         if not job.recenter:
             yield stage
             return
-        with recentering.recentred(scene, layer, camera_object, ledger, stage.is_lit) as moved:
+        with recentering.recentered(scene, layer, camera_object, ledger, stage.is_lit) as moved:
             layer = moved.scene.view_layers[0]
-            yield Stage(moved.scene, layer, moved.camera, True, level, origin=moved.origin, names=moved.names, told=ledger)
+            yield Stage(
+                moved.scene, layer, moved.camera, True, level, origin=moved.origin, names=moved.names, file_ledger=ledger
+            )
 
 
 def rendered_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:

@@ -42,7 +42,7 @@ _SAMPLING = {
     "use_camera_cull": False,
     "use_distance_cull": False,
 }
-_PASSES_OF_CENTRES = ("Depth", "Object Index")
+_PASSES_OF_CENTERS = ("Depth", "Object Index")
 
 # Pixels independent of each other, and nothing left out or guessed.
 _LIGHT = {
@@ -146,7 +146,7 @@ def override_settings(
     if light:
         overrides.set(scene.render, "film_transparent", light.film.transparent)
         override_all(overrides, scene.cycles, _LIGHT | _settings_of(light))
-        passes = LIGHT_PASSES + (_PASSES_OF_CENTRES if light.samples == 1 else ())
+        passes = LIGHT_PASSES + (_PASSES_OF_CENTERS if light.samples == 1 else ())
     _override_passes(overrides, view_layer, passes)
     if not everything:
         override_all(overrides, scene.cycles, _LIGHT_OF_SURFACES if light else {})
@@ -157,18 +157,18 @@ def _override_device(overrides: Overrides, scene: bpy.types.Scene, device: str) 
     """All of a kind, and no processor beside them."""
     preferences = bpy.context.preferences.addons["cycles"].preferences
     known = [kind for kind, *_ in preferences.get_device_types(bpy.context) if kind != "NONE"]
-    found = preferences.get_devices_for_type(device) if device in known else ()
-    if not any(each.type == device for each in found):
+    devices = preferences.get_devices_for_type(device) if device in known else ()
+    if not any(each.type == device for each in devices):
         others = f"those that this Blender knows are {', '.join(known)}" if known else "this Blender knows none"
         raise InputError(f"there is no {device} device that Cycles could render on ({others}): leave --device out, for the CPU")
     overrides.set(preferences, "compute_device_type", device)
-    for each in found:
+    for each in devices:
         overrides.set(each, "use", each.type == device)
     overrides.set(scene.cycles, "device", "GPU")
 
 
 def _settings_of(light: LightSettings) -> dict[str, object]:
-    settings = {name: getattr(light.bounces, ours) for ours, name in film.BOUNCES.items()}
+    settings = {name: getattr(light.bounces, field) for field, name in film.BOUNCES.items()}
     settings |= {"samples": light.samples, "seed": light.seed % 2**31, "film_exposure": light.film.exposure}
     if light.samples > 1:
         settings |= {"pixel_filter_type": light.film.filter, "filter_width": light.film.filter_width}

@@ -149,7 +149,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
             scene = replace(scene, camera=scene.camera.cropped(*replace(frame, crop=True).window))
         lacking = [(entry.object, entry.reason) for entry in scene.ledger if entry.status != "exported"]
         beyond = [(camera_object.name, sentence) for sentence in datablocks.beyond_pinhole(camera_object, depsgraph.scene)]
-        words = [f"Not modelled as it is: {name!r}, {reason}" for name, reason in (*beyond, *lacking)]
+        words = [f"Not modeled as it is: {name!r}, {reason}" for name, reason in (*beyond, *lacking)]
         if words:
             others = f" (and {len(words) - 1} more, which viewcam export lists)" if len(words) > 1 else ""
             self.report({"WARNING"}, plain(words[0] + others))
@@ -176,12 +176,12 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
 
         self._keeper = self._keeper or tracing.keeper()
         settings, threads = depsgraph.scene_eval.virtual_pinhole_reference, depsgraph.scene.render.threads
-        centres: Passes = {}
+        centers: Passes = {}
         if level != _GEOMETRY and set(GEOMETRY_PASSES) & set(_asked_for(depsgraph.scene_eval, depsgraph.view_layer)):
             for passes, _ in traced(_GEOMETRY):
-                centres = passes
+                centers = passes
         for passes, rows in traced(level, steps):
-            band = {name: values[rows.start : rows.stop] for name, values in (centres | passes).items()}
+            band = {name: values[rows.start : rows.stop] for name, values in (centers | passes).items()}
             if level == _GEOMETRY:
                 band["Combined"] = lit_from_the_eye(band)
             yield band, rows

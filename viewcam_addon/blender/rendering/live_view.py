@@ -95,7 +95,7 @@ class LiveView:
             self.show(of_clay(scene) if settings.clay else scene, level, settings.samples)
 
     def words(self) -> str:
-        """What the picture shows, or why there is none."""
+        """The subject of the picture, or why there is none."""
         return self.message or (f"{self.samples} samples" if self.samples else "Surfaces")
 
     def show(self, scene: Scene, level: str, samples: int) -> None:

@@ -1,7 +1,7 @@
 """Tracing in a thread of its own, its finished bands of rows handed over in the thread that asked.
 
 Blender may be spoken to only in the thread in which it calls an engine: here that thread looks every few milliseconds whether
-the artist cancelled, while the tracer's threads know nothing of Blender. Rejected: tracing in Blender's own thread, which can't
+the artist canceled, while the tracer's threads know nothing of Blender. Rejected: tracing in Blender's own thread, which can't
 ask for Escape before a band is finished.
 """
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ...tracer.render import Keeper
 
 _PATIENCE = 0.05
-"""Seconds between two looks at whether it is cancelled."""
+"""Seconds between two looks at whether it is canceled."""
 
 
 class _Watcher:

@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 GENERATED, POINTINESS, RANDOM_PER_ISLAND = "generated", "pointiness", "random_per_island"
 """Cycles' names of them; an Attribute node that names one asks for it, too."""
-VERTEX_COLOR = "vertex_color"
-"""Cycles' name of the color attribute that is active for rendering."""
 
 _EPSILON = float(np.finfo(np.float32).eps)
 _ROTATIONS = (14, 11, 25, 16, 4, 14, 24)

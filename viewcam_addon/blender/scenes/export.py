@@ -125,13 +125,13 @@ def level_needed(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera
 
     def look(depsgraph: bpy.types.Depsgraph) -> str:
         ledger, shading = Ledger(), Shading()
-        shown = [
+        materials = [
             (source.name, shading.reading(slot).material if slot else PLAIN)
             for source, *_ in placements(depsgraph, ledger, shading)
             for slot in source.used_slots
         ]
         light = light_in(depsgraph, ledger, render=False)
-        return level_of(light.lamps, light.world, light.bounces, shown)[0]
+        return level_of(light.lamps, light.world, light.bounces, materials)[0]
 
     return visit_still(scene, view_layer, camera_object, look)
 
@@ -145,8 +145,8 @@ def light_in(
     """
     scene = depsgraph.scene
     bounces = film.bounces_of(scene, ledger)
-    shown = world.shown_world(scene, depsgraph.view_layer_eval)
-    seen, suns = world.world_of(depsgraph.scene_eval, shown, ledger, images, render)
+    shown_world = world.shown_world(scene, depsgraph.view_layer_eval)
+    seen, suns = world.world_of(depsgraph.scene_eval, shown_world, ledger, images, render)
     return Lighting(
         lamps=(*lamps.lamps_in(depsgraph, bounces, ledger, images), *suns),
         world=seen,
@@ -173,10 +173,10 @@ def _scene(depsgraph: bpy.types.Depsgraph, view: dict[str, object], ledger: Ledg
     geometries: dict[str, Mesh | Spheres] = {}
     objects = []
 
-    def read(source: Surface, shown: bpy.types.Object) -> None:
+    def read(source: Surface, evaluated: bpy.types.Object) -> None:
         if source.key not in names:
-            names[source.key] = _free_name(shown.data.name, geometries)
-            geometries[names[source.key]] = _geometry(source, shown, ledger, shading)
+            names[source.key] = _free_name(evaluated.data.name, geometries)
+            geometries[names[source.key]] = _geometry(source, evaluated, ledger, shading)
 
     for source, matrices, random in placements(depsgraph, ledger, shading, read):
         materials = shading.names(source.slots) if shading else ()
@@ -219,9 +219,9 @@ def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], 
         elif within[placed.geometry]:
             what = "triangles" if isinstance(geometry, Mesh) else "points"
             _note_double(ledger, placed.name, f"{within[placed.geometry]} {what}", "others of it")
-    for found, owner, what in (keys, owners, "triangles"), (places, placed_by, "instances"):
+    for numbers, owner, what in (keys, owners, "triangles"), (places, placed_by, "instances"):
         number = np.concatenate([np.empty(0, np.int64), *owner])
-        pairs = _pairs(np.concatenate([np.empty(0, np.uint64), *found]))
+        pairs = _pairs(np.concatenate([np.empty(0, np.uint64), *numbers]))
         for (first, second), count in Counter(map(tuple, number[pairs].tolist())).items():
             if what == "instances" and all(len(objects[i].matrices) == 1 for i in (first, second)):
                 continue  # its triangles tell
@@ -316,28 +316,28 @@ def placements(
     called with each surface as it is met first, and the object or instance that shows it, which is gone afterwards.
     """
     matrices = export_geometry.read(depsgraph.object_instances, "matrix_world", np.float32, 16)
-    found: dict[Surface, list[int]] = {}
+    rows: dict[Surface, list[int]] = {}
     known: dict[tuple[int, ...], list[int]] = {}
     links = linking.Links(depsgraph) if shading else None
     for number, instance in enumerate(depsgraph.object_instances):
         features.note_hair(instance, ledger)
-        shown = instance.object
-        data = shown.data
+        evaluated = instance.object
+        data = evaluated.data
         if not instance.show_self or data is None:
             continue
         placed = features.placed_by(instance)
         identity = placed.real.as_pointer(), placed.parent.as_pointer(), data.as_pointer()
         if identity not in known:
             source = _source(placed, depsgraph, ledger, shading, links)
-            if read and source and source not in found:
-                read(source, shown)
-            known[identity] = found.setdefault(source, []) if source else []
+            if read and source and source not in rows:
+                read(source, evaluated)
+            known[identity] = rows.setdefault(source, []) if source else []
         known[identity].append(number)
-    for source, numbers in found.items():
+    for source, numbers in rows.items():
         ledger.placed(source.name, len(numbers))
-    draws = _draws(depsgraph) if shading and any(shading.asks_for_random(source.slots) for source in found) else None
+    draws = _draws(depsgraph) if shading and any(shading.asks_for_random(source.slots) for source in rows) else None
     placed = []
-    for source, numbers in found.items():
+    for source, numbers in rows.items():
         random = None
         if draws and shading.asks_for_random(source.slots):
             draw = np.where(draws[0][numbers], draws[1][numbers], random_number(source.name))
@@ -394,22 +394,22 @@ def _source(
     """The source of what one object shows, or None if nothing of it is seen."""
     if not features.is_surface(placed, ledger, shading):
         return None
-    shown, real, _ = placed
+    evaluated, real, _ = placed
     layer = depsgraph.view_layer_eval
     hidden_from = features.hidden_from(placed, layer)
     if "camera" in hidden_from:
         ledger.note(placed.name, "exported", "not visible to the camera")
         if not shading or len(hidden_from) == len(RAYS):
             return None
-    is_mesh = isinstance(shown.data, bpy.types.Mesh)
+    is_mesh = isinstance(evaluated.data, bpy.types.Mesh)
     if is_mesh and not layer.use_solid:
         ledger.note(placed.name, "exported", "the view layer leaves out surfaces")
         return None
     override = layer.material_override
-    slots = [override or slot.material for slot in shown.material_slots] or [override]
+    slots = [override or slot.material for slot in evaluated.material_slots] or [override]
     used = {0}
     if is_mesh:
-        with export_geometry.mesh_shown(shown) as mesh:
+        with export_geometry.mesh_shown(evaluated) as mesh:
             used = export_geometry.used_slots(mesh, len(slots))
         if not used:  # it has no faces
             return None
@@ -421,12 +421,12 @@ def _source(
     if links and linking.is_linked(placed.real.original) and shading.shines(slots):
         receivers, blockers = links.of(placed, ledger, True)
     # Cycles shares a geometry among objects unless a slot belongs to the object (BlenderSync::BKE_object_is_modified).
-    own = any(slot.link == "OBJECT" for slot in shown.material_slots)
+    own = any(slot.link == "OBJECT" for slot in evaluated.material_slots)
     return Surface(
         name=placed.name,
         is_mesh=is_mesh,
-        key=(shown.data.as_pointer(), real.as_pointer() if own else 0),
-        object_index=shown.pass_index,
+        key=(evaluated.data.as_pointer(), real.as_pointer() if own else 0),
+        object_index=evaluated.pass_index,
         slots=tuple(slots),
         used=tuple(sorted(used)),
         hidden_from=hidden_from if shading else frozenset(),
@@ -436,12 +436,12 @@ def _source(
     )
 
 
-def _geometry(source: Surface, shown: bpy.types.Object, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
+def _geometry(source: Surface, evaluated: bpy.types.Object, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
     if not source.is_mesh:
-        return export_geometry.spheres_of(shown.data)
+        return export_geometry.spheres_of(evaluated.data)
     has_colours = shading is not None and shading.asks_for_colours(source.slots)
     attributes = shading.attributes(source.slots) if shading else ()
-    with export_geometry.mesh_shown(shown, split=True) as data:
+    with export_geometry.mesh_shown(evaluated, split=True) as data:
         mesh = export_geometry.mesh_of(data, len(source.materials), has_colours, attributes)
         nowhere = len(data.loop_triangles) - len(mesh.triangles)
     if nowhere:

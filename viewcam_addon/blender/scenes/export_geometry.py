@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...tracer.scene import Mesh, Spheres
+from ...tracer.scene.value_nodes import VERTEX_COLOR
 from .. import versions
 from . import cycles_attributes
 
@@ -73,22 +74,22 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colours: bool = False, at
 
 
 @contextlib.contextmanager
-def mesh_shown(shown: bpy.types.Object, split: bool = False) -> Iterator[bpy.types.Mesh]:
+def mesh_shown(evaluated: bpy.types.Object, split: bool = False) -> Iterator[bpy.types.Mesh]:
     """The mesh of an object or an instance in a depsgraph, as it is there, or a copy that lasts as long as the context.
 
     What is edited is no mesh before it is copied. split : copies one that Cycles splits, too, and splits the copy.
     """
-    mesh = shown.data
+    mesh = evaluated.data
     if not (mesh.is_editmode or (split and is_split(mesh))):
         yield mesh
         return
-    copy = shown.to_mesh()
+    copy = evaluated.to_mesh()
     try:
         if split and is_split(copy):
             copy.split_faces()
         yield copy
     finally:
-        shown.to_mesh_clear()
+        evaluated.to_mesh_clear()
 
 
 def spheres_of(points: bpy.types.PointCloud) -> Spheres:
@@ -170,7 +171,7 @@ def _corner_uvs(mesh: bpy.types.Mesh, corners: Array) -> Array | None:
 
 def _corner_colours(mesh: bpy.types.Mesh, triangles: Array, corners: Array, faces: Array) -> Array:
     """(triangles, 3, 3) float32, linear: the colors that are active for rendering; black, as in Cycles, where none are."""
-    colours = _corner_values(mesh, cycles_attributes.VERTEX_COLOR, triangles, corners, faces)
+    colours = _corner_values(mesh, VERTEX_COLOR, triangles, corners, faces)
     return np.zeros((*corners.shape, 3), np.float32) if colours is None else np.ascontiguousarray(colours[:, :, :3])
 
 
@@ -180,7 +181,7 @@ def _corner_values(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: A
         return _generated(mesh)[triangles]
     if name in (cycles_attributes.POINTINESS, cycles_attributes.RANDOM_PER_ISLAND):
         return _of_edges(mesh, name)[triangles, np.newaxis]
-    if name == cycles_attributes.VERTEX_COLOR and mesh.color_attributes.render_color_index >= 0:
+    if name == VERTEX_COLOR and mesh.color_attributes.render_color_index >= 0:
         name = mesh.color_attributes[mesh.color_attributes.render_color_index].name
     attribute = mesh.attributes.get(name)
     if attribute is None or attribute.data_type not in _ATTRIBUTES:

@@ -17,10 +17,10 @@ from .ledger import Ledger
 from .shading import Shading
 
 _NO_SURFACE = {
-    "VOLUME": "volumes are not modelled",
-    "CURVES": "hair and curves without a surface are not modelled",
-    "GREASEPENCIL": "Grease Pencil is not modelled",
-    "GPENCIL": "Grease Pencil is not modelled",
+    "VOLUME": "volumes are not modeled",
+    "CURVES": "hair and curves without a surface are not modeled",
+    "GREASEPENCIL": "Grease Pencil is not modeled",
+    "GPENCIL": "Grease Pencil is not modeled",
 }
 # Blender itself draws them into Cycles' picture, and into its Depth pass.
 _DRAWN_OVER_CYCLES = ("GREASEPENCIL", "GPENCIL")
@@ -53,11 +53,11 @@ def note_render(
 class Placed(NamedTuple):
     """An object in the depsgraph, each of the three evaluated.
 
-    shown : what is placed, and its data. real : the object in the file that it comes from. parent : what places it; for an
+    evaluated : what is placed, and its data. real : the object in the file that it comes from. parent : what places it; for an
     object that is no instance all three are the same.
     """
 
-    shown: bpy.types.Object
+    evaluated: bpy.types.Object
     real: bpy.types.Object
     parent: bpy.types.Object
 
@@ -68,15 +68,15 @@ class Placed(NamedTuple):
 
 def placed_by(instance: bpy.types.DepsgraphObjectInstance) -> Placed:
     """The object that a depsgraph's instance places, and how."""
-    shown = instance.object
-    real, parent = (instance.instance_object, instance.parent) if instance.is_instance else (shown, shown)
-    return Placed(shown, real, parent)
+    evaluated = instance.object
+    real, parent = (instance.instance_object, instance.parent) if instance.is_instance else (evaluated, evaluated)
+    return Placed(evaluated, real, parent)
 
 
 def hidden_from(placed: Placed, layer: bpy.types.ViewLayer) -> frozenset[str]:
     """The kinds of rays (lights.RAYS) that don't see an object, be it by its own flags or by those of what places it."""
-    shown, _, parent = placed
-    hidden = {ray for ray in RAYS if not all(getattr(each, f"visible_{ray}") for each in (shown, parent))}
+    evaluated, _, parent = placed
+    hidden = {ray for ray in RAYS if not all(getattr(each, f"visible_{ray}") for each in (evaluated, parent))}
     if parent.indirect_only_get(view_layer=layer) and not parent.holdout_get(view_layer=layer):
         hidden.add("camera")
     return frozenset(hidden)
@@ -84,19 +84,19 @@ def hidden_from(placed: Placed, layer: bpy.types.ViewLayer) -> frozenset[str]:
 
 def is_surface(placed: Placed, ledger: Ledger, shading: Shading | None) -> bool:
     """True if this is a mesh or a point cloud; what is drawn but is neither is noted."""
-    shown, real, _ = placed
+    evaluated, real, _ = placed
     name = placed.name
-    if shown.type in _NO_SURFACE:
-        ledger.note(name, "skipped", _NO_SURFACE[shown.type])
-        if shown.type in _DRAWN_OVER_CYCLES:
+    if evaluated.type in _NO_SURFACE:
+        ledger.note(name, "skipped", _NO_SURFACE[evaluated.type])
+        if evaluated.type in _DRAWN_OVER_CYCLES:
             ledger.set_for_cycles(real.original, "hide_render", True)
-    elif shown.type == "LIGHT":
+    elif evaluated.type == "LIGHT":
         if not shading:
             ledger.note(name, "exported", "a light, which leaves no mark in the passes of level geometry")
-    elif _holds_gas(real) and shown.data == real.data:
+    elif _holds_gas(real) and evaluated.data == real.data:
         ledger.note(name, "skipped", _NO_SURFACE["VOLUME"])
     else:
-        return isinstance(shown.data, bpy.types.Mesh | bpy.types.PointCloud)
+        return isinstance(evaluated.data, bpy.types.Mesh | bpy.types.PointCloud)
     return False
 
 
@@ -109,14 +109,14 @@ def note_object(
     shading: Shading | None,
 ) -> None:
     """Note what a visible surface is beyond its geometry. slots : its materials; used : the indices of those that are seen."""
-    shown, real, parent = placed
+    evaluated, real, parent = placed
     name = placed.name
     if parent.holdout_get(view_layer=depsgraph.view_layer_eval):
         ledger.note(name, "approximated", "a holdout, a plain object on both sides")
         ledger.set_for_cycles(parent.original, "is_holdout", False)
         for collection in _layer_collections(depsgraph.view_layer.layer_collection):
             ledger.set_for_cycles(collection, "holdout", False)
-    for each in (shown, parent):
+    for each in (evaluated, parent):
         if each.is_shadow_catcher:
             ledger.note(name, "approximated", "a shadow catcher, a plain object on both sides")
             ledger.set_for_cycles(each.original, "is_shadow_catcher", False)
@@ -124,7 +124,7 @@ def note_object(
     if adaptive:
         ledger.note(name, "approximated", "adaptive subdivision is subdivision at the render level on both sides")
         ledger.set_for_cycles(*adaptive, False)
-    is_empty = isinstance(shown.data, bpy.types.Mesh) and any(slots[index] is None for index in used)
+    is_empty = isinstance(evaluated.data, bpy.types.Mesh) and any(slots[index] is None for index in used)
     if not shading and versions.DEFAULT_SURFACE_BENDS_NORMALS and is_empty:
         ledger.call_for_cycles(real.original, materials.fill_empty_slots, stands_in=False)
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
@@ -134,7 +134,7 @@ def note_object(
         ledger.set_for_cycles(real.original, "hide_render", True)
     for material in filter(None, slots):
         if materials.is_volume_alone(material):
-            ledger.note(name, "skipped", f"material {material.name!r} is a volume without a surface, which is not modelled")
+            ledger.note(name, "skipped", f"material {material.name!r} is a volume without a surface, which is not modeled")
             ledger.call_for_cycles(material.original, materials.make_transparent)
             continue
         if not shading:  # the Normal pass; mirrors and glass bend normals on both sides (scattering.specular_normal)
@@ -165,8 +165,8 @@ def note_object(
 
 def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: Ledger, shading: Shading) -> None:
     """Note what matters as soon as there is light."""
-    shown, real, parent = placed
-    if isinstance(shown.data, bpy.types.PointCloud):
+    evaluated, real, parent = placed
+    if isinstance(evaluated.data, bpy.types.PointCloud):
         for asked in sorted(shading.attributes(tuple(slots))):
             ledger.note(
                 placed.name, "approximated", f"is a point cloud, of which the attribute {asked!r} does not come along: 0"
@@ -180,11 +180,11 @@ def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: 
 
 def note_hair(instance: bpy.types.DepsgraphObjectInstance, ledger: Ledger) -> None:
     """Hair of a particle system, which grows beside the object itself."""
-    shown = instance.object
+    evaluated = instance.object
     if instance.show_particles and any(
-        system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in shown.particle_systems
+        system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in evaluated.particle_systems
     ):
-        ledger.note(shown.original.name, "skipped", "particle hair is not modelled")
+        ledger.note(evaluated.original.name, "skipped", "particle hair is not modeled")
 
 
 def _holds_gas(real: bpy.types.Object) -> bool:

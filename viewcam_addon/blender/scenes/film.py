@@ -35,4 +35,4 @@ def bounces_of(scene: bpy.types.Scene, ledger: Ledger) -> Bounces:
         return Bounces()
     if not all(getattr(cycles, name) for name in CAUSTICS):
         ledger.note(scene.name, "approximated", "caustics are on on both sides")
-    return Bounces(**{ours: getattr(cycles, theirs) for ours, theirs in BOUNCES.items()})
+    return Bounces(**{field: getattr(cycles, setting) for field, setting in BOUNCES.items()})

@@ -28,14 +28,14 @@ def shows_nothing(node: bpy.types.Node) -> bool:
 
 def missing(tree: bpy.types.NodeTree | None) -> list[str]:
     """The nodes of a tree that show no image, one clause each; whether it leads to the output is not asked."""
-    found = {}
+    result = {}
     for node in nodes.all_of(tree) if tree else ():
         if shows_nothing(node):
-            shown = (
+            used = (
                 f"shows {node.image.name!r}, which is missing" if node.image else f"has a node {node.name!r} without an image"
             )
-            found[f"{shown}: magenta, as Cycles has it"] = None
-    return list(found)
+            result[f"{used}: magenta, as Cycles has it"] = None
+    return list(result)
 
 
 def obstacle(image: bpy.types.Image | None) -> str | None:
@@ -46,7 +46,7 @@ def obstacle(image: bpy.types.Image | None) -> str | None:
         return f"shows {image.name!r}, which has no pixels"
     space = image.colorspace_settings.name
     if space != "sRGB" and space not in _LINEAR:
-        return f"shows {image.name!r}, whose colours are {space}"
+        return f"shows {image.name!r}, whose colors are {space}"
     return None
 
 

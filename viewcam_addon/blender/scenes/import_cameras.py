@@ -45,7 +45,7 @@ class ImportedCameras:
 
 
 def import_cameras(
-    found: Sequence[Camera],
+    cameras: Sequence[Camera],
     name: str,
     scene: bpy.types.Scene,
     folder: Path | None = None,
@@ -64,7 +64,7 @@ def import_cameras(
         if a camera, or the picture's size, is beyond Blender's numbers. Nothing has changed then.
     """
     with contextlib.ExitStack() as undo:
-        imported = _CameraImport(name, scene, Overrides(undo)).run(found, folder, set_size, as_flight)
+        imported = _CameraImport(name, scene, Overrides(undo)).run(cameras, folder, set_size, as_flight)
         undo.pop_all()
     return imported
 
@@ -80,27 +80,27 @@ class _CameraImport:
         scene.collection.children.link(self._collection)
         self._world: bpy.types.Object | None = None
 
-    def run(self, found: Sequence[Camera], folder: Path | None, set_size: bool, as_flight: bool) -> ImportedCameras:
+    def run(self, cameras: Sequence[Camera], folder: Path | None, set_size: bool, as_flight: bool) -> ImportedCameras:
         if set_size:
-            picture.set_size(self._overrides, self._scene, found[0].pinhole)
-        self._note(note for camera in found for note in camera.notes)
-        if len(found) > 1:
+            picture.set_size(self._overrides, self._scene, cameras[0].pinhole)
+        self._note(note for camera in cameras for note in camera.notes)
+        if len(cameras) > 1:
             self._world = self._linked(f"{self._name} World", None)
         if as_flight:
             objects = (self._new(self._name),)
-            self._fly(objects[0], found)
+            self._fly(objects[0], cameras)
         else:
-            objects = tuple(self._new(camera.name) for camera in found)
+            objects = tuple(self._new(camera.name) for camera in cameras)
         if self._scene.camera is None:
             self._overrides.set(self._scene, "camera", objects[0])
         pictures = 0
         if not as_flight:
             bpy.context.view_layer.update()
-            for block, camera in zip(objects, found, strict=True):
+            for block, camera in zip(objects, cameras, strict=True):
                 self._place(block, camera)
             if folder is not None:
-                pictures = sum([self._show(block, camera, folder) for block, camera in zip(objects, found, strict=True)])
-                named = sum(camera.image is not None or camera.picture is not None for camera in found)
+                pictures = sum([self._show(block, camera, folder) for block, camera in zip(objects, cameras, strict=True)])
+                named = sum(camera.image is not None or camera.picture is not None for camera in cameras)
                 if pictures < named:
                     self._note([f"{named - pictures} of {named} pictures were not found beside the file, nor in images/"])
         return ImportedCameras(objects, pictures, tuple(self._notes))
@@ -131,17 +131,17 @@ class _CameraImport:
 
     # --- A flight
 
-    def _fly(self, block: bpy.types.Object, found: Sequence[Camera]) -> None:
+    def _fly(self, block: bpy.types.Object, cameras: Sequence[Camera]) -> None:
         scene, frame = self._scene, datablocks.frame_of(self._scene)
-        found, at = self._timed(found)
-        if len({camera.pinhole.mirrored for camera in found}) > 1:
+        cameras, at = self._timed(cameras)
+        if len({camera.pinhole.mirrored for camera in cameras}) > 1:
             raise InputError(
                 "some of the cameras are mirrored and some are not, which no flight can be: import them one by one"
             )
         block.rotation_mode = "QUATERNION"
         sensor = datablocks.own_sensor(block.data)
         keys: dict[str, list[tuple[float, ...]]] = {path: [] for path in ("location", "rotation_quaternion", *_OF_DATA)}
-        for camera in found:
+        for camera in cameras:
             try:
                 fitted, notes = picture.fitted(camera.pinhole, frame)
                 data = intrinsics.camera_data(fitted.plane, frame, *sensor, block.data.sensor_fit)
@@ -169,17 +169,17 @@ class _CameraImport:
         if at[-1] > scene.frame_end:
             self._note([f"The flight ends at frame {at[-1]:.6g} and the scene at {scene.frame_end}: set its End"])
 
-    def _timed(self, found: Sequence[Camera]) -> tuple[list[Camera], list[float]]:
+    def _timed(self, cameras: Sequence[Camera]) -> tuple[list[Camera], list[float]]:
         """The cameras in order of time, with the frame of each; the first one is at the scene's start."""
         start = self._scene.frame_start
-        if any(camera.time is None for camera in found):
-            return [*found], [start + i for i in range(len(found))]
-        found = sorted(found, key=lambda camera: camera.time)
-        twice = next((camera for before, camera in itertools.pairwise(found) if camera.time == before.time), None)
+        if any(camera.time is None for camera in cameras):
+            return [*cameras], [start + i for i in range(len(cameras))]
+        cameras = sorted(cameras, key=lambda camera: camera.time)
+        twice = next((camera for before, camera in itertools.pairwise(cameras) if camera.time == before.time), None)
         if twice is not None:
             raise InputError(f"two cameras have the time {twice.time!r}, {twice.name!r} one of them: import a camera each")
         render = self._scene.render
-        return found, [start + (camera.time - found[0].time) * render.fps / render.fps_base for camera in found]
+        return cameras, [start + (camera.time - cameras[0].time) * render.fps / render.fps_base for camera in cameras]
 
     # --- Pictures
 

@@ -49,20 +49,20 @@ class LampReader(shaders.Tree):
         return total if isinstance(total, Node) else tuple(max(value, 0.0) for value in total)
 
     def _image(self, output: Output) -> Colour:
-        self._reason(output, "is no colour alone")  # its place is the light's to say
+        self._reason(output, "is no color alone")  # its place is the light's to say
         return self.viewport
 
     def _value(self, output: Output) -> Colour | Node | None:
-        made, name = output.node, output.socket.name
-        if made.type == "UVMAP" or (made.type, name) in (("TEX_COORD", "UV"), ("NEW_GEOMETRY", "Parametric")):
+        source, name = output.node, output.socket.name
+        if source.type == "UVMAP" or (source.type, name) in (("TEX_COORD", "UV"), ("NEW_GEOMETRY", "Parametric")):
             return self._of_itself(output, UV)
-        if made.type == "TEX_COORD" and name == "Normal":
+        if source.type == "TEX_COORD" and name == "Normal":
             return self._turned(node("geometry", output="normal"))
-        if made.type == "TEX_COORD" and (name == "Generated" or (name == "Object" and made.object is None)):
+        if source.type == "TEX_COORD" and (name == "Generated" or (name == "Object" and source.object is None)):
             return self._of_itself(output, GENERATED)
-        unknown = made.type in _OF_SURFACES or (made.type == "TEX_COORD" and name != "Object")
-        unknown |= made.type == "NEW_GEOMETRY" and name not in _PLACES
-        unknown |= made.type == "LIGHT_PATH" and not (name.startswith("Is ") or name == "Ray Length")
+        unknown = source.type in _OF_SURFACES or (source.type == "TEX_COORD" and name != "Object")
+        unknown |= source.type == "NEW_GEOMETRY" and name not in _PLACES
+        unknown |= source.type == "LIGHT_PATH" and not (name.startswith("Is ") or name == "Ray Length")
         if unknown:
             self._reason(output, f"says the {name} of a light")
             return None

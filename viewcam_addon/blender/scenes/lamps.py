@@ -43,7 +43,7 @@ class _Kind:
     def values(self, light: bpy.types.Light, matrix: np.ndarray, strength: RGB) -> dict[str, Any]:
         """The values of the lamp: where it is, how strong it is, and its numbers."""
         place = {"power": strength, "matrix": matrix}
-        return place | {ours: getattr(light, theirs) for ours, theirs in self.settings.items()}
+        return place | {field: getattr(light, setting) for field, setting in self.settings.items()}
 
     def exported(
         self, name: str, light: bpy.types.Light, matrix: np.ndarray, strength: RGB, common: dict[str, Any], ledger: Ledger
@@ -58,7 +58,7 @@ class _Kind:
         radius = light.shadow_soft_size
         return 4 * math.pi * radius**2 if radius > 0 else 4.0
 
-    def shown(self, light: bpy.types.Light) -> tuple[str, ...]:
+    def settings_shown(self, light: bpy.types.Light) -> tuple[str, ...]:
         """The properties that count in the picture, and no other kind of light has."""
         return tuple(self.settings.values())
 
@@ -100,8 +100,8 @@ class _Spot(_Kind):
     lamp = Spot
     settings = _Point.settings | {"angle": "spot_size", "blend": "spot_blend"}
 
-    def shown(self, light: bpy.types.Light) -> tuple[str, ...]:
-        return (*super().shown(light), "show_cone")
+    def settings_shown(self, light: bpy.types.Light) -> tuple[str, ...]:
+        return (*super().settings_shown(light), "show_cone")
 
     def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
         """Over its cone."""
@@ -143,9 +143,9 @@ class _Area(_Kind):
             ledger.set_for_cycles(light.original, "spread", math.pi)
         return super().exported(name, light, matrix, strength, common, ledger)
 
-    def shown(self, light: bpy.types.Light) -> tuple[str, ...]:
+    def settings_shown(self, light: bpy.types.Light) -> tuple[str, ...]:
         sides = ("size", "size_y") if light.shape in ("RECTANGLE", "ELLIPSE") else ("size",)
-        return ("shape", *sides, *super().shown(light))
+        return ("shape", *sides, *super().settings_shown(light))
 
     def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
         """Over the whole of it."""
@@ -194,7 +194,7 @@ def lamps_in(
     for instance in depsgraph.object_instances:
         if instance.object.type == "LIGHT" and instance.show_self:
             placed = features.placed_by(instance)
-            name, light = placed.name, placed.shown.data
+            name, light = placed.name, placed.evaluated.data
             ledger.note(name, "exported", "a light")
             hidden_from = features.hidden_from(placed, depsgraph.view_layer_eval) - {"shadow"}
             matrix = np.array(instance.matrix_world, dtype=np.float64)

@@ -73,7 +73,7 @@ class Ledger:
         if lacking:
             others = f" (and {len(lacking) - 1} more)" if len(lacking) > 1 else ""
             raise NotModelledError(
-                f"{lacking[0].object!r} can't be modelled{others}, {lacking[0].reason}: take it out, or leave --strict out"
+                f"{lacking[0].object!r} can't be modeled{others}, {lacking[0].reason}: take it out, or leave --strict out"
             )
 
     def _remedy(self, key: tuple, remedy: Remedy, stands_in: bool) -> None:

@@ -49,7 +49,7 @@ class Links:
         if not is_linked(block):
             return None, None
         collections = [getattr(block.light_linking, each) for each in _COLLECTIONS]
-        if any(each and not self._instances.isdisjoint(shown.name for shown in each.all_objects) for each in collections):
+        if any(each and not self._instances.isdisjoint(member.name for member in each.all_objects) for each in collections):
             ledger.note(placed.name, "approximated", "is linked to instances, which count as the objects that they show")
         (receivers, _), (blockers, excluded) = (self._named(each) if each else (None, True) for each in collections)
         if is_found and blockers is not None:

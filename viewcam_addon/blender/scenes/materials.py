@@ -14,8 +14,10 @@ import bpy
 
 from ...errors import InputError
 from ...tracer.scene.materials import PLAIN, Colour
-from ...tracer.scene.shader_nodes import KINDS, Node
+from ...tracer.scene.shader_nodes import KINDS, SHADERS, Node, word_of
+from ...tracer.scene.shader_nodes import node as _node
 from ...tracer.scene.value_nodes import GENERATED, OWN, POSITION, UV
+from ...tracer.scene.value_nodes import KINDS as VALUE_NODES
 from .. import versions
 from ..temporary_settings import Overrides
 from . import images, nodes, shaders, value_nodes
@@ -25,14 +27,6 @@ _TRANSPARENT = {"BSDF_TRANSPARENT", "HOLDOUT"}
 _TURNING = {"BUMP", "NORMAL_MAP", "BEVEL"}
 _UNKNOWN = {"SCRIPT"}
 _WHITE = (1.0, 1.0, 1.0)
-# The shaders of the tracer's components.
-_SHADERS = {
-    "diffuse": "ShaderNodeBsdfDiffuse",
-    "emission": "ShaderNodeEmission",
-    "mirror": "ShaderNodeBsdfGlossy",
-    "glass": "ShaderNodeBsdfGlass",
-    "refraction": "ShaderNodeBsdfRefraction",
-}
 
 
 def departures(material: bpy.types.Material, lit: bool = False) -> list[str]:
@@ -108,27 +102,17 @@ def _add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Re
         raised.space = "WORLD"
         _colour(adder, raised.inputs["Height"], made.displacement, reading)
         adder.link(raised.outputs[0], output.inputs["Displacement"])
-    if made.surface is not None:
-        adder.link(_shader(adder, made.surface, reading).outputs[0], output.inputs["Surface"])
-        return
-    total = None
-    for component, colour in made.colours.items():
-        shader = adder.add(_SHADERS[component])
-        _set(shader, "Roughness", 0.0)
-        _set(shader, "IOR", made.ior)
-        _colour(adder, shader.inputs["Color"], colour, reading)
-        total = shader if total is None else adder.add("ShaderNodeAddShader", total.outputs[0], shader.outputs[0])
     # Without any light Cycles would draw nothing: not even the depth.
-    total = total or adder.add("ShaderNodeBsdfDiffuse", Color=(0.0, 0.0, 0.0, 1.0))
-    adder.link(total.outputs[0], output.inputs["Surface"])
+    surface = made.surface or _node("diffuse", color=Colour((0.0, 0.0, 0.0)))
+    adder.link(_shader(adder, surface, reading).outputs[0], output.inputs["Surface"])
 
 
 def _shader(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.types.Node:
     """Add the nodes that a tree of shader nodes is."""
-    shader = shaders.SHADERS[node.type]
+    shader = SHADERS[node.type]
     added = adder.add(shader.class_name)
     for name, theirs in shader.words.items():
-        setattr(added, theirs, shaders.word_of(node[name]))
+        setattr(added, theirs, word_of(node[name]))
     for name, theirs in shader.inputs.items():
         value = node[name]
         if isinstance(value, Node) and not value.is_value:
@@ -140,22 +124,22 @@ def _shader(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.typ
 
 def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.types.NodeSocket:
     """The output of nodes that make a value; those are one that differ by their output alone."""
-    value = next(value for ours, value in value_nodes.VALUES if ours == node.type)
+    row = VALUE_NODES[node.type].blender[0]
     key = node.type, tuple(each for each in node.inputs if each[0] != "output")
     added = adder.values.get(key)
     if added is None:
-        added = adder.values[key] = adder.add(value.class_name)
-        for name, wanted in value.fixed.items():
+        added = adder.values[key] = adder.add(row.class_name)
+        for name, wanted in row.fixed.items():
             setattr(added, name, wanted)
-        for name, theirs in value.words.items():
+        for name, theirs in row.words.items():
             if node[name] == KINDS[node.type].inputs[name][0] and not hasattr(added, theirs):
                 continue  # what an older version does
-            _choose(added, theirs, value_nodes.word_of(node.type, node[name]))
-        for name, theirs in value.flags.items():
+            _choose(added, theirs, row.word(node[name]))
+        for name, theirs in row.flags.items():
             setattr(added, theirs, node[name])
-        for name, theirs in value.names.items():
+        for name, theirs in row.names.items():
             setattr(added, theirs, node[name])
-        for name, theirs in value.numbers.items():
+        for name, theirs in row.numbers.items():
             setattr(added, theirs, type(getattr(added, theirs))(node[name][0]))
         if "image" in KINDS[node.type].inputs and node["image"] is not None:
             added.image = reading.images[node["image"].image]
@@ -164,14 +148,14 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
         if "table" in KINDS[node.type].inputs:
             table, ends = reading.images[node["table"].image], (node["least"][0], node["most"][0])
             value_nodes.draw_curves(added.mapping, table, *ends, node["extrapolate"])
-        for name, theirs in value.inputs.items():
+        for name, theirs in row.inputs.items():
             socket = value_nodes.input_of(added, theirs)
             if socket is None:
-                _want_as_before(added, theirs, node[name], value.before[name])
+                _want_as_before(added, theirs, node[name], row.before[name])
             elif KINDS[node.type].inputs[name] not in (UV, GENERATED, POSITION, *OWN) or name in dict(node.inputs):
                 _colour(adder, socket, node[name], reading)
     word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
-    found = [socket for socket in added.outputs if value.outputs.get(socket.identifier, "") == word]
+    found = [socket for socket in added.outputs if row.outputs.get(socket.identifier, "") == word]
     return next((socket for socket in found if socket.enabled), found[0])
 
 
@@ -223,11 +207,6 @@ def _times(adder: nodes.Adder, *factors: bpy.types.NodeSocket) -> bpy.types.Node
     multiply = adder.add("ShaderNodeVectorMath", *factors)
     multiply.operation = "MULTIPLY"
     return multiply
-
-
-def _set(node: bpy.types.Node, name: str, value: float) -> None:
-    if name in node.inputs:
-        node.inputs[name].default_value = value
 
 
 def keep_normals(overrides: Overrides, material: bpy.types.Material) -> None:

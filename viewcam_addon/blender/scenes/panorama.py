@@ -42,14 +42,14 @@ def main(library: str, name: str, out: str, width: str, frame: str, subframe: st
     skies = [node for node in nodes.all_of(tree) if _has_sun(node)]
     for sky in skies:
         sky.sun_disc = False
-    found = {}
+    arrays = {}
     for side in ("seen", "light"):
         if side == "light" and not blind_to_camera(tree):
-            found |= {"light": found["seen"], "light_suns": found["seen_suns"]}
+            arrays |= {"light": arrays["seen"], "light_suns": arrays["seen_suns"]}
         else:
-            found[side] = eye.around(int(width))
-            found[f"{side}_suns"] = np.array([_sun(sky, eye) for sky in skies]).reshape(-1, 7)
-    np.savez(out, **found)
+            arrays[side] = eye.around(int(width))
+            arrays[f"{side}_suns"] = np.array([_sun(sky, eye) for sky in skies]).reshape(-1, 7)
+    np.savez(out, **arrays)
 
 
 def blind_to_camera(tree: bpy.types.NodeTree) -> bool:

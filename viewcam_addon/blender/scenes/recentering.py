@@ -72,7 +72,7 @@ _FRAME = (
 
 
 @dataclass(frozen=True)
-class Recentred:
+class Recentered:
     """A scene to render in place of the file's.
 
     origin : the file's point that is the origin here: the eye. names : object here → the object in the file that it shows.
@@ -107,9 +107,9 @@ class _Placed:
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """The file's camera. shown : the pinhole to render; claimed : what it is said to be. Both in the file's world space."""
+    """The file's camera. actual : the pinhole to render; claimed : what it is said to be. Both in the file's world space."""
 
-    shown: Pinhole
+    actual: Pinhole
     claimed: Pinhole
     sensor_fit: str
     sensor: tuple[float, float]
@@ -117,9 +117,9 @@ class _View:
 
 
 @contextlib.contextmanager
-def recentred(
+def recentered(
     scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False
-) -> Iterator[Recentred]:
+) -> Iterator[Recentered]:
     """Give what a render of this view layer shows, as a scene whose origin is the eye; it is gone at the end of the block.
 
     ledger : notes what could not come, as `export.survey` does. lit : whether what only other rays than the camera's see comes
@@ -140,20 +140,22 @@ def recentred(
         _remove_keys_but(keys)
         temporary = _empty_scene(overrides, scene, view_layer)
         camera = _camera(overrides, temporary, view)  # before all others: it asks for a depsgraph
-        shown = _place(overrides, temporary, placed)
-        visit_still(temporary, temporary.view_layers[0], camera, lambda depsgraph: _verify(depsgraph, shown, copies))
-        yield Recentred(temporary, camera, view.shown.eye, {each.name: source.name for each, source in shown.items()})
+        copies_by_source = _place(overrides, temporary, placed)
+        visit_still(temporary, temporary.view_layers[0], camera, lambda depsgraph: _verify(depsgraph, copies_by_source, copies))
+        yield Recentered(
+            temporary, camera, view.actual.eye, {each.name: source.name for each, source in copies_by_source.items()}
+        )
 
 
 def as_in_file(objects: Iterable[Object], names: Mapping[str, str]) -> tuple[Object, ...]:
-    """The objects of an exported `Recentred` as the file's own export has them: by their names there, instances as one object.
+    """The objects of an exported `Recentered` as the file's own export has them: by their names there, instances as one object.
 
-    Here each place has an object of its own, and so a name of its own, that the exporter keeps apart. names : of `Recentred`.
+    Here each place has an object of its own, and so a name of its own, that the exporter keeps apart. names : of `Recentered`.
     """
-    found: dict[tuple, list[Object]] = {}
+    result: dict[tuple, list[Object]] = {}
     for placed in (replace(each, name=names[each.name]) for each in objects):
         all_but_place = tuple(getattr(placed, each.name) for each in fields(placed) if each.name not in ("matrix", "random"))
-        found.setdefault(all_but_place, []).append(placed)
+        result.setdefault(all_but_place, []).append(placed)
 
     def together(same: list[Object]) -> Object:
         if len(same) == 1:
@@ -161,7 +163,7 @@ def as_in_file(objects: Iterable[Object], names: Mapping[str, str]) -> tuple[Obj
         random = None if same[0].random is None else np.concatenate([each.random for each in same])
         return replace(same[0], matrix=np.concatenate([each.matrices for each in same]), random=random)
 
-    return tuple(map(together, found.values()))
+    return tuple(map(together, result.values()))
 
 
 def _seen(
@@ -171,30 +173,30 @@ def _seen(
     if lit:
         light_in(depsgraph, ledger, render=False)  # for what the ledger tells of the file's own lamps
     view = _view(depsgraph, camera_object)
-    eye = np.array(view.shown.eye)
+    eye = np.array(view.actual.eye)
     plain = materials.plain(overrides)
     copies: dict[tuple[int, int], _Copy] = {}
     placed = []
     shading = Shading() if lit else None
-    found: dict[tuple[int, int], Geometry] = {}
+    geometries: dict[tuple[int, int], Geometry] = {}
 
-    def copy_of(source: Surface, shown: bpy.types.Object) -> None:
-        if source.key not in found:
-            with export_geometry.mesh_shown(shown) if source.is_mesh else contextlib.nullcontext(shown.data) as data:
-                found[source.key] = data.copy()
-            overrides.afterwards(bpy.data.batch_remove, [found[source.key]])
+    def copy_of(source: Surface, evaluated: bpy.types.Object) -> None:
+        if source.key not in geometries:
+            with export_geometry.mesh_shown(evaluated) if source.is_mesh else contextlib.nullcontext(evaluated.data) as data:
+                geometries[source.key] = data.copy()
+            overrides.afterwards(bpy.data.batch_remove, [geometries[source.key]])
 
-    shown = placements(depsgraph, ledger, shading, copy_of)
-    for source, *_ in shown if shading else ():
+    placed_objects = placements(depsgraph, ledger, shading, copy_of)
+    for source, *_ in placed_objects if shading else ():
         _note_places(source, shading, ledger)
         if source.is_linked:
             ledger.note(source.name, "approximated", _UNLINKED)
-    for source, matrix in ((source, matrix) for source, matrices, _ in shown for matrix in matrices):
+    for source, matrix in ((source, matrix) for source, matrices, _ in placed_objects for matrix in matrices):
         if not np.isfinite(matrix).all():
             raise InputError(f"the matrix of object {source.name!r} holds a number that is not finite: check its transform")
         matrix[:3, 3] -= eye
         if source.key not in copies:
-            data = found[source.key]
+            data = geometries[source.key]
             _set_materials(data, [(material and material.original) or plain for material in source.slots])
             copies[source.key] = _moved(data, matrix)
         copy = copies[source.key]
@@ -206,12 +208,12 @@ def _seen(
 def _note_places(source: Surface, shading: Shading, ledger: Ledger) -> None:
     """Name materials that say otherwise here than in the file: on both sides, which both are moved."""
     for material in filter(None, source.slots):
-        found = {
+        places = {
             node.type
             for node in shading.reading(material).material.nodes
             if "output" in KINDS[node.type].inputs and (node.type, node["output"]) in _PLACES
         }
-        if found:
+        if places:
             ledger.note(
                 source.name,
                 "approximated",
@@ -239,12 +241,12 @@ def _lights(depsgraph: bpy.types.Depsgraph, eye: Array, ledger: Ledger) -> Itera
 
 def _view(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> _View:
     camera = camera_object.evaluated_get(depsgraph)
-    found = cameras.read(camera, depsgraph.scene)
+    pinhole = cameras.read(camera, depsgraph.scene)
     stated = cameras.stated(camera, depsgraph.scene)
-    is_stated = stated and not findings.differences(stated, found, pose.reach(camera_object, depsgraph))
+    is_stated = stated and not findings.differences(stated, pinhole, pose.reach(camera_object, depsgraph))
     return _View(
-        shown=stated if is_stated else found,
-        claimed=stated or found,
+        actual=stated if is_stated else pinhole,
+        claimed=stated or pinhole,
         sensor_fit=camera.data.sensor_fit,
         sensor=datablocks.own_sensor(camera.data),
         clip=(camera.data.clip_start, camera.data.clip_end),
@@ -314,7 +316,7 @@ def _place(overrides: Overrides, temporary: bpy.types.Scene, placed: list[_Place
 
 
 def _camera(overrides: Overrides, temporary: bpy.types.Scene, view: _View) -> bpy.types.Object:
-    """A camera that shows `view.shown`, and states `view.claimed`."""
+    """A camera that shows `view.actual`, and states `view.claimed`."""
     data = bpy.data.cameras.new("Virtual Pinhole")
     overrides.afterwards(bpy.data.batch_remove, [data])
     block = bpy.data.objects.new("Virtual Pinhole", data)
@@ -323,8 +325,8 @@ def _camera(overrides: Overrides, temporary: bpy.types.Scene, view: _View) -> bp
     temporary.camera = block
     data.sensor_fit, (data.sensor_width, data.sensor_height) = view.sensor_fit, view.sensor
     data.clip_start, data.clip_end = view.clip
-    shown, claimed = (_relative(pinhole, view.shown.eye) for pinhole in (view.shown, view.claimed))
-    conversion.place(block, shown, temporary, datablocks.depsgraph_of(temporary))
+    actual, claimed = (_relative(pinhole, view.actual.eye) for pinhole in (view.actual, view.claimed))
+    conversion.place(block, actual, temporary, datablocks.depsgraph_of(temporary))
     frame = datablocks.frame_of(temporary)
     distance = claimed.distance[0] * frame.resolution_x / frame.size[0]
     cameras.CameraSync.of(block).state(claimed.eye, claimed.look_at, claimed.up, distance, frame)
@@ -337,9 +339,9 @@ def _relative(pinhole: Pinhole, origin: tuple[float, ...]) -> Pinhole:
     return replace(pinhole, eye=eye, look_at=look_at)
 
 
-def _verify(depsgraph: bpy.types.Depsgraph, shown: dict[bpy.types.Object, _Placed], copies: dict[bpy.types.ID, _Copy]) -> None:
+def _verify(depsgraph: bpy.types.Depsgraph, placed: dict[bpy.types.Object, _Placed], copies: dict[bpy.types.ID, _Copy]) -> None:
     """Raise InputError, by name, unless everything stands relative to the eye as in the file, each number rounded once."""
-    missing = dict(shown)
+    missing = dict(placed)
     verified = set()
     for instance in depsgraph.object_instances:
         block = instance.object.original
@@ -358,8 +360,8 @@ def _verify(depsgraph: bpy.types.Depsgraph, shown: dict[bpy.types.Object, _Place
         raise InputError(f"object {each.name!r} is missing in the scene that was moved to the eye: leave --recenter out")
 
 
-def _compare(name: str, found: NDArray, wanted: Array) -> None:
-    if found.shape == wanted.shape and np.allclose(found, wanted, rtol=_ROUNDING, atol=_LEAST, equal_nan=True):
+def _compare(name: str, actual: NDArray, wanted: Array) -> None:
+    if actual.shape == wanted.shape and np.allclose(actual, wanted, rtol=_ROUNDING, atol=_LEAST, equal_nan=True):
         return
     raise InputError(
         f"object {name!r} did not follow when the scene was moved to the eye, perhaps an add-on moves it: leave --recenter out"

@@ -1,9 +1,9 @@
 """A Blender material as the tracer's: the shaders that its nodes are, or the nearest ones and why.
 
-It is read as a tree of shader nodes, and where that is a sum of components (materials.components) as these, which a hand can
-change. What makes an input that does not count is not followed. Measured in 4.2, 4.5, 5.0 and 5.2: with a specular IOR level
-of 0, or an IOR of 1, a Principled BSDF gives the Diffuse BSDF's pixels to the last bit, whatever its roughness, anisotropy and
-tint, unless a weight or the thin film is not 0.
+It is read as a tree of shader nodes, and where that is a sum of components without roughness as these (materials.simplified).
+What makes an input that does not count is not followed. Measured in 4.2, 4.5, 5.0 and 5.2: with a specular IOR level of 0, or
+an IOR of 1, a Principled BSDF gives the Diffuse BSDF's pixels to the last bit, whatever its roughness, anisotropy and tint,
+unless a weight or the thin film is not 0.
 
 What is not modeled is left out, and where nothing is left becomes a Lambert surface of its base color. Then Cycles is shown
 the same for the time of a comparison (materials.stand_in): an approximation is never a difference between the two sides.
@@ -19,8 +19,8 @@ import numpy as np
 
 from ...errors import InputError
 from ...tracer.scene import ies
-from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture, components
-from ...tracer.scene.shader_nodes import KINDS, MOST_NODES, Node, closures
+from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, PLAIN_COLOR, Colour, Material, Picture, simplified, sum_of
+from ...tracer.scene.shader_nodes import KINDS, MOST_NODES, SHADERS, Node, closures, word_of
 from ...tracer.scene.shader_nodes import node as _node
 from ...tracer.scene.value_nodes import GENERATED, INCOMING, NORMAL, OWN, POSITION, TANGENT, UV
 from .. import versions
@@ -62,62 +62,9 @@ _FIXED = {
 _LUMINANCE = (0.2126390, 0.7151687, 0.0721923)
 
 
-@dataclass(frozen=True)
-class Shader:
-    """A type of the tracer's shader nodes as Blender has it.
-
-    kind : the node's type. inputs : ours → theirs. words : ours → the property that has the word.
-    neutral : of inputs that are not modeled, the value without which a shader is only approximated.
-    """
-
-    kind: str
-    inputs: dict[str, str | int]
-    words: dict[str, str]
-    neutral: dict[str, float]
-
-    @property
-    def class_name(self) -> str:
-        return "ShaderNode" + self.kind.title().replace("_", "")
-
-
-# Blender's names are ours in its spelling, but for these; and what it has that is not modeled.
-_TYPES = {"emission": "EMISSION", "mix": "MIX_SHADER", "add": "ADD_SHADER"}
-_NAMES: dict[str, dict[str, str | int]] = {
-    "metallic": {"color": "Base Color"},
-    "mix": {"factor": 0, "first": 1, "second": 2},
-    "add": {"first": 0, "second": 1},
-}
-_PROPERTIES = {"fresnel": "fresnel_type"}
-_NEUTRAL = {
-    "metallic": {"Thin Film Thickness": 0.0},
-    "glass": {"Thin Film Thickness": 0.0},
-    "principled": {"Thin Film Thickness": 0.0, "Subsurface Weight": 0.0, "Thin Wall": 0.0},
-}
-
-
-def _shader(ours: str) -> Shader:
-    inputs, words = {}, {}
-    for name, default in KINDS[ours].inputs.items():
-        if isinstance(default, tuple) and isinstance(default[0], str):
-            words[name] = _PROPERTIES.get(name, name)
-        else:
-            inputs[name] = _NAMES.get(ours, {}).get(name, name.replace("_", " ").title().replace("Ior", "IOR"))
-    return Shader(_TYPES.get(ours, f"BSDF_{ours.upper()}"), inputs, words, _NEUTRAL.get(ours, {}))
-
-
-SHADERS = {ours: _shader(ours) for ours, kind in KINDS.items() if not kind.is_value}
 # What Cycles takes for another shader on a surface, and for none.
 _AS = {"BACKGROUND": "EMISSION"}
 _VOLUMES = ("VOLUME_ABSORPTION", "VOLUME_SCATTER", "VOLUME_COEFFICIENTS", "PRINCIPLED_VOLUME")
-# Blender's words, where they are others than ours in capitals.
-_WORDS = {"multiscatter_ggx": "MULTI_GGX"}
-
-
-def word_of(ours: str) -> str:
-    """Blender's name of one of the words of our shader nodes."""
-    return _WORDS.get(ours, ours.upper())
-
-
 # Nodes that feed one another in a row. One of them may become two of the tracer's, which may be more (shader_nodes.MOST_DEEP).
 _MOST_DEEP = 100
 
@@ -164,23 +111,23 @@ def read(material: bpy.types.Material) -> Reading:
     output = tree and tree.get_output_node("CYCLES")
     if not output:
         return in_the_viewport(material)
-    viewport, of = in_the_viewport(material).material.diffuse, Input(output.inputs["Surface"])
+    viewport, of = _viewport_color(material), Input(output.inputs["Surface"])
     reader = Tree(viewport)
     surface = reader.surface(of)
     shines = any(closure.node.is_shining for closure in closures(surface))
     if shines:
         reader = Tree(viewport, shines)
         surface = reader.surface(of)
-    simple = components(surface)
-    of_tree = {"surface": surface, "transparent_shadow": material.use_transparent_shadow}
-    reader.reading.material = Material(**(of_tree if simple is None else simple))
+    simple = simplified(surface)
+    is_tree = surface is not None and simple is surface
+    reader.reading.material = Material(simple, not is_tree or material.use_transparent_shadow)
     return _displaced(reader.reading, material, output, shines)
 
 
 def _displaced(reading: Reading, material: bpy.types.Material, output: bpy.types.Node, shines: bool) -> Reading:
     """A reading with what its displacement does to the normals, where that is all that it does."""
     if is_only_bumped(material):
-        reader = Tree(PLAIN.diffuse, shines)
+        reader = Tree(PLAIN_COLOR, shines)
         reader.reading = reading
         reading.material = replace(reading.material, displacement=reader.height(Input(output.inputs["Displacement"])))
     return reading
@@ -193,7 +140,11 @@ def is_only_bumped(material: bpy.types.Material) -> bool:
 
 def in_the_viewport(material: bpy.types.Material) -> Reading:
     """A Lambert surface of the color that the material has in Blender's viewport."""
-    return Reading(Material(diffuse=Colour(possible(material.diffuse_color[:3]) or PLAIN.diffuse.rgb)))
+    return Reading(sum_of(diffuse=_viewport_color(material)))
+
+
+def _viewport_color(material: bpy.types.Material) -> Colour:
+    return Colour(possible(material.diffuse_color[:3]) or PLAIN_COLOR.rgb)
 
 
 class Tree:
@@ -219,7 +170,7 @@ class Tree:
         kind = _AS.get(source.node.type, source.node.type)
         found = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == kind), None)
         if found is None:
-            self._reason(source, "is not modelled")
+            self._reason(source, "is not modeled")
             name = next((name for name in ("Base Color", "Color") if name in source.node.inputs), None)
             return Node("diffuse", (("color", self._colour(source, name) if name else self.viewport),))
         ours, shader = found
@@ -267,18 +218,18 @@ class Tree:
             return Colour(_WHITE, vertex=True)
         if node.type == "VECT_MATH" and node.operation == "MULTIPLY":
             return self._product(source)
-        self._reason(source, "is not modelled")
+        self._reason(source, "is not modeled")
         return self.viewport
 
     def _product(self, output: Output) -> Colour:
         """The product that a Vector Math node makes of two colors."""
         first, second = self._colour(output, 0), self._colour(output, 1)
         if (first.image and second.image) or (first.vertex and second.vertex):
-            self._reason(output, "multiplies two colours that vary alike")
+            self._reason(output, "multiplies two colors that vary alike")
             return first
         rgb = possible(tuple(a * b for a, b in zip(first.rgb, second.rgb, strict=True)))
         if rgb is None:
-            self._reason(output, "multiplies colours beyond what light can have")
+            self._reason(output, "multiplies colors beyond what light can have")
             return self.viewport
         textured = first if first.image else second
         return Colour(rgb, textured.image, textured.closest, first.vertex or second.vertex)
@@ -296,7 +247,7 @@ class Tree:
             return self.viewport
         vector = nodes.source(output.input("Vector"))
         if isinstance(vector, Output) and not self._is_uv(vector):
-            self._reason(vector, "is not modelled")
+            self._reason(vector, "is not modeled")
         return Colour(_WHITE, node.image.original.name_full, node.interpolation == "Closest")
 
     def _shows(self, output: Output) -> bool:
@@ -455,13 +406,13 @@ class Tree:
             return self._ramp(output)
         if node.type == "NORMAL":
             return self._along(output)
-        found = value_nodes.value_of(output)
+        found = value_nodes.row_of(output)
         if found is None:
-            self._reason(output, "is not modelled")
+            self._reason(output, "is not modeled")
             return None
         told = len(self.reading.reasons)
-        ours, value = found
-        words = value_nodes.given_words(output, ours, value)
+        ours, row = found
+        words = value_nodes.given_words(output, ours, row)
         why = words if isinstance(words, str) else self._departure(output, ours)
         if why:
             self._reason(output, why)
@@ -488,14 +439,14 @@ class Tree:
                 self._reason(output, f"shows what {str(error).partition(': ')[0].removeprefix('it ')}")
                 return None
             given["text"] = text
-        for name, theirs in value.inputs.items():
+        for name, theirs in row.inputs.items():
             known = KINDS[ours].inputs[name]
             if known in OWN:
                 given |= self._normal(output, name, theirs)
                 continue
             socket = value_nodes.input_of(node, theirs)
             if socket is None:
-                given[name] = (value.before[name],) * 3
+                given[name] = (row.before[name],) * 3
                 continue
             is_beside, self._is_beside = self._is_beside, self._is_beside or name == "height"
             read = self._value_input(Input(socket, output.groups), known)

@@ -55,11 +55,11 @@ def world_of(
         if hasattr(owner, name):  # versions know fewer of them
             ledger.set_for_cycles(owner, name, value, stands_in=False)
     hidden_from = frozenset(ray for ray in _RAYS if not getattr(world.cycles_visibility, ray))
-    made = _rendered(scene, world, reasons, ledger, render) if reasons else None
-    if made:
+    rendered = _rendered(scene, world, reasons, ledger, render) if reasons else None
+    if rendered:
         if pictures is not None:
-            pictures |= made.pictures
-        return replace(made.world, hidden_from=hidden_from), made.suns
+            pictures |= rendered.pictures
+        return replace(rendered.world, hidden_from=hidden_from), rendered.suns
     # Of an image, even of one that is missing, Cycles samples light, which no constant world needs.
     is_constant = wrapped is None and (backdrop, wrapped_there) == (radiance, None)
     if reasons or (missing and is_constant):
@@ -181,7 +181,7 @@ def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, l
     if not isinstance(surface, Output):
         return (0.0, 0.0, 0.0), None, reasons
     if surface.node.type not in ("BACKGROUND", "EMISSION"):
-        return tuple(world.color), None, [*reasons, f"has a node {surface.node.name!r} that is not modelled"]
+        return tuple(world.color), None, [*reasons, f"has a node {surface.node.name!r} that is not modeled"]
     color = _unmixed(surface.input("Color"), camera)
     rgb = shaders.constant_colour_of(color)
     strength = shaders.constant_number_of(_unmixed(surface.input("Strength"), camera))
@@ -196,7 +196,7 @@ def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, l
         reasons.append("has a strength that varies")
     radiance = shaders.possible(tuple(value * strength for value in rgb))
     if radiance is None:
-        return (0.0, 0.0, 0.0), None, [*reasons, f"has the colour {tuple(rgb)} and the strength {strength:g}"]
+        return (0.0, 0.0, 0.0), None, [*reasons, f"has the color {tuple(rgb)} and the strength {strength:g}"]
     if wrapped and reasons:  # a constant world stands in
         mean = images.mean(wrapped.image)
         return tuple(a * b for a, b in zip(radiance, mean, strict=True)), None, reasons
@@ -238,14 +238,14 @@ def _rotation(vector: Output | Input) -> tuple[float, float, float] | None:
         return (0.0, 0.0, 0.0) if is_direction else None
     if vector.node.type != "MAPPING" or vector.node.vector_type not in ("POINT", "VECTOR"):
         return None
-    given = [
+    turns = [
         shaders.constant_colour(vector, name)
         for name in ("Location", "Rotation", "Scale")[vector.node.vector_type == "VECTOR" :]
     ]
     inner = _rotation(nodes.source(vector.input("Vector")))
-    if None in given or inner is None or any(inner) or given[-1] != (1.0, 1.0, 1.0) or (len(given) == 3 and any(given[0])):
+    if None in turns or inner is None or any(inner) or turns[-1] != (1.0, 1.0, 1.0) or (len(turns) == 3 and any(turns[0])):
         return None
-    return given[-2]
+    return turns[-2]
 
 
 def _mean(source: Output, world: bpy.types.World) -> tuple[RGB, str]:

@@ -74,20 +74,20 @@ def rendered(world: bpy.types.World, scene: bpy.types.Scene) -> Rendered | None:
         arguments = [str(library), world.original.name, str(out), str(width(world)), str(scene.frame_current)]
         try:
             another_blender.call("blender.scenes.panorama", [*arguments, repr(scene.frame_subframe)], _TIMEOUT)
-            with np.load(out) as found:
-                return _made(world.name, {name: found[name] for name in found.files})
+            with np.load(out) as arrays:
+                return _made(world.name, {name: arrays[name] for name in arrays.files})
         except (OSError, subprocess.TimeoutExpired):
             return None
 
 
-def _made(name: str, found: dict[str, NDArray]) -> Rendered:
-    pictures = {f"{name} (rendered)": _picture(found["light"])}
+def _made(name: str, arrays: dict[str, NDArray]) -> Rendered:
+    pictures = {f"{name} (rendered)": _picture(arrays["light"])}
     backdrop = None
-    if found["seen"] is not found["light"] and not np.array_equal(found["seen"], found["light"]):
-        pictures[f"{name} (seen)"] = _picture(found["seen"])
+    if arrays["seen"] is not arrays["light"] and not np.array_equal(arrays["seen"], arrays["light"]):
+        pictures[f"{name} (seen)"] = _picture(arrays["seen"])
         backdrop = World((1.0, 1.0, 1.0), image=f"{name} (seen)")
     suns = []
-    for number, (lit, seen) in enumerate(zip(found["light_suns"], found["seen_suns"], strict=True)):
+    for number, (lit, seen) in enumerate(zip(arrays["light_suns"], arrays["seen_suns"], strict=True)):
         same = np.allclose(lit, seen, rtol=1e-6, atol=0.0)
         sides = ((lit, frozenset()),) if same else ((lit, frozenset({"camera"})), (seen, _ALL_RAYS - {"camera"}))
         for (x, y, z, *irradiance, angle), hidden_from in sides:
@@ -101,12 +101,14 @@ def _picture(pixels: NDArray[np.float32]) -> Picture:
     return Picture(np.nan_to_num(np.clip(pixels, 0.0, LARGEST_RADIANCE), nan=0.0))
 
 
-def show(overrides: Overrides, world: bpy.types.World, scene: bpy.types.Scene, made: Rendered) -> None:
+def show(overrides: Overrides, world: bpy.types.World, scene: bpy.types.Scene, rendered: Rendered) -> None:
     """Let Cycles see the image and the lamps in place of a world."""
     output, adder = nodes.override_output(overrides, world.node_tree, "ShaderNodeOutputWorld")
-    shown = {name: images.image_of(picture, name, overrides, packed=False) for name, picture in made.pictures.items()}
-    _add_world(adder, output, made.world, shown)
-    for sun in made.suns:
+    images_by_name = {
+        name: images.image_of(picture, name, overrides, packed=False) for name, picture in rendered.pictures.items()
+    }
+    _add_world(adder, output, rendered.world, images_by_name)
+    for sun in rendered.suns:
         data, matrix = lamps.light_of(sun, overrides)
         block = bpy.data.objects.new(sun.name, data)
         overrides.afterwards(bpy.data.batch_remove, [block])
@@ -116,38 +118,38 @@ def show(overrides: Overrides, world: bpy.types.World, scene: bpy.types.Scene, m
         scene.collection.objects.link(block)
 
 
-def _add_world(adder: nodes.Adder, output: bpy.types.Node, made: World, shown: dict[str, bpy.types.Image]) -> None:
+def _add_world(adder: nodes.Adder, output: bpy.types.Node, world: World, images_by_name: dict[str, bpy.types.Image]) -> None:
     """Let a world's output show what lights and, where that is another world, what the camera sees.
 
-    shown : `World.image` → the image.
+    images_by_name : `World.image` → the image.
     """
     backgrounds = []
-    for each in filter(None, (made, made.backdrop)):
+    for each in filter(None, (world, world.backdrop)):
         background = adder.add("ShaderNodeBackground", Color=(*each.radiance, 1.0), Strength=1.0)
         if each.image is not None:
             background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-            _add_environment(adder, background, each, shown[each.image])
+            _add_environment(adder, background, each, images_by_name[each.image])
         backgrounds.append(background.outputs[0])
     surface = backgrounds[0]
-    if made.backdrop:
+    if world.backdrop:
         is_camera = adder.add("ShaderNodeLightPath").outputs["Is Camera Ray"]
         surface = adder.add("ShaderNodeMixShader", is_camera, *backgrounds).outputs[0]
     adder.link(surface, output.inputs["Surface"])
 
 
-def _add_environment(adder: nodes.Adder, background: bpy.types.Node, made: World, image: bpy.types.Image) -> None:
+def _add_environment(adder: nodes.Adder, background: bpy.types.Node, world: World, image: bpy.types.Image) -> None:
     """Let a Background node show an image that is wrapped around the world."""
-    coordinates, mapping = adder.add("ShaderNodeTexCoord"), adder.add("ShaderNodeMapping", Rotation=made.rotation)
+    coordinates, mapping = adder.add("ShaderNodeTexCoord"), adder.add("ShaderNodeMapping", Rotation=world.rotation)
     texture = adder.add("ShaderNodeTexEnvironment")
-    texture.image, texture.interpolation = image, "Closest" if made.closest else "Linear"
+    texture.image, texture.interpolation = image, "Closest" if world.closest else "Linear"
     adder.link(coordinates.outputs["Generated"], mapping.inputs["Vector"])
     adder.link(mapping.outputs[0], texture.inputs["Vector"])
     color = texture.outputs["Color"]
-    if len(set(made.radiance)) == 1:
-        background.inputs["Strength"].default_value = made.radiance[0]
+    if len(set(world.radiance)) == 1:
+        background.inputs["Strength"].default_value = world.radiance[0]
     else:
         multiply = adder.add("ShaderNodeVectorMath", color)
         multiply.operation = "MULTIPLY"
-        multiply.inputs[1].default_value = made.radiance
+        multiply.inputs[1].default_value = world.radiance
         color = multiply.outputs[0]
     adder.link(color, background.inputs["Color"])

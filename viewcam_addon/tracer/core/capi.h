@@ -13,18 +13,6 @@
 typedef struct ViewcamScene ViewcamScene;
 typedef struct ViewcamLight ViewcamLight;
 
-enum ViewcamPass {
-    VIEWCAM_DEPTH,
-    VIEWCAM_POSITION,
-    VIEWCAM_NORMAL,
-    VIEWCAM_UV,
-    VIEWCAM_OBJECT_INDEX,
-    VIEWCAM_MATERIAL_INDEX,
-    VIEWCAM_MAGNITUDE,
-    VIEWCAM_FACING,
-    VIEWCAM_PASSES
-};
-
 /* vertices: (vertex_count, 3), object space. triangles: (count, 3). materials: (count,), slots of the object. The rest or null:
  * corner_normals: (count, 3, 3). corner_uvs: (count, 3, 2). corner_colors: (count, 3, 3), linear. attributes: each with values
  * (count, 3, width), width from 1 to 4. */
@@ -84,7 +72,7 @@ typedef struct {
     int (*set_camera)(ViewcamScene*, const ViewcamCamera*);
     size_t (*bytes)(const ViewcamScene*);
 
-    /* planes: of each pass or null, its channels `stride` numbers apart. stop: or null; what it points to ends the work. */
+    /* planes: of each pass of integrators/geometry.h or null, its channels `stride` numbers apart. stop: or null; what it points to ends the work. */
     int (*render_geometry)(const ViewcamScene*, uint32_t first_row, uint32_t end_row, float* const* planes, size_t stride, const volatile int* stop);
     /* The same, and of each pixel what `closest` tells of a ray as long as the camera's axis. */
     int (*render_hits)(const ViewcamScene*, uint32_t first_row, uint32_t end_row, float* const* planes, size_t stride, double* depth, uint32_t* objects, uint32_t* primitives, const volatile int* stop);
@@ -118,8 +106,9 @@ typedef struct {
     /* The objects, two and two, that paths have met in one place, and how often: the first `most`. Returns how many there are. */
     size_t (*light_pairs)(const ViewcamLight*, size_t most, uint32_t* objects, uint64_t* counts);
     /* A tile of 32 × 32 pixels, by its lowest row and its first column, until its pixels have so many samples: all, or fewer, to which
-     * a later call adds. No two threads may trace the same tile. */
-    int (*trace_light)(ViewcamLight*, uint32_t row, uint32_t column, uint32_t samples, const ViewcamLightPasses*, const volatile int* stop);
+     * a later call adds. No two threads may trace the same tile. passes: those of film/film.h, of a whole picture, rows from the
+     * bottom; those that nobody wants are null. */
+    int (*trace_light)(ViewcamLight*, uint32_t row, uint32_t column, uint32_t samples, float* const* passes, const volatile int* stop);
 
     /* For tests: light_functions.h says what they are given and return. */
     int (*probe_sobol)(uint32_t seed, uint32_t samples, int scatterings, size_t, const uint32_t*, const uint32_t*, int first, int dimensions, double*);

@@ -69,8 +69,3 @@ typedef struct {
     uint32_t seed, samples;
     double error, coincident;
 } ViewcamLightSettings;
-
-/* Of a whole picture, rows from the bottom. Those that nobody wants are null; Combined is always wanted. */
-typedef struct {
-    float *combined, *emission, *environment, *diffuse_direct, *diffuse_indirect, *diffuse_color, *variance, *sample_count;
-} ViewcamLightPasses;

@@ -117,10 +117,10 @@ inline void light(const Scene& scene, const ViewcamLightSettings& given) {
     that(given.coincident >= 0 && given.coincident <= LARGEST, "surfaces in one place are less than 0 roundings apart, or too many");
     that(given.error >= 0 && std::isfinite(given.error), "the error is below 0, or no number");
 }
-inline void tile(const TileSampler& light, uint32_t row, uint32_t column, uint32_t samples, const ViewcamLightPasses& to) {
+inline void tile(const TileSampler& light, uint32_t row, uint32_t column, uint32_t samples, const LightPasses& to) {
     that(row < light.camera().height && column < light.camera().width && row % light.TILE == 0 && column % light.TILE == 0, "a tile is asked for that the picture does not have");
     that(samples >= 1 && samples <= light.samples(), "a tile is asked for more samples than there are");
-    that(to.combined, "the pass Combined has no place to go");
+    that(to.plane[LightPasses::COMBINED], "the pass Combined has no place to go");
 }
 
 }  // namespace viewcam::VIEWCAM_ISA::check

@@ -281,10 +281,10 @@ const ViewcamCore core = {
         return pairs.size();
     },
     .trace_light =
-        [](ViewcamLight* light, uint32_t row, uint32_t column, uint32_t samples, const ViewcamLightPasses* passes, const volatile int* stop) {
+        [](ViewcamLight* light, uint32_t row, uint32_t column, uint32_t samples, float* const* passes, const volatile int* stop) {
             return guarded([&] {
-                check::tile(light_of(light), row, column, samples, *passes);
-                light_of(light).trace(row, column, samples, *passes, stop);
+                check::tile(light_of(light), row, column, samples, {passes});
+                light_of(light).trace(row, column, samples, {passes}, stop);
             });
         },
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import checks
-from ...checks import shown
+from ...checks import quoted
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .film import Bounces, Film
@@ -60,9 +60,9 @@ class Mesh:
         if self.corner_colours is not None:
             _check_shape("corner_colours", self.corner_colours, (count, 3, 3))
         for name, values in self.attributes.items():
-            _check_shape(f"attribute {shown(name)}", values, (count, 3, None))
+            _check_shape(f"attribute {quoted(name)}", values, (count, 3, None))
             if not 1 <= values.shape[2] <= 4:
-                raise InputError(f"attribute {shown(name)} has {values.shape[2]} numbers a corner: give 1 to 4")
+                raise InputError(f"attribute {quoted(name)} has {values.shape[2]} numbers a corner: give 1 to 4")
         if count and not 0 <= self.triangles.min() <= self.triangles.max() < len(self.vertices):
             raise InputError(f"triangles name a vertex outside 0 … {len(self.vertices) - 1}: check the mesh")
         if not np.isfinite(self.vertices).all():
@@ -120,23 +120,23 @@ class Object:
     blockers: frozenset[str] | None = None
 
     def __post_init__(self) -> None:
-        _check_shape(f"the matrix of object {shown(self.name)}", self.matrix, (None, 4, 4)[-max(self.matrix.ndim, 2) :])
+        _check_shape(f"the matrix of object {quoted(self.name)}", self.matrix, (None, 4, 4)[-max(self.matrix.ndim, 2) :])
         if not np.isfinite(self.matrix).all():
-            raise InputError(f"the matrix of object {shown(self.name)} holds a number that is not finite: check its transform")
+            raise InputError(f"the matrix of object {quoted(self.name)} holds a number that is not finite: check its transform")
         if not (self.matrices[:, 3] == (0, 0, 0, 1)).all():
-            raise InputError(f"the matrix of object {shown(self.name)} is not affine: its last row must be 0, 0, 0, 1")
+            raise InputError(f"the matrix of object {quoted(self.name)} is not affine: its last row must be 0, 0, 0, 1")
         if not self.material_indices:
             raise InputError(
-                f"object {shown(self.name)} has no material_indices: give at least one, 0 where it has no material"
+                f"object {quoted(self.name)} has no material_indices: give at least one, 0 where it has no material"
             )
-        object.__setattr__(self, "hidden_from", hidden_from(f"object {shown(self.name)}", self.hidden_from))
+        object.__setattr__(self, "hidden_from", hidden_from(f"object {quoted(self.name)}", self.hidden_from))
         object.__setattr__(self, "receivers", linked(self.receivers))
         object.__setattr__(self, "blockers", linked(self.blockers))
-        object.__setattr__(self, "color", checks.vector(f"the color of object {shown(self.name)}", self.color, 4))
+        object.__setattr__(self, "color", checks.vector(f"the color of object {quoted(self.name)}", self.color, 4))
         if self.random is not None:
-            _check_shape(f"random of object {shown(self.name)}", self.random, (len(self.matrices),))
+            _check_shape(f"random of object {quoted(self.name)}", self.random, (len(self.matrices),))
             if not ((self.random >= 0) & (self.random <= 1)).all():
-                raise InputError(f"random of object {shown(self.name)} holds a number that is not from 0 to 1: correct it")
+                raise InputError(f"random of object {quoted(self.name)} holds a number that is not from 0 to 1: correct it")
 
     @property
     def matrices(self) -> NDArray[np.float64]:
@@ -170,13 +170,13 @@ def with_pairs(ledger: Sequence[LedgerEntry], pairs: Iterable[tuple[str, str]]) 
         others.setdefault(first, []).append("itself" if first == second else repr(second))
         if first != second:
             others.setdefault(second, []).append(repr(first))
-    told = []
+    entries = []
     for entry in ledger:
         if entry.object in others:
             shares = f"lies in one place with {', '.join(others[entry.object])} where pixels show it"
             entry = replace(entry, reason="; ".join(filter(None, (entry.reason, shares))))
-        told.append(entry)
-    return tuple(told)
+        entries.append(entry)
+    return tuple(entries)
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +216,7 @@ class Scene:
         if len(self.origin) != 3 or not np.isfinite(self.origin).all():
             raise InputError(f"origin is {self.origin}: give three finite numbers")
         if len(self.cycles) != 2 or not all(type(number) is int and 0 <= number < 100 for number in self.cycles):
-            raise InputError(f"cycles is {checks.shown(self.cycles)}: give a version of Blender, as 5.2")
+            raise InputError(f"cycles is {checks.quoted(self.cycles)}: give a version of Blender, as 5.2")
         start, end = (float(depth) for depth in self.clip)
         if not 0 <= start < end:
             raise InputError(f"clip is {start:g} … {end:g}: give a nearest depth of at least 0 and a greater farthest depth")
@@ -227,38 +227,38 @@ class Scene:
         for placed in self.objects:
             if placed.geometry not in materials:
                 raise InputError(
-                    f"object {shown(placed.name)} names the geometry {shown(placed.geometry)}, which the scene does not have"
+                    f"object {quoted(placed.name)} names the geometry {quoted(placed.geometry)}, which the scene does not have"
                 )
             _check_reach(placed, reaches[placed.geometry])
             least, greatest = materials[placed.geometry]
             if least < 0 or greatest >= len(placed.material_indices):
                 raise InputError(
-                    f"object {shown(placed.name)} has {len(placed.material_indices)} material_indices and its geometry "
-                    f"{shown(placed.geometry)} uses materials {least} … {greatest}: give one for each"
+                    f"object {quoted(placed.name)} has {len(placed.material_indices)} material_indices and its geometry "
+                    f"{quoted(placed.geometry)} uses materials {least} … {greatest}: give one for each"
                 )
             for name in placed.materials:
                 if name and name not in self.materials:
                     raise InputError(
-                        f"object {shown(placed.name)} names the material {shown(name)}, which the scene does not have"
+                        f"object {quoted(placed.name)} names the material {quoted(name)}, which the scene does not have"
                     )
         _check_links(self.lamps, self.objects)
         for image in self.world.images:
             if image not in self.images:
-                raise InputError(f"the world names the image {shown(image)}, which the scene does not have")
+                raise InputError(f"the world names the image {quoted(image)}, which the scene does not have")
         named = [
-            (f"{component} of material {shown(name)}", colour)
+            (f"{component} of material {quoted(name)}", colour)
             for name, material in self.materials.items()
             for component, colour in material.inputs
         ]
         named += [
-            (f"the emission of light {shown(lamp.name)}", colour)
+            (f"the emission of light {quoted(lamp.name)}", colour)
             for lamp in self.lamps
             if lamp.emission
             for colour in lamp.emission.colours
         ]
         for what, colour in named:
             if colour.image is not None and colour.image not in self.images:
-                raise InputError(f"{what} names the image {shown(colour.image)}, which the scene does not have")
+                raise InputError(f"{what} names the image {quoted(colour.image)}, which the scene does not have")
 
 
 def _check_links(lamps: tuple[Lamp, ...], objects: tuple[Object, ...]) -> None:
@@ -273,7 +273,8 @@ def _check_links(lamps: tuple[Lamp, ...], objects: tuple[Object, ...]) -> None:
             if unknown:
                 kind = "light" if isinstance(light, Lamp) else "object"
                 raise InputError(
-                    f"{what} of {kind} {shown(light.name)} names the object {shown(unknown[0])}, which the scene does not have"
+                    f"{what} of {kind} {quoted(light.name)} names the object {quoted(unknown[0])}, "
+                    "which the scene does not have"
                 )
 
 
@@ -301,7 +302,7 @@ def _check_reach(placed: Object, reach: float) -> None:
     if largest <= LARGEST:  # no product overflows
         largest = max(largest, (3 * reach * linear.max(axis=(1, 2)) + translation.max(axis=1)).max(initial=0.0))
     if largest > LARGEST:
-        raise InputError(f"object {shown(placed.name)} reaches as far as {largest:.3g}: give it coordinates below {LARGEST:g}")
+        raise InputError(f"object {quoted(placed.name)} reaches as far as {largest:.3g}: give it coordinates below {LARGEST:g}")
 
 
 def _material_range(materials: NDArray[np.int32]) -> tuple[int, int]:

@@ -21,7 +21,7 @@ def radiance(name: str, values: object) -> tuple[float, float, float]:
     """Three numbers that light can have: finite, not negative, not beyond `LARGEST_RADIANCE`; InputError with `name`."""
     rgb = checks.vector(name, values, 3)
     if not all(0.0 <= value <= LARGEST_RADIANCE for value in rgb):
-        raise InputError(f"{name} is {checks.shown(rgb)}: give three numbers from 0 to {LARGEST_RADIANCE:g}")
+        raise InputError(f"{name} is {checks.quoted(rgb)}: give three numbers from 0 to {LARGEST_RADIANCE:g}")
     return rgb
 
 
@@ -68,7 +68,7 @@ class Picture:
     @classmethod
     def compact(cls, values: NDArray[np.float32], srgb: bool = False) -> "Picture":
         """The picture of some float32 values, in as few bytes as hold each of them to the bit. values : as `pixels`."""
-        return cls(next(filter(lambda made: made is not None, (_exactly(values, dtype) for dtype in _SMALLEST_FIRST))), srgb)
+        return cls(next(filter(lambda exact: exact is not None, (_exactly(values, dtype) for dtype in _SMALLEST_FIRST))), srgb)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -102,15 +102,15 @@ def _exactly(values: NDArray[np.float32], dtype: np.dtype) -> NDArray | None:
     result = np.empty((*values.shape[:2], 1) if dtype == RGBE else values.shape, dtype)
     rows = max(1, _ROWS // values[0].size)
     for first in range(0, len(values), rows):
-        some, part = values[first : first + rows], result[first : first + rows]
+        source, part = values[first : first + rows], result[first : first + rows]
         with np.errstate(over="ignore", invalid="ignore"):
             if dtype == RGBE:
-                largest = np.maximum(np.maximum(some[..., 0], some[..., 1]), some[..., 2])
+                largest = np.maximum(np.maximum(source[..., 0], source[..., 1]), source[..., 2])
                 parts, exponents = part.view(np.uint8), np.clip(np.frexp(largest)[1] + 128, 0, 255)
-                parts[..., :3], parts[..., 3] = np.ldexp(some, 136 - exponents[..., None]), exponents
+                parts[..., :3], parts[..., 3] = np.ldexp(source, 136 - exponents[..., None]), exponents
             else:
-                part[:] = some if dtype.kind == "f" else np.rint(some * np.float32(np.iinfo(dtype).max))
-        if not np.array_equal(_values(part).view(np.int32), some.view(np.int32)):
+                part[:] = source if dtype.kind == "f" else np.rint(source * np.float32(np.iinfo(dtype).max))
+        if not np.array_equal(_values(part).view(np.int32), source.view(np.int32)):
             return None
     return result
 
@@ -141,7 +141,7 @@ class Colour:
     vertex: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rgb", radiance("a colour", self.rgb))
+        object.__setattr__(self, "rgb", radiance("a color", self.rgb))
 
     @property
     def is_black(self) -> bool:

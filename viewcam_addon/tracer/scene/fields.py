@@ -49,15 +49,17 @@ class Field:
         table = self._object()
         for key in required:
             if key not in table:
-                self.fail(f"has no key {checks.shown(key)}: add it")
+                self.fail(f"has no key {checks.quoted(key)}: add it")
         unknown = None if others else next((key for key in table if key not in required + optional), None)
         if unknown is not None:
-            self.fail(f"has an unknown key {checks.shown(unknown)}: remove it, or give one of {', '.join(required + optional)}")
-        return {key: Field(value, f"{checks.shown(key)} of {self.name}", self.file) for key, value in table.items()}
+            self.fail(
+                f"has an unknown key {checks.quoted(unknown)}: remove it, or give one of {', '.join(required + optional)}"
+            )
+        return {key: Field(value, f"{checks.quoted(key)} of {self.name}", self.file) for key, value in table.items()}
 
     def named(self, kind: str) -> dict[str, "Field"]:
         """The values of an object whose keys are names of things of this kind."""
-        return {key: Field(value, f"{kind} {checks.shown(key)}", self.file) for key, value in self._object().items()}
+        return {key: Field(value, f"{kind} {checks.quoted(key)}", self.file) for key, value in self._object().items()}
 
     def items(self, kind: str, count: int | None = None) -> list["Field"]:
         """The values of a list of things of this kind, called by their name where they have one."""
@@ -67,27 +69,27 @@ class Field:
 
     def text(self) -> str:
         if not isinstance(self.value, str):
-            self.fail(f"is {_shown(self.value)}: give a text")
+            self.fail(f"is {_quoted(self.value)}: give a text")
         return self.value
 
     def truth(self) -> bool:
         if not isinstance(self.value, bool):
-            self.fail(f"is {_shown(self.value)}: give true or false")
+            self.fail(f"is {_quoted(self.value)}: give true or false")
         return self.value
 
     def number(self) -> float:
         if not _is_number(self.value):
-            self.fail(f"is {_shown(self.value)}: give a finite number")
+            self.fail(f"is {_quoted(self.value)}: give a finite number")
         return float(self.value)
 
     def whole(self, least: int) -> int:
         if type(self.value) is not int or not least <= self.value <= _LARGEST_WHOLE:
-            self.fail(f"is {_shown(self.value)}: give a whole number of at least {least}")
+            self.fail(f"is {_quoted(self.value)}: give a whole number of at least {least}")
         return self.value
 
     def vector(self, count: int) -> tuple[float, ...]:
         if not isinstance(self.value, list) or len(self.value) != count or not all(map(_is_number, self.value)):
-            self.fail(f"is {_shown(self.value)}: give a list of {count} finite numbers")
+            self.fail(f"is {_quoted(self.value)}: give a list of {count} finite numbers")
         return tuple(map(float, self.value))
 
     def array(
@@ -121,7 +123,7 @@ class Field:
 
     def _object(self) -> dict:
         if not isinstance(self.value, dict):
-            self.fail(f"is {_shown(self.value)}: give an object with keys")
+            self.fail(f"is {_quoted(self.value)}: give an object with keys")
         return self.value
 
     def _nested(self, depth: int) -> NDArray:
@@ -156,7 +158,7 @@ class Arrays:
             key.fail("names an array, and the scene has no key 'arrays': add it, with the name of the .npz file")
         name = key.text()
         if name not in self._members:
-            key.fail(f"is {checks.shown(name)}, which {self._file} does not hold: export the scene again")
+            key.fail(f"is {checks.quoted(name)}, which {self._file} does not hold: export the scene again")
         if name not in self._taken:
             self._taken[name] = self._read(name)
         array = self._taken[name]
@@ -165,15 +167,13 @@ class Arrays:
         return array
 
     def _read(self, name: str) -> NDArray:
-        damaged = f"{self._file}: the array {checks.shown(name)} is damaged: export the scene again"
+        damaged = f"{self._file}: the array {checks.quoted(name)} is damaged: export the scene again"
         member = self._members[name]
         try:
             with self._archive.open(member) as file:
                 dtype, size = npy.header(file)
                 if dtype.hasobject:
-                    raise InputError(
-                        f"{self._file}: the array {checks.shown(name)} holds pickled objects, which are not read: store numbers"
-                    )
+                    raise InputError(f"{self._file}: the array {checks.quoted(name)} holds pickled objects: store numbers")
                 packed = min(member.compress_size, os.fstat(self._archive.fp.fileno()).st_size)
                 if file.tell() + size != member.file_size or member.file_size > packed * _MOST_UNPACKED:
                     raise InputError(damaged)
@@ -203,14 +203,14 @@ def arrays_beside(scene_path: Path, field: Field | None) -> Iterator[Arrays]:
         yield Arrays()
         return
     path = _beside(scene_path, field)
-    refusal = f"{checks.shown(path.name)} is no .npz file of arrays: export the scene again"
+    refusal = f"{checks.quoted(path.name)} is no .npz file of arrays: export the scene again"
     with contextlib.ExitStack() as opened:
         try:
             if path.exists() and not path.is_file():
                 raise InputError(refusal)
             archive = Arrays(path.name, opened.enter_context(zipfile.ZipFile(path)))
         except FileNotFoundError:
-            field.fail(f"names {checks.shown(path.name)}, which is not there: put it beside the scene file")
+            field.fail(f"names {checks.quoted(path.name)}, which is not there: put it beside the scene file")
         except (OSError, ValueError, NotImplementedError, zipfile.BadZipFile) as error:
             raise InputError(refusal) from error
         yield archive
@@ -225,13 +225,13 @@ def _beside(scene_path: Path, field: Field) -> Path:
     except (OSError, ValueError):  # too long for the system to tell
         inside = False
     if not inside:
-        field.fail(f"is {checks.shown(field.value)}, which leaves the scene file's folder: give the name of a file in it")
+        field.fail(f"is {checks.quoted(field.value)}, which leaves the scene file's folder: give the name of a file in it")
     return path
 
 
 def _name(kind: str, index: int, value: object, parent: Field) -> str:
     name = value.get("name", value.get("object")) if isinstance(value, dict) else None
-    return f"{kind} {checks.shown(name)}" if isinstance(name, str) else f"{kind} {index} of {parent.name}"
+    return f"{kind} {checks.quoted(name)}" if isinstance(name, str) else f"{kind} {index} of {parent.name}"
 
 
 def _is_number(value: object) -> bool:
@@ -240,7 +240,7 @@ def _is_number(value: object) -> bool:
     return type(value) is float and math.isfinite(value)
 
 
-def _shown(value: object) -> str:
+def _quoted(value: object) -> str:
     if isinstance(value, list | dict):
         return "a list" if isinstance(value, list) else "an object"
-    return json.dumps(value) if value is None or isinstance(value, bool) else checks.shown(value)
+    return json.dumps(value) if value is None or isinstance(value, bool) else checks.quoted(value)

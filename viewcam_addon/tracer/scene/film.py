@@ -45,13 +45,13 @@ def refinement(samples: int, pixels: int) -> tuple[int, ...]:
 
 def _filter(_: str, name: object) -> object:
     if name not in FILTERS:
-        raise InputError(f"the pixel filter is {checks.shown(name)}: give one of {', '.join(FILTERS)}")
+        raise InputError(f"the pixel filter is {checks.quoted(name)}: give one of {', '.join(FILTERS)}")
     return name
 
 
 def _bounces(name: str, value: object) -> object:
     if type(value) is not int or not 0 <= value <= 1024:
-        raise InputError(f"{name} is {checks.shown(value)}: give a whole number from 0 to 1024")
+        raise InputError(f"{name} is {checks.quoted(value)}: give a whole number from 0 to 1024")
     return value
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import shown
+from ...checks import quoted
 from ...errors import InputError
 from . import Mesh, Spheres
 from .fields import Arrays, Field
@@ -43,7 +43,7 @@ def geometry(field: Field, arrays: Arrays) -> Mesh | Spheres:
     kind = field.fields(("type",), others=True)["type"]
     readers: dict[str, Callable[[Field, Arrays], Mesh | Spheres]] = {"mesh": _mesh, "spheres": _spheres, "plane": _plane}
     if kind.text() not in readers:
-        kind.fail(f"is {shown(kind.value)}: give one of {', '.join(readers)}")
+        kind.fail(f"is {quoted(kind.value)}: give one of {', '.join(readers)}")
     try:
         return readers[kind.text()](field, arrays)
     except InputError as error:

@@ -43,7 +43,7 @@ def read(name: str, text: object) -> Table:
         if it is none.
     """
     if not isinstance(text, str):
-        raise InputError(f"{name} is {checks.shown(text)}: give the text of an IES file")
+        raise InputError(f"{name} is {checks.quoted(text)}: give the text of an IES file")
     try:
         return _table(text)
     except (ValueError, IndexError) as error:
@@ -52,8 +52,8 @@ def read(name: str, text: object) -> Table:
 
 @functools.lru_cache(maxsize=16)
 def _table(text: str) -> Table:
-    _, found, rest = text.replace(",", " ").partition("\nTILT=")
-    if not found:
+    _, separator, rest = text.replace(",", " ").partition("\nTILT=")
+    if not separator:
         raise ValueError("it has no line TILT=")
     tilt, _, rest = rest.partition("\n")
     words = iter(rest.split())
@@ -90,9 +90,9 @@ def _number(words: Iterator[str]) -> float:
     try:
         value = float(word)
     except ValueError:
-        raise ValueError(f"it has {checks.shown(word)} where a number belongs") from None
+        raise ValueError(f"it has {checks.quoted(word)} where a number belongs") from None
     if not np.isfinite(value) or abs(value) > 1e18:
-        raise ValueError(f"it has the number {checks.shown(word)}")
+        raise ValueError(f"it has the number {checks.quoted(word)}")
     return value
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import checks
-from ...checks import shown
+from ...checks import quoted
 from ...errors import InputError
 from . import values
 from .shader_nodes import Node
@@ -39,7 +39,7 @@ def hidden_from(name: str, rays: Collection[str]) -> frozenset[str]:
     """The kinds of rays that something is hidden from; InputError with its `name` where there is no such kind."""
     unknown = sorted(set(rays) - set(RAYS))
     if unknown:
-        raise InputError(f"{name} is hidden from {shown(unknown[0])}: give some of {', '.join(RAYS)}")
+        raise InputError(f"{name} is hidden from {quoted(unknown[0])}: give some of {', '.join(RAYS)}")
     return frozenset(rays)
 
 
@@ -58,7 +58,7 @@ def _linked(name: str, objects: Collection[str] | None) -> frozenset[str] | None
 
 def _emission(name: str, node: Node | None) -> Node | None:
     if node is not None and not node.is_value:
-        raise InputError(f"the {name} is a shader {node.type!r}: give a node that makes a colour")
+        raise InputError(f"the {name} is a shader {node.type!r}: give a node that makes a color")
     return node
 
 
@@ -76,7 +76,7 @@ def _direction(name: str, value: object) -> tuple[float, ...]:
 def _position(name: str, value: object) -> tuple[float, ...]:
     position = checks.vector(name, value, 3)
     if max(map(abs, position)) > values.LARGEST:
-        raise InputError(f"{name} is {shown(position)}: give numbers below {values.LARGEST:g}")
+        raise InputError(f"{name} is {quoted(position)}: give numbers below {values.LARGEST:g}")
     return position
 
 
@@ -89,7 +89,7 @@ def _matrix(name: str, value: Any) -> Any:
 def _size(name: str, value: object) -> tuple[float, ...]:
     size = checks.vector(name, value, 2)
     if not all(0 <= side <= values.LARGEST for side in size):
-        raise InputError(f"{name} is {shown(size)}: give two numbers from 0 to {values.LARGEST:g}")
+        raise InputError(f"{name} is {quoted(size)}: give two numbers from 0 to {values.LARGEST:g}")
     return size
 
 
@@ -116,7 +116,7 @@ class Lamp:
     emission: Node | None = values.value(None, _emission, "node")
 
     def __post_init__(self) -> None:
-        values.check(self, f"light {shown(self.name)}")
+        values.check(self, f"light {quoted(self.name)}")
 
     @property
     def _own(self) -> dict[str, Any]:

@@ -14,21 +14,23 @@ _WHAT = {"diffuse": _REFLECTS, "principled": _REFLECTS, "glossy": _MIRRORS, "met
 
 def least_level(scene: Scene) -> tuple[str, str]:
     """The level (film.LEVELS) at which nothing is left out that this scene shows, and one sentence that says why."""
-    shown = [(placed.name, material) for placed in scene.objects for material in _materials(scene, placed)]
-    return level_of(scene.lamps, scene.world, scene.bounces, shown)
+    materials = [(placed.name, material) for placed in scene.objects for material in _materials(scene, placed)]
+    return level_of(scene.lamps, scene.world, scene.bounces, materials)
 
 
-def level_of(lamps: Sequence[Lamp], world: World, bounces: Bounces, shown: Sequence[tuple[str, Material]]) -> tuple[str, str]:
-    """`least_level` of what gives light. shown : (object's name, material), of each material that some part of it uses."""
+def level_of(
+    lamps: Sequence[Lamp], world: World, bounces: Bounces, materials: Sequence[tuple[str, Material]]
+) -> tuple[str, str]:
+    """`least_level` of what gives light. materials : (object's name, material), of each material that some part of it uses."""
     geometry, direct, path = LEVELS
-    light = _light(lamps, world, shown)
+    light = _light(lamps, world, materials)
     if light is None:
         return geometry, "Nothing gives light: no lamp, no surface and not the world."
     if bounces.total == 0:
         return direct, f"Light comes from {light}, and the scene allows no bounces."
     scattering = [
         (name, closure.node.type)
-        for name, material in shown
+        for name, material in materials
         for closure in material.closures
         if KINDS[closure.node.type].scatters
     ]
@@ -40,12 +42,12 @@ def level_of(lamps: Sequence[Lamp], world: World, bounces: Bounces, shown: Seque
     return direct, f"Light comes from {light}, and the scene allows no bounces of the kinds that it has."
 
 
-def _light(lamps: Sequence[Lamp], world: World, shown: Sequence[tuple[str, Material]]) -> str | None:
+def _light(lamps: Sequence[Lamp], world: World, materials: Sequence[tuple[str, Material]]) -> str | None:
     """The first thing that gives light."""
     for lamp in lamps:
         if any(lamp.strength):
             return f"the lamp {lamp.name!r}"
-    for name, material in shown:
+    for name, material in materials:
         if material.shines:
             return f"the surface of {name!r}"
     return None if world.is_black else "the world"

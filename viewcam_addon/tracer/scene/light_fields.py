@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import shown
+from ...checks import quoted
 from ...errors import InputError
 from . import Scene, lamps, placing, value_nodes
 from .colours import RGBE, TEXELS
@@ -19,7 +19,7 @@ from .fields import Arrays, Field
 from .film import Bounces, Film
 from .geometry_fields import LARGEST_INLINE, array_document
 from .lamps import Lamp, World
-from .materials import Colour, Material, Picture
+from .materials import COMPONENTS, Colour, Material, Picture, sum_of
 from .shader_nodes import KINDS, MOST_DEEP, Node
 
 KEYS = ("images", "materials", "lamps", "world", "film", "bounces", "cycles")
@@ -69,7 +69,7 @@ def light(fields: dict[str, Field], arrays: Arrays) -> dict[str, Any]:
 
 def _version(field: Field) -> tuple[int, int]:
     if not re.fullmatch(r"[0-9]{1,2}\.[0-9]{1,2}", field.text()):
-        field.fail(f'is {shown(field.value)}: give a version of Blender, as "5.2"')
+        field.fail(f'is {quoted(field.value)}: give a version of Blender, as "5.2"')
     first, second = map(int, field.value.split("."))
     return first, second
 
@@ -96,14 +96,9 @@ def _changed(owner: Lamp | World | Film | Bounces) -> dict[str, Any]:
 
 
 def _material_document(material: Material) -> dict[str, Any]:
-    plain = ((name, getattr(material, name)) for name in ("ior", "transparent_shadow"))
-    document: dict[str, Any] = {name: value for name, value in plain if value != getattr(Material, name)}
-    for each in dataclasses.fields(material):
-        colour = getattr(material, each.name)
-        if isinstance(colour, Colour):
-            document[each.name] = _colour_document(colour)
     trees = ((name, getattr(material, name)) for name in ("surface", "displacement"))
-    return document | {name: _node_document(tree) for name, tree in trees if tree is not None}
+    document: dict[str, Any] = {name: _node_document(tree) for name, tree in trees if tree is not None}
+    return document if material.transparent_shadow else document | {"transparent_shadow": False}
 
 
 def _node_document(node: Node) -> dict[str, Any]:
@@ -140,17 +135,19 @@ def _picture(field: Field, arrays: Arrays) -> Picture:
 
 
 def _material(field: Field) -> Material:
-    others = ("ior", "surface", "transparent_shadow", "displacement")
-    components = [each.name for each in dataclasses.fields(Material) if each.name not in others]
-    keys = field.fields((), (*components, *others))
-    given: dict[str, Any] = {name: _colour(keys[name]) for name in components if name in keys}
+    """A tree of nodes, or components, which are read as one."""
+    keys = field.fields((), (*COMPONENTS, "ior", "surface", "transparent_shadow", "displacement"))
+    stated: dict[str, Any] = {name: _colour(keys[name]) for name in COMPONENTS if name in keys}
+    beside = [name for name, colour in stated.items() if not colour.is_black]
+    if "surface" in keys and beside:
+        field.fail(f"has a surface beside {', '.join(beside)}: give one or the other")
     if "ior" in keys:
-        given["ior"] = keys["ior"].number()
-    given |= {name: _node(keys[name]) for name in ("surface", "displacement") if name in keys}
+        stated["ior"] = keys["ior"].number()
+    trees = {name: _node(keys[name]) for name in ("surface", "displacement") if name in keys}
     if "transparent_shadow" in keys:
-        given["transparent_shadow"] = keys["transparent_shadow"].truth()
+        trees["transparent_shadow"] = keys["transparent_shadow"].truth()
     try:
-        return Material(**given)
+        return dataclasses.replace(sum_of(**stated), **trees)
     except InputError as error:
         field.hand_on(error)
 
@@ -160,16 +157,16 @@ def _node(field: Field, deep: int = 1) -> Node:
         raise InputError(f"{field.file}: more than {MOST_DEEP} nodes feed one another in a row: give fewer")
     kind = field.fields(("type",), others=True)["type"]
     if kind.text() not in KINDS:
-        kind.fail(f"is {shown(kind.value)}: give one of {', '.join(KINDS)}")
+        kind.fail(f"is {quoted(kind.value)}: give one of {', '.join(KINDS)}")
     known = KINDS[kind.value]
     keys = field.fields(("type",), tuple(known.inputs))
     try:
-        given = (
+        stated = (
             (name, _node_input(keys[name], default, known.is_value, deep))
             for name, default in known.inputs.items()
             if name in keys
         )
-        return Node(kind.value, tuple(given))
+        return Node(kind.value, tuple(stated))
     except InputError as error:
         field.hand_on(error)
 
@@ -207,7 +204,7 @@ def _colour(field: Field) -> Colour:
 def _lamp(field: Field) -> Lamp:
     kind = field.fields(("type", "name"), others=True)["type"]
     if kind.text() not in lamps.KINDS:
-        kind.fail(f"is {shown(kind.value)}: give one of {', '.join(lamps.KINDS)}")
+        kind.fail(f"is {quoted(kind.value)}: give one of {', '.join(lamps.KINDS)}")
     lamp = lamps.KINDS[kind.value]
     declared = [each.name for each in dataclasses.fields(lamp) if each.name not in ("name", "matrix")]
     is_placed = len(declared) + 1 < len(dataclasses.fields(lamp))

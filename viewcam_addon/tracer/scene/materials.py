@@ -1,11 +1,11 @@
-"""The materials of surfaces, as data.
+"""The materials of surfaces, as data: trees of shader nodes (shader_nodes.py).
 
-A material is either a tree of shader nodes (shader_nodes.py) or, for what a hand writes most, a sum of components without any
-roughness, each with a color: Lambert's diffuse reflection, emission, a perfect mirror, clear glass and clear refraction.
+What a hand writes most, a sum of components without any roughness, each with a color, is such a tree, too: `sum_of` makes it,
+where a scene file is read. `simplified` finds the sums among trees: their closures are fewer, and without factors.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ... import checks
@@ -13,64 +13,38 @@ from ...errors import InputError
 from .colours import LARGEST_RADIANCE, WHITE, Colour, Picture, radiance
 from .shader_nodes import Closure, Node, closures, node
 
-__all__ = ["LARGEST_RADIANCE", "PLAIN", "Colour", "Material", "Picture", "components", "radiance"]
+__all__ = ["LARGEST_RADIANCE", "PLAIN", "Colour", "Material", "Picture", "radiance", "simplified", "sum_of"]
 
 LEAST_IOR, MOST_IOR = 1e-3, 1e3
 
 
 @dataclass(frozen=True)
 class Material:
-    """The components that a surface's light is the sum of; None is no such component. Or `surface`, and no component.
+    """The light of a surface.
 
-    diffuse : albedo of a Lambert surface, both of its sides. emission : radiance, of both sides. mirror : reflectance of a
-    perfect mirror. glass : color of what is reflected and refracted by a clear dielectric, shared out by Fresnel's equations.
-    refraction : color of what is refracted, nothing being reflected. ior : of glass and refraction, inside over outside.
-    surface : the shader that is in their place. transparent_shadow : whether shadow rays go through it where it is transparent.
+    surface : its shader, None where it gives no light at all.
+    transparent_shadow : whether shadow rays go through it where it is transparent.
     displacement : a node that makes a height, world units, whose slope turns the normals; nothing moves.
     """
 
-    diffuse: Colour | None = None
-    emission: Colour | None = None
-    mirror: Colour | None = None
-    glass: Colour | None = None
-    refraction: Colour | None = None
-    ior: float = 1.45
     surface: Node | None = None
     transparent_shadow: bool = True
     displacement: Node | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ior", checks.number("ior of a material", self.ior, LEAST_IOR, MOST_IOR))
         truth = checks.truth("transparent_shadow of a material", self.transparent_shadow)
         object.__setattr__(self, "transparent_shadow", truth)
         if self.surface is not None and self.surface.is_value:
             raise InputError(f"the surface of a material is a node {self.surface.type!r}: give a shader")
-        if self.surface is not None and self.colours:
-            raise InputError(f"a material has a surface beside {', '.join(self.colours)}: give one or the other")
         if self.displacement is not None and not self.displacement.is_value:
             raise InputError(
                 f"the displacement of a material is a shader {self.displacement.type!r}: give a node that makes a height"
             )
 
     @property
-    def colours(self) -> dict[str, Colour]:
-        """Component → its color, without those that are None or black."""
-        found = {field.name: getattr(self, field.name) for field in fields(self) if field.type in (Colour, Colour | None)}
-        return {name: colour for name, colour in found.items() if colour is not None and not colour.is_black}
-
-    @property
     def closures(self) -> tuple[Closure, ...]:
-        """The closures that the core adds up, of either form of a material."""
-        if self.surface is not None:
-            return tuple(closures(self.surface))
-        made = {
-            "emission": lambda colour: node("emission", color=colour),
-            "diffuse": lambda colour: node("diffuse", color=colour),
-            "mirror": lambda colour: node("glossy", color=colour, roughness=0.0, distribution="ggx"),
-            "glass": lambda colour: node("glass", color=colour, ior=self.ior, distribution="ggx"),
-            "refraction": lambda colour: node("refraction", color=colour, ior=self.ior, distribution="ggx"),
-        }
-        return tuple(Closure(make(self.colours[name])) for name, make in made.items() if name in self.colours)
+        """The closures that the core adds up."""
+        return tuple(closures(self.surface))
 
     @property
     def shines(self) -> bool:
@@ -80,15 +54,13 @@ class Material:
     @property
     def inputs(self) -> tuple[tuple[str, Colour], ...]:
         """The inputs of all colors and numbers, each with its name in sentences."""
-        found = [("displacement", colour) for colour in self.displacement.colours] if self.displacement else []
-        if self.surface is None:
-            return (*self.colours.items(), *found)
+        result = [("displacement", colour) for colour in self.displacement.colours] if self.displacement else []
         for closure in self.closures:
             kind = closure.node.type
             for name, value in (*closure.node.inputs, *(("a factor", factor) for factor, _ in closure.factors)):
                 colours = value.colours if isinstance(value, Node) else [value] if isinstance(value, Colour) else []
-                found += [(f"{name} of {kind}", colour) for colour in colours]
-        return tuple(found)
+                result += [(f"{name} of {kind}", colour) for colour in colours]
+        return tuple(result)
 
     @property
     def nodes(self) -> Iterator[Node]:
@@ -105,8 +77,43 @@ class Material:
         return {name for node in self.nodes for name in node.attributes}
 
 
-def components(shader: Node | None) -> dict[str, Any] | None:
-    """The components that a tree of shaders is the sum of, as a `Material` takes it; None where no components say the same."""
+# In the order in which the core adds them up.
+COMPONENTS = {"emission": "emission", "diffuse": "diffuse", "mirror": "glossy", "glass": "glass", "refraction": "refraction"}
+"""Component → the type of its shader, which has no roughness."""
+
+
+def sum_of(
+    ior: float = 1.45, transparent_shadow: bool = True, displacement: Node | None = None, **components: Colour
+) -> Material:
+    """The material whose light is the sum of components; without any it is black.
+
+    ior : of glass and refraction, inside over outside.
+    components : of `COMPONENTS`. diffuse : albedo of a Lambert surface, both of its sides. emission : radiance, of both sides.
+        mirror : reflectance of a perfect mirror. glass : color of what is reflected and refracted by a clear dielectric, shared
+        out by Fresnel's equations. refraction : color of what is refracted, nothing being reflected.
+    """
+    ior = checks.number("ior of a material", ior, LEAST_IOR, MOST_IOR)
+    surface: Node | None = None
+    for name, kind in COMPONENTS.items():
+        colour = components.pop(name, None)
+        if colour is None or colour.is_black:
+            continue
+        more = {} if name in ("emission", "diffuse") else {"roughness": 0.0, "distribution": "ggx"}
+        shader = node(kind, color=colour, **more, **({"ior": ior} if name in ("glass", "refraction") else {}))
+        surface = shader if surface is None else node("add", first=surface, second=shader)
+    if components:
+        raise TypeError(f"a material has no component {', '.join(components)}")
+    return Material(surface, transparent_shadow, displacement)
+
+
+def simplified(shader: Node | None) -> Node | None:
+    """The shader, or the sum of components that says the same, where there is one."""
+    components = _components(shader)
+    return shader if components is None else sum_of(**components).surface
+
+
+def _components(shader: Node | None) -> dict[str, Any] | None:
+    """The components that a tree of shaders is the sum of, as `sum_of` takes them; None where no components say the same."""
     if shader is None:
         return {}
     if shader.type not in ("mix", "add"):
@@ -116,8 +123,8 @@ def components(shader: Node | None) -> dict[str, Any] | None:
         return None
     total: dict[str, Any] | None = {}
     for name, weight in (("first", 1.0 if factor is None else 1.0 - factor), ("second", 1.0 if factor is None else factor)):
-        some = components(shader[name]) if weight else {}
-        total = None if total is None or some is None else _sum(total, some, weight)
+        part = _components(shader[name]) if weight else {}
+        total = None if total is None or part is None else _sum(total, part, weight)
     return total
 
 
@@ -126,20 +133,20 @@ _LAYERS = ("metallic", "diffuse_roughness", "transmission_weight", "coat_weight"
 
 
 def _component(shader: Node) -> dict[str, Any] | None:
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     if shader.type == "emission":
-        found = {"emission": _scaled(shader["color"], _constant(shader["strength"]))}
+        result = {"emission": _scaled(shader["color"], _constant(shader["strength"]))}
     elif shader.type in _SMOOTH and _constant(shader["roughness"]) == 0.0:
-        found = {_SMOOTH[shader.type]: _scaled(shader["color"], 1.0)}
+        result = {_SMOOTH[shader.type]: _scaled(shader["color"], 1.0)}
         if shader.type in ("glass", "refraction"):
             ior = _constant(shader["ior"])
-            found["ior"] = ior if ior is not None and LEAST_IOR <= ior <= MOST_IOR else None
+            result["ior"] = ior if ior is not None and LEAST_IOR <= ior <= MOST_IOR else None
     elif shader.type == "principled" and _is_diffuse(shader):
-        found = {"diffuse": _scaled(shader["base_color"], 1.0)}
+        result = {"diffuse": _scaled(shader["base_color"], 1.0)}
         if not shader["emission_strength"].is_black:
-            found["emission"] = _scaled(shader["emission_color"], _constant(shader["emission_strength"]))
+            result["emission"] = _scaled(shader["emission_color"], _constant(shader["emission_strength"]))
     is_bent = any(name in ("normal", "coat_normal") for name, _ in shader.inputs)
-    return None if is_bent or not found or None in found.values() else found
+    return None if is_bent or not result or None in result.values() else result
 
 
 def _is_diffuse(principled: Node) -> bool:
@@ -147,9 +154,9 @@ def _is_diffuse(principled: Node) -> bool:
     return not has_gloss and _constant(principled["alpha"]) == 1.0 and all(principled[name].is_black for name in _LAYERS)
 
 
-def _sum(total: dict[str, Any], some: dict[str, Any], weight: float) -> dict[str, Any] | None:
+def _sum(total: dict[str, Any], added: dict[str, Any], weight: float) -> dict[str, Any] | None:
     result = dict(total)
-    for name, value in some.items():
+    for name, value in added.items():
         before = result.get(name)
         scaled = value if name == "ior" else _scaled(value, weight)
         if name == "ior" or before is None or before.is_black:
@@ -174,5 +181,6 @@ def _constant(value: Colour | Node) -> float | None:
     return None if isinstance(value, Node) or value.varies or len(set(value.rgb)) > 1 else value.rgb[0]
 
 
-PLAIN = Material(diffuse=Colour((0.8, 0.8, 0.8)))
+PLAIN_COLOR = Colour((0.8, 0.8, 0.8))
+PLAIN = sum_of(diffuse=PLAIN_COLOR)
 """The material of a surface that has none, in Blender as here."""

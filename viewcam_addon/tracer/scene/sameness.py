@@ -14,31 +14,31 @@ from . import Scene
 _FEW = 64  # numbers, below which NumPy takes longer to compare two arrays than to copy them
 
 
-def same_things(one: Scene, other: Scene) -> bool:
+def same_things(first: Scene, second: Scene) -> bool:
     """True if the same geometries stand in the same places, made of materials of the same names."""
-    return same(one.objects, other.objects) and same(one.geometries, other.geometries)
+    return same(first.objects, second.objects) and same(first.geometries, second.geometries)
 
 
-def same(one: object, other: object) -> bool:
+def same(first: object, second: object) -> bool:
     """True if two values, of those that scenes are made of, are the same."""
-    if one is other:
+    if first is second:
         return True
-    if type(one) is not type(other):
+    if type(first) is not type(second):
         return False
-    if isinstance(one, np.ndarray):
-        return _same_array(one, other)
-    if isinstance(one, dict):
-        return list(one) == list(other) and all(same(value, other[key]) for key, value in one.items())
-    if isinstance(one, tuple):
-        return len(one) == len(other) and all(map(same, one, other))
-    if is_dataclass(one):
-        return all(same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
-    return one == other
+    if isinstance(first, np.ndarray):
+        return _same_array(first, second)
+    if isinstance(first, dict):
+        return list(first) == list(second) and all(same(value, second[key]) for key, value in first.items())
+    if isinstance(first, tuple):
+        return len(first) == len(second) and all(map(same, first, second))
+    if is_dataclass(first):
+        return all(same(getattr(first, field.name), getattr(second, field.name)) for field in fields(first))
+    return first == second
 
 
-def _same_array(one: NDArray, other: NDArray) -> bool:
-    if one.shape != other.shape or one.dtype != other.dtype:
+def _same_array(first: NDArray, second: NDArray) -> bool:
+    if first.shape != second.shape or first.dtype != second.dtype:
         return False
-    if one.size < _FEW:
-        return one.tobytes() == other.tobytes()
-    return np.array_equal(one, other)
+    if first.size < _FEW:
+        return first.tobytes() == second.tobytes()
+    return np.array_equal(first, second)

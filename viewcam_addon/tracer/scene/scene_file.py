@@ -144,7 +144,7 @@ def _parsed(path: Path) -> object:
         table = {}
         for key, value in pairs:
             if key in table:
-                raise InputError(f"{path.name}: the key {checks.shown(key)} appears twice in one object: remove one")
+                raise InputError(f"{path.name}: the key {checks.quoted(key)} appears twice in one object: remove one")
             table[key] = value
         return table
 

@@ -27,14 +27,20 @@ class Kind:
     """The inputs of a type of node.
 
     inputs : name → its default; a number, a color, words to choose from (the first is the default), or None for a shader; of a
-    node that makes values also what value_nodes.py says.
-    is_value : whether it makes a value, and is no shader.
+        node that makes values also what value_nodes.py says.
     scatters : the kinds of bounces (film.Bounces) that its light is counted as.
+    is_value : whether it makes a value, and is no shader.
+    node : the type of Blender's shader node, where it is not BSDF_ and our name.
+    names : of inputs that Blender calls otherwise → what, or their number.
+    neutral : Blender's name of an input that is not modeled → the value without which the shader is only approximated.
     """
 
     inputs: Mapping[str, value_nodes.Default | None]
     scatters: tuple[str, ...] = ()
     is_value: bool = False
+    node: str = ""
+    names: Mapping[str, str | int] = field(default_factory=dict)
+    neutral: Mapping[str, float] = field(default_factory=dict)
 
 
 KINDS: dict[str, Kind] = {
@@ -61,16 +67,19 @@ KINDS: dict[str, Kind] = {
             "normal": value_nodes.NORMAL,
         },
         ("glossy",),
+        names={"color": "Base Color", "fresnel": "fresnel_type"},
+        neutral={"Thin Film Thickness": 0.0},
     ),
     "glass": Kind(
         {"color": WHITE, "roughness": 0.0, "ior": 1.5, "distribution": DISTRIBUTIONS, "normal": value_nodes.NORMAL},
         ("glossy", "transmission"),
+        neutral={"Thin Film Thickness": 0.0},
     ),
     "refraction": Kind(
         {"color": WHITE, "roughness": 0.0, "ior": 1.45, "distribution": ("beckmann", "ggx"), "normal": value_nodes.NORMAL},
         ("transmission",),
     ),
-    "emission": Kind({"color": WHITE, "strength": 1.0}),
+    "emission": Kind({"color": WHITE, "strength": 1.0}, node="EMISSION"),
     "transparent": Kind({"color": WHITE}),
     "principled": Kind(
         {
@@ -100,11 +109,52 @@ KINDS: dict[str, Kind] = {
             "coat_normal": value_nodes.NORMAL,
         },
         ("diffuse", "glossy", "transmission"),
+        neutral={"Thin Film Thickness": 0.0, "Subsurface Weight": 0.0, "Thin Wall": 0.0},
     ),
-    "mix": Kind({"factor": 0.5, "first": None, "second": None}),
-    "add": Kind({"first": None, "second": None}),
-    **{name: Kind(inputs, is_value=True) for name, inputs in value_nodes.KINDS.items()},
+    "mix": Kind(
+        {"factor": 0.5, "first": None, "second": None}, node="MIX_SHADER", names={"factor": 0, "first": 1, "second": 2}
+    ),
+    "add": Kind({"first": None, "second": None}, node="ADD_SHADER", names={"first": 0, "second": 1}),
+    **{name: Kind(row.inputs, is_value=True) for name, row in value_nodes.KINDS.items()},
 }
+
+
+@dataclass(frozen=True)
+class Shader:
+    """A type of shader node as Blender has it.
+
+    kind : the node's type. inputs : ours → theirs. words : ours → the property that has the word. neutral : as of `Kind`.
+    """
+
+    kind: str
+    inputs: Mapping[str, str | int]
+    words: Mapping[str, str]
+    neutral: Mapping[str, float]
+
+    @property
+    def class_name(self) -> str:
+        return "ShaderNode" + self.kind.title().replace("_", "")
+
+
+def _shader(ours: str, kind: Kind) -> Shader:
+    inputs, words = {}, {}
+    for name, default in kind.inputs.items():
+        if isinstance(default, tuple) and isinstance(default[0], str):
+            words[name] = str(kind.names.get(name, name))
+        else:
+            inputs[name] = kind.names.get(name, name.replace("_", " ").title().replace("Ior", "IOR"))
+    return Shader(kind.node or f"BSDF_{ours.upper()}", inputs, words, kind.neutral)
+
+
+SHADERS = {ours: _shader(ours, kind) for ours, kind in KINDS.items() if not kind.is_value}
+# Blender's words, where they are others than ours in capitals.
+_WORDS = {"multiscatter_ggx": "MULTI_GGX"}
+
+
+def word_of(ours: str) -> str:
+    """Blender's name of one of the words of our shader nodes."""
+    return _WORDS.get(ours, ours.upper())
+
 
 _NEEDED = {"image": "the name of one", "table": "the name of an image of one row", "text": "that of an IES file"}
 
@@ -130,13 +180,13 @@ class Node:
     def __post_init__(self) -> None:
         what = "node" if self.is_value else "shader"
         if self.type not in KINDS:
-            raise InputError(f"a {what} is of the type {checks.shown(self.type)}: give one of {', '.join(KINDS)}")
+            raise InputError(f"a {what} is of the type {checks.quoted(self.type)}: give one of {', '.join(KINDS)}")
         known = KINDS[self.type].inputs
         values = {}
         for name, value in dict(self.inputs).items():
             if name not in known:
                 raise InputError(
-                    f"a {what} {self.type!r} has no input {checks.shown(name)}: give one of {', '.join(known) or 'none'}"
+                    f"a {what} {self.type!r} has no input {checks.quoted(name)}: give one of {', '.join(known) or 'none'}"
                 )
             values[name] = _checked(f"{name} of a {what} {self.type!r}", value, known[name], self.is_value)
         for name, wanted in _NEEDED.items():
@@ -275,7 +325,7 @@ def _number_or_colour(value: Any, may_be_negative: bool) -> Any:
         return Colour(three)
     three = checks.vector("a value", three, 3)
     if any(abs(number) > LARGEST_RADIANCE for number in three):
-        raise InputError(f"a value is {checks.shown(three)}: give numbers up to {LARGEST_RADIANCE:g}")
+        raise InputError(f"a value is {checks.quoted(three)}: give numbers up to {LARGEST_RADIANCE:g}")
     return three
 
 
@@ -288,15 +338,15 @@ def _checked(name: str, value: Any, known: Any, of_value: bool) -> Any:
         return value
     if isinstance(known, tuple) and isinstance(known[0], str):
         if value not in known:
-            raise InputError(f"{name} is {checks.shown(value)}: give one of {', '.join(known)}")
+            raise InputError(f"{name} is {checks.quoted(value)}: give one of {', '.join(known)}")
         return value
     if isinstance(known, bool):
         if not isinstance(value, bool):
-            raise InputError(f"{name} is {checks.shown(value)}: give true or false")
+            raise InputError(f"{name} is {checks.quoted(value)}: give true or false")
         return value
     if known is value_nodes.NAME:
         if not isinstance(value, str):
-            raise InputError(f"{name} is {checks.shown(value)}: give a name")
+            raise InputError(f"{name} is {checks.quoted(value)}: give a name")
         return value
     if known is value_nodes.IES:
         ies.read(name, value)

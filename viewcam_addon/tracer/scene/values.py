@@ -23,13 +23,13 @@ def value(default: Any, check: Callable[[str, Any], Any] | None, *read: Any) -> 
 
 
 def number(default: float, least: float = 0.0, most: float = LARGEST) -> Any:
-    return value(default, lambda name, given: checks.number(name, given, least, most), "number")
+    return value(default, lambda name, stated: checks.number(name, stated, least, most), "number")
 
 
 def angle(default: float, least: float = 0.0) -> Any:
     """Radians, at most π, as which the float32 just above it counts, Blender's 180°."""
     half_turn = float(np.float32(np.pi))
-    return value(default, lambda name, given: min(checks.number(name, given, least, half_turn), np.pi), "number")
+    return value(default, lambda name, stated: min(checks.number(name, stated, least, half_turn), np.pi), "number")
 
 
 def truth(default: bool) -> Any:
@@ -37,7 +37,7 @@ def truth(default: bool) -> Any:
 
 
 def vector(default: tuple[float, ...]) -> Any:
-    return value(default, lambda name, given: checks.vector(name, given, len(default)), "vector", len(default))
+    return value(default, lambda name, stated: checks.vector(name, stated, len(default)), "vector", len(default))
 
 
 def light(default: float = 1.0) -> Any:
@@ -48,6 +48,6 @@ def light(default: float = 1.0) -> Any:
 def check(owner: Any, of: str = "") -> None:
     """Let all declared values of a frozen dataclass be what they may be. of : whose they are, as a sentence says it."""
     for each in fields(owner):
-        if found := each.metadata.get("check"):
+        if check := each.metadata.get("check"):
             name = f"{each.name} of {of}" if of else each.name
-            object.__setattr__(owner, each.name, found(name, getattr(owner, each.name)))
+            object.__setattr__(owner, each.name, check(name, getattr(owner, each.name)))

@@ -51,12 +51,12 @@ def test_a_baked_flight_over_the_pole_renders_the_live_picture_without_the_addon
 def test_keyframes_are_within_rounding_of_the_live_camera_and_never_flip(over_the_target, scene, mode, curves):
     over_the_target.rotation_mode = mode
     over_the_target.virtual_pinhole.pole = "HOLD"
-    (found,) = baking.bake([over_the_target], scene, 1, 21)
-    assert found.ok
+    (flight,) = baking.bake([over_the_target], scene, 1, 21)
+    assert flight.ok
     # 40 px from the axis at d = 40: the storage of a rotation, at most 4e-7 on both sides, shows as 4e-7 · 40 · 2.
-    assert found.at_keys < 1e-4, found.sentence()
+    assert flight.at_keys < 1e-4, flight.sentence()
     # 6° a frame about the look-at point, ten away: half-way a straight line is 10 (1 − cos 3°) off, 0.014 of a length of 10.
-    assert found.between < 0.05 * 40, found.sentence()
+    assert flight.between < 0.05 * 40, flight.sentence()
     name = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}.get(mode, "rotation_euler")
     for index in range(len(getattr(over_the_target, name))):
         steps = np.diff([point.co[1] for point in curves(over_the_target)[name, index].keyframe_points])
@@ -64,18 +64,18 @@ def test_keyframes_are_within_rounding_of_the_live_camera_and_never_flip(over_th
 
 
 def test_a_flip_that_up_asks_for_is_told_between_the_keyframes(over_the_target, scene):
-    (found,) = baking.bake([over_the_target], scene, 1, 21)
-    assert found.ok and found.between > 10 and found.frame in (10.5, 11.5), found.sentence()
+    (flight,) = baking.bake([over_the_target], scene, 1, 21)
+    assert flight.ok and flight.between > 10 and flight.frame in (10.5, 11.5), flight.sentence()
 
 
 def test_more_keys_a_frame_follow_the_flight_more_closely(over_the_target, scene, curves):
     over_the_target.virtual_pinhole.pole = "HOLD"
-    (one,) = baking.bake([over_the_target], scene, 1, 9)
+    (flight,) = baking.bake([over_the_target], scene, 1, 9)
     over_the_target.virtual_pinhole.enabled = True
     (four,) = baking.bake([over_the_target], scene, 1, 9, keys_per_frame=4)
     assert len(curves(over_the_target)["location", 0].keyframe_points) == 33
     # What a straight line is off goes with the square of its length; a corner of the keyed values goes with the length.
-    assert four.between < one.between / 3.5, f"{one.sentence()}; {four.sentence()}"
+    assert four.between < flight.between / 3.5, f"{flight.sentence()}; {four.sentence()}"
 
 
 @pytest.mark.parametrize("path", ["location", "rotation_euler", "lens"])
@@ -91,8 +91,8 @@ def test_the_report_notices_keyframes_that_are_wrong(over_the_target, scene, mon
         curve.update()
 
     monkeypatch.setattr(baking, "_write", spoil)
-    (found,) = baking.bake([over_the_target], scene, 1, 21)
-    assert not found.ok
+    (flight_baked,) = baking.bake([over_the_target], scene, 1, 21)
+    assert not flight_baked.ok
 
 
 def test_the_values_are_kept_and_turned_off_and_the_frame_is_restored(over_the_target, scene, curves):
@@ -138,8 +138,8 @@ def test_curves_of_these_channels_are_replaced_and_all_others_are_left_alone(ove
         [tuple(point.co) for point in curves(block)[path, 0].keyframe_points]
         for block, path in ((over_the_target, "scale"), (camera, "shift_x"))
     ]
-    (found,) = baking.bake([over_the_target], scene, 1, 21)
-    assert found.ok, found.sentence()
+    (flight,) = baking.bake([over_the_target], scene, 1, 21)
+    assert flight.ok, flight.sentence()
     assert [
         [tuple(point.co) for point in curves(block)[path, 0].keyframe_points]
         for block, path in ((over_the_target, "scale"), (camera, "shift_x"))
@@ -171,11 +171,11 @@ def test_a_sensor_that_must_grow_has_one_size_for_all_frames(posed_camera, scene
         point.interpolation = "LINEAR"
     scene.frame_set(5)
     assert posed_camera.data.sensor_width == 36
-    (found,) = baking.bake([posed_camera], scene, 1, 5)
-    assert found.ok and posed_camera.data.sensor_width == 4 * 36
+    (flight,) = baking.bake([posed_camera], scene, 1, 5)
+    assert flight.ok and posed_camera.data.sensor_width == 4 * 36
     assert ("sensor_width", 0) not in curves(posed_camera.data)
     # The lens goes along a straight line as d does: 960 px from the middle, three roundings of float32 on both sides.
-    assert found.between < 6 * 960 * 2.0**-24, found.sentence()
+    assert flight.between < 6 * 960 * 2.0**-24, flight.sentence()
     group.enabled = True
     scene.frame_set(5)
     assert posed_camera.data.sensor_width == 36  # live again, with the artist's own
@@ -186,15 +186,15 @@ def test_an_animated_sensor_is_followed(over_the_target, scene, curves):
     for frame, width in ((1, 36), (21, 18)):
         camera.sensor_width = width
         camera.keyframe_insert("sensor_width", frame=frame)
-    (found,) = baking.bake([over_the_target], scene, 1, 21)
-    assert found.ok, found.sentence()
+    (flight,) = baking.bake([over_the_target], scene, 1, 21)
+    assert flight.ok, flight.sentence()
     assert len(curves(camera)["sensor_width", 0].keyframe_points) == 21
 
 
 def test_time_that_is_stretched_is_followed(over_the_target, scene, curves):
     scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
-    (found,) = baking.bake([over_the_target], scene, 1, 42)
-    assert found.ok, found.sentence()
+    (flight,) = baking.bake([over_the_target], scene, 1, 42)
+    assert flight.ok, flight.sentence()
     assert curves(over_the_target)["location", 0].keyframe_points[-1].co[0] == 21
 
 
@@ -226,8 +226,8 @@ def test_a_range_that_runs_backwards_is_refused(over_the_target):
 
 
 def test_a_single_frame_is_baked(over_the_target, scene):
-    (found,) = baking.bake([over_the_target], scene, 4, 4)
-    assert found.ok and "between" not in found.sentence()
+    (flight,) = baking.bake([over_the_target], scene, 4, 4)
+    assert flight.ok and "between" not in flight.sentence()
 
 
 def test_turned_on_again_after_a_bake_one_warning_names_the_keyframes_and_its_button_brings_the_live_camera_back(

@@ -19,13 +19,13 @@ def test_an_animated_parent_and_a_constraint_that_carries_are_taken_into_account
             item.keyframe_insert("location", frame=frame)
             item.keyframe_insert("rotation_euler", frame=frame)
     over_the_target.parent = dolly
-    (found,) = baking.bake([over_the_target], scene, 1, 21)
-    assert found.ok, found.sentence()
+    (flight,) = baking.bake([over_the_target], scene, 1, 21)
+    assert flight.ok, flight.sentence()
     over_the_target.virtual_pinhole.enabled = True
     constraint = over_the_target.constraints.new("CHILD_OF")
     constraint.target = crane
-    (found,) = baking.bake([over_the_target], scene, 1, 21)
-    assert found.ok, found.sentence()
+    (flight,) = baking.bake([over_the_target], scene, 1, 21)
+    assert flight.ok, flight.sentence()
 
 
 def test_a_target_on_a_moving_object_is_followed_and_kept(over_the_target, scene):
@@ -40,8 +40,8 @@ def test_a_target_on_a_moving_object_is_followed_and_kept(over_the_target, scene
     over_the_target.virtual_pinhole.look_at_target = target
     scene.frame_set(13)
     live = cameras.read(over_the_target, scene)
-    (found,) = baking.bake([over_the_target], scene, 1, 21)
-    assert found.ok, found.sentence()
+    (flight,) = baking.bake([over_the_target], scene, 1, 21)
+    assert flight.ok, flight.sentence()
     assert over_the_target.virtual_pinhole.look_at_target == target
     np.testing.assert_allclose(cameras.read(over_the_target, scene).basis(), live.basis(), atol=1e-6)
     assert abs(live.project(tuple(target.matrix_world.translation))[0] - 32) < 1e-3  # in the middle of 64 px
@@ -50,8 +50,8 @@ def test_a_target_on_a_moving_object_is_followed_and_kept(over_the_target, scene
 def test_a_constraint_in_the_way_acts_on_keyframes_as_on_the_live_camera(over_the_target, scene):
     constraint = over_the_target.constraints.new("LIMIT_LOCATION")
     constraint.use_max_z, constraint.max_z = True, 8
-    (found,) = baking.bake([over_the_target], scene, 1, 21)
-    assert found.ok, found.sentence()
+    (flight,) = baking.bake([over_the_target], scene, 1, 21)
+    assert flight.ok, flight.sentence()
 
 
 def test_values_in_the_nla_are_baked_into_an_action_above_it(over_the_target, scene, curves):
@@ -62,8 +62,8 @@ def test_values_in_the_nla_are_baked_into_an_action_above_it(over_the_target, sc
         strip.action_slot = slot
     data.action = None
     scene.frame_set(1)
-    (found,) = baking.bake([over_the_target], scene, 1, 21)
-    assert found.ok, found.sentence()
+    (flight,) = baking.bake([over_the_target], scene, 1, 21)
+    assert flight.ok, flight.sentence()
     assert data.action != action and {path for path, _ in curves(over_the_target)} == {"location", "rotation_euler"}
 
 
@@ -124,8 +124,8 @@ def test_a_linked_camera_is_refused_and_a_library_override_is_baked_and_saved(ov
     with pytest.raises(InputError, match=r"'Camera' is linked from"):  # the data still is
         baking.bake([override], scene, 1, 21)
     override.data.override_create(remap_local_usages=True)
-    (found,) = baking.bake([override], scene, 1, 21)
-    assert found.ok, found.sentence()
+    (flight,) = baking.bake([override], scene, 1, 21)
+    assert flight.ok, flight.sentence()
     before = everything(override)
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     bpy.ops.wm.open_mainfile(filepath=str(file))

@@ -100,17 +100,17 @@ def crowd(scene, look, add, add_map, mesh_from):
 
 def assert_moved(plain, moved):
     """Assert that each object has as many instances, and each point stands where the plain export has it, less the origin."""
-    found, wanted = ([(each.name, len(each.matrices)) for each in scene.objects] for scene in (moved, plain))
-    assert found == wanted, "not the same objects with the same number of instances"
+    counts, wanted = ([(each.name, len(each.matrices)) for each in scene.objects] for scene in (moved, plain))
+    assert counts == wanted, "not the same objects with the same number of instances"
     for was, now in zip(plain.objects, moved.objects, strict=True):
         before, after = (scene.geometries[each.geometry] for scene, each in ((plain, was), (moved, now)))
         points, moved_points = (each.vertices if isinstance(each, Mesh) else each.centers for each in (before, after))
         for number, (stood, stands) in enumerate(zip(was.matrices, now.matrices, strict=True), start=1):
             wanted = points @ stood[:3, :3].T + (stood[:3, 3] - moved.origin)
-            found = moved_points @ stands[:3, :3].T + stands[:3, 3]
+            counts = moved_points @ stands[:3, :3].T + stands[:3, 3]
             # The translation and the vertex are rounded to float32 once each, and the vertex is multiplied by the matrix.
             size = np.abs(moved_points) @ np.abs(stands[:3, :3]).T + np.abs(stands[:3, 3])
-            off = np.abs(found - wanted)
+            off = np.abs(counts - wanted)
             error = off - 2.0**-23 * size - 1e-30
             assert error.max(initial=0) <= 0, f"instance {number} of {was.name} is {off.max():.3g} from where it should be"
 

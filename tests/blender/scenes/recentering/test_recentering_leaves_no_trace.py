@@ -54,11 +54,11 @@ def test_the_ledger_is_that_of_the_file(crowd, scene, add, mesh_from, check):
         jobs.export(Job(strict=True, recenter=True))
 
 
-def test_rendering_alone_recentres_too(look, tmp_path, add_map):
+def test_rendering_alone_recenters_too(look, tmp_path, add_map):
     look(UTM)
     add_map(UTM)
-    told = jobs.cycles(Job(recenter=True), tmp_path / "picture.exr")
-    assert [(entry.object, entry.status) for entry in told] == [("Map", "exported")]
+    entries = jobs.cycles(Job(recenter=True), tmp_path / "picture.exr")
+    assert [(entry.object, entry.status) for entry in entries] == [("Map", "exported")]
     assert (tmp_path / "picture.exr").stat().st_size > 1000
 
 
@@ -116,10 +116,10 @@ def test_an_object_that_did_not_follow_is_named(sabotage, look, add, mesh_from, 
     place = recentering._place
 
     def place_wrongly(overrides, temporary, placed):
-        shown = place(overrides, temporary, placed)
-        for block, each in shown.items():
+        copies = place(overrides, temporary, placed)
+        for block, each in copies.items():
             block.matrix_parent_inverse = recentering.Matrix(sabotage(each))
-        return shown
+        return copies
 
     monkeypatch.setattr(recentering, "_place", place_wrongly)
     with pytest.raises(InputError, match="object 'Cube' did not follow") as caught:
@@ -134,9 +134,9 @@ def test_a_vertex_that_did_not_follow_and_an_object_that_is_gone_are_named(look,
 
     def spoil(change):
         def place_wrongly(overrides, temporary, placed):
-            shown = place(overrides, temporary, placed)
-            change(next(iter(shown)))
-            return shown
+            copies = place(overrides, temporary, placed)
+            change(next(iter(copies)))
+            return copies
 
         monkeypatch.setattr(recentering, "_place", place_wrongly)
 

@@ -31,8 +31,8 @@ def test_a_crowded_scene_anywhere_in_the_world_is_compared_to_a_thousandth_of_a_
     sides = check()
     assert sides.exported.origin == tuple(np.add(place, (6.2, -7.3, 4.123456789)))
     assert sides.exported.camera.eye == (0, 0, 0) and sides.exported.stated_camera.eye == (0, 0, 0)
-    shown = set(np.unique(sides.cycles["Object Index"]))
-    assert len(shown) >= 7, f"only the objects {shown} are in the picture"
+    present = set(np.unique(sides.cycles["Object Index"]))
+    assert len(present) >= 7, f"only the objects {present} are in the picture"
 
 
 @pytest.mark.parametrize("place", [UTM, ECEF], ids=["UTM", "ECEF"])
@@ -50,7 +50,7 @@ def depth_of(comparison):
     return next(row for row in comparison.rows if row.name == "Depth").values[0]
 
 
-def test_a_map_that_was_pulled_home_is_within_the_tolerance_and_exact_when_recentred(look, both_sides, check, add_map):
+def test_a_map_that_was_pulled_home_is_within_the_tolerance_and_exact_when_recentered(look, both_sides, check, add_map):
     """Its vertices are far from its origin, and its origin as far from the world's: Cycles adds the two in float32.
 
     Each of its rays meets the rounded surface where it should, and so only Depth tells.
@@ -154,7 +154,7 @@ def test_particles_follow(look, add, mesh_from, scene, check):
 
 
 @pytest.mark.parametrize(
-    "change, told",
+    "change, sentence",
     [
         (lambda matrices: matrices[:, :, [1, 0, 2, 3]], "instance 1 of Map is"),
         (lambda matrices: matrices[::-1], "instance 1 of Map is"),
@@ -162,7 +162,7 @@ def test_particles_follow(look, add, mesh_from, scene, check):
     ],
     ids=["turned", "in another order", "one fewer"],
 )
-def test_instances_that_are_not_where_the_file_has_them_are_caught(change, told, look, add, map_mesh, check_moved):
+def test_instances_that_are_not_where_the_file_has_them_are_caught(change, sentence, look, add, map_mesh, check_moved):
     look(UTM)
     many = bpy.data.collections.new("Many")
     add(map_mesh("Map", (0, 0, 0)), "Map", collection=many)
@@ -172,7 +172,7 @@ def test_instances_that_are_not_where_the_file_has_them_are_caught(change, told,
     plain, moved = (jobs.export(Job(recenter=recenter)) for recenter in (False, True))
     check_moved(plain, moved)
     (maps,) = moved.objects
-    with pytest.raises(AssertionError, match=told):
+    with pytest.raises(AssertionError, match=sentence):
         check_moved(plain, replace(moved, objects=(replace(maps, matrix=change(maps.matrices)),)))
 
 
@@ -269,15 +269,15 @@ def test_the_command_as_its_users_type_it(look, scene, tmp_path, capfd, add_map)
     words = ["check", str(path), "--threads", "2", "--json", str(result)]
     main(words)
     plain = json.loads(result.read_text())
-    told = capfd.readouterr().out
-    assert plain["far_from_origin"]["error"] > 0.5 and plain["far_from_origin"]["sentence"] in told
+    output = capfd.readouterr().out
+    assert plain["far_from_origin"]["error"] > 0.5 and plain["far_from_origin"]["sentence"] in output
     assert main([*words, "--recenter"]) == 0
-    recentred = json.loads(result.read_text())
-    assert recentred["far_from_origin"] is None and recentred["origin"] == np.add(ECEF, (6.2, -7.3, 4.123456789)).tolist()
-    assert recentred["passes"][0]["percentiles"]["p99"]["value"] < 1e-3
+    recentered = json.loads(result.read_text())
+    assert recentered["far_from_origin"] is None and recentered["origin"] == np.add(ECEF, (6.2, -7.3, 4.123456789)).tolist()
+    assert recentered["passes"][0]["percentiles"]["p99"]["value"] < 1e-3
     scene_path = tmp_path / "scene.json"
     assert main(["export", str(path), str(scene_path), "--recenter"]) == 0
-    assert list(scene_file.read(scene_path).origin) == recentred["origin"]
+    assert list(scene_file.read(scene_path).origin) == recentered["origin"]
     assert main(["cycles", str(path), str(tmp_path / "picture.exr"), "--recenter"]) == 0
 
 
@@ -291,12 +291,12 @@ def test_materials_that_ask_where_they_are_are_the_same_on_both_sides_and_told(
     cubes = [add(mesh_from("cube"), name, (1000.0 + 3 * i, 2000.0, 30.0)) for i, name in enumerate(("Left", "Right"))]
     material = make_material("Asks", "ShaderNodeBsdfDiffuse")
     tree = material.node_tree
-    told = tree.nodes.new("ShaderNodeObjectInfo").outputs[output]
+    socket = tree.nodes.new("ShaderNodeObjectInfo").outputs[output]
     scaled = tree.nodes.new("ShaderNodeVectorMath")
     scaled.operation, scaled.inputs[1].default_value = "MULTIPLY", (1e-2,) * 3 if output == "Location" else (1.0,) * 3
     absolute = tree.nodes.new("ShaderNodeVectorMath")
     absolute.operation = "ABSOLUTE"
-    tree.links.new(told, scaled.inputs[0])
+    tree.links.new(socket, scaled.inputs[0])
     tree.links.new(scaled.outputs[0], absolute.inputs[0])
     tree.links.new(absolute.outputs[0], tree.nodes["Shader"].inputs["Color"])
     for number, cube in enumerate(cubes):
@@ -304,7 +304,7 @@ def test_materials_that_ask_where_they_are_are_the_same_on_both_sides_and_told(
         cube.pass_index = number
     add_lamp("SUN", rotation=(0.3, 0.4, 0), angle=0.0)
     exported = jobs.both_sides(Job(level="direct", samples=1, recenter=True, threads=2), [tmp_path / "0.exr"])
-    (theirs,) = (passes["Diffuse Color"] for passes in read_passes([tmp_path / "0.exr"]))
-    ours = render(exported, "direct", 1, threads=2)["Diffuse Color"]
-    assert np.percentile(np.abs(ours - theirs), 99.5) <= 1e-6 and theirs.max() > 0.01
+    (cycles_passes,) = (passes["Diffuse Color"] for passes in read_passes([tmp_path / "0.exr"]))
+    traced = render(exported, "direct", 1, threads=2)["Diffuse Color"]
+    assert np.percentile(np.abs(traced - cycles_passes), 99.5) <= 1e-6 and cycles_passes.max() > 0.01
     assert {entry.status for entry in exported.ledger if entry.object in ("Left", "Right")} == {status}

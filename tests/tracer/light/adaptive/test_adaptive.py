@@ -6,7 +6,7 @@ import pytest
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Area, Spot
-from viewcam_addon.tracer.scene.materials import Colour, Material
+from viewcam_addon.tracer.scene.materials import Colour, sum_of
 
 pytestmark = pytest.mark.slow
 
@@ -18,9 +18,9 @@ def mirrored(make_lit, floor, make_spheres, soft):
     matrix = np.eye(4)
     matrix[:3, 3] = (0.5, 0, 3)
     things = (
-        (floor(), Material(diffuse=Colour((0.6, 0.7, 0.8)))),
-        (make_spheres([(-1, 0, 0.8)], 0.8), Material(mirror=Colour((0.9,) * 3))),
-        (make_spheres([(1, 0.5, 0.6)], 0.6), Material(diffuse=Colour((0.8, 0.3, 0.2)))),
+        (floor(), sum_of(diffuse=Colour((0.6, 0.7, 0.8)))),
+        (make_spheres([(-1, 0, 0.8)], 0.8), sum_of(mirror=Colour((0.9,) * 3))),
+        (make_spheres([(1, 0.5, 0.6)], 0.6), sum_of(diffuse=Colour((0.8, 0.3, 0.2)))),
     )
     lamp = Area("area", matrix=matrix, size=(0.5, 0.5), power=(100,) * 3)
     return make_lit(camera, *things, lamps=(lamp,), bounces=Bounces(2, 2, 2, 2))
@@ -76,8 +76,8 @@ def test_the_error_that_is_wanted_is_met_in_the_mean(soft, error):
     passes = render(scene, "direct", 1024, 1, error=error)
     off = np.sqrt(((passes["Combined"][..., :3] - truth) ** 2).mean())
     assert off <= error, f"{off:.4f}"
-    told = np.sqrt(passes["Variance"].astype(float).mean())
-    assert off / 3 <= told <= 3 * off, f"{told:.4f} told, {off:.4f} true"
+    stated = np.sqrt(passes["Variance"].astype(float).mean())
+    assert off / 3 <= stated <= 3 * off, f"{stated:.4f} told, {off:.4f} true"
 
 
 def test_samples_go_where_noise_is_and_are_no_more_than_allowed(soft):
@@ -107,7 +107,7 @@ def test_without_noise_all_pixels_have_the_fewest_samples(make_lit, floor):
 
 WANTED = 0.02
 MOST = 12 * WANTED
-WHITE = Material(diffuse=Colour((0.9,) * 3))
+WHITE = sum_of(diffuse=Colour((0.9,) * 3))
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def with_things(make_lit, floor, sunny):
 
     def build(geometry, material=WHITE, **light):
         light = {"lamps": scene.lamps, **light}
-        return make_lit(scene.camera, (floor(), Material(diffuse=Colour((0.05,) * 3))), (geometry, material), **light)
+        return make_lit(scene.camera, (floor(), sum_of(diffuse=Colour((0.05,) * 3))), (geometry, material), **light)
 
     return build
 
@@ -187,7 +187,7 @@ def assert_no_light_is_lost(scene, seeds=48):
 def test_a_small_bright_window_that_few_samples_see(with_things, make_mesh):
     """It covers a hundredth of one pixel, and is forty times as bright as white."""
     window = make_mesh([(0.5, 0, 0.8), (0.508, 0, 0.8), (0.508, 0, 0.808), (0.5, 0, 0.808)], [(0, 1, 2), (0, 2, 3)])
-    assert_no_light_is_lost(with_things(window, Material(emission=Colour((40,) * 3))))
+    assert_no_light_is_lost(with_things(window, sum_of(emission=Colour((40,) * 3))))
 
 
 def test_a_spot_whose_light_falls_within_a_pixel(with_things, make_spheres):

@@ -43,6 +43,13 @@ struct FilmSettings {
     double exposure = 1;
 };
 
+// Where the passes' values go, of a whole picture, its rows from the bottom; nullptr is not wanted, but Combined always is.
+struct LightPasses {
+    enum Pass { COMBINED, EMISSION, ENVIRONMENT, DIFFUSE_DIRECT, DIFFUSE_INDIRECT, DIFFUSE_COLOR, VARIANCE, SAMPLE_COUNT };  // as image.py lists them
+
+    float* const* plane;
+};
+
 // The sums over the samples of one pixel.
 class Pixel {
    public:
@@ -70,25 +77,27 @@ class Pixel {
     }
 
     // random: whether another seed would give another picture; if so, the variance of a single batch is infinite.
-    void write(const ViewcamLightPasses& passes, size_t pixel, const FilmSettings& film, uint32_t batch_size, bool random) const {
+    void write(const LightPasses& passes, size_t pixel, const FilmSettings& film, uint32_t batch_size, bool random) const {
         Vec3 unknown;
         if (random) unknown.x = unknown.y = unknown.z = std::numeric_limits<double>::infinity();
         write(passes, pixel, film, count_ >= 2 * batch_size ? variance(film, batch_size) : unknown);
     }
-    void write(const ViewcamLightPasses& passes, size_t pixel, const FilmSettings& film, Vec3 variance) const {
+    void write(const LightPasses& passes, size_t pixel, const FilmSettings& film, Vec3 variance) const {
         Vec3 color = rgb(totals_[COLOR]) / count_;
-        store(passes.combined + 4 * pixel, combined(film));
-        passes.combined[4 * pixel + 3] = film.transparent ? float(covered_ / count_) : 1.0f;
-        auto show = [&](float* pass, Vec3 value) {
-            if (pass) store(pass + 3 * pixel, value);
+        float* shown = passes.plane[LightPasses::COMBINED] + 4 * pixel;
+        store(shown, combined(film));
+        shown[3] = film.transparent ? float(covered_ / count_) : 1.0f;
+        auto show = [&](LightPasses::Pass pass, Vec3 value) {
+            if (float* to = passes.plane[pass]) store(to + 3 * pixel, value);
         };
-        show(passes.diffuse_color, color);
-        show(passes.emission, mean(EMISSION, film));
-        show(passes.environment, mean(ENVIRONMENT, film));
-        show(passes.diffuse_direct, without_color(mean(DIRECT, film), color));
-        show(passes.diffuse_indirect, without_color(mean(INDIRECT, film), color));
-        for (int channel = 0; passes.variance && channel < 3; channel++) passes.variance[3 * pixel + channel] = float(variance[channel]);
-        if (passes.sample_count) passes.sample_count[pixel] = float(count_);
+        show(LightPasses::DIFFUSE_COLOR, color);
+        show(LightPasses::EMISSION, mean(EMISSION, film));
+        show(LightPasses::ENVIRONMENT, mean(ENVIRONMENT, film));
+        show(LightPasses::DIFFUSE_DIRECT, without_color(mean(DIRECT, film), color));
+        show(LightPasses::DIFFUSE_INDIRECT, without_color(mean(INDIRECT, film), color));
+        float* variances = passes.plane[LightPasses::VARIANCE];
+        for (int channel = 0; variances && channel < 3; channel++) variances[3 * pixel + channel] = float(variance[channel]);
+        if (float* counts = passes.plane[LightPasses::SAMPLE_COUNT]) counts[pixel] = float(count_);
     }
 
    private:

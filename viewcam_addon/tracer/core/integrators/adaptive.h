@@ -46,7 +46,7 @@ class TileSampler {
     uint32_t samples() const { return samples_; }
     // Traces the tile whose lowest row and first column are given, until its pixels have so many samples: all of them, or fewer,
     // to which a later call adds. `*stop`, if there is one, ends it early, and then the tile can't be gone on with.
-    void trace(uint32_t row, uint32_t column, uint32_t samples, const ViewcamLightPasses& passes, const volatile int* stop) {
+    void trace(uint32_t row, uint32_t column, uint32_t samples, const LightPasses& passes, const volatile int* stop) {
         std::vector<Pixel>& kept = under_way_[size_t(row / TILE) * tiles(camera_.width) + column / TILE];
         Tile tile{row, column, std::min(TILE, camera_.height - row), std::min(TILE, camera_.width - column), std::exchange(kept, {})};
         tile.pixels.resize(TILE * TILE);
@@ -139,7 +139,7 @@ class TileSampler {
         }
     }
 
-    void trace_until_known(Tile& tile, const ViewcamLightPasses& passes, const volatile int* stop) const {
+    void trace_until_known(Tile& tile, const LightPasses& passes, const volatile int* stop) const {
         std::vector<Spread> spreads(TILE * TILE);
         std::vector<double> efficiencies;
         std::vector<uint16_t> active = all(tile), going;

@@ -8,11 +8,13 @@ namespace viewcam::VIEWCAM_ISA {
 
 // Where the passes' values go: channel c of the pass p and the pixel i to plane[p][c · stride + i]; nullptr is not wanted.
 struct GeometryPasses {
+    enum Pass { DEPTH, POSITION, NORMAL, UV, OBJECT_INDEX, MATERIAL_INDEX, MAGNITUDE, FACING, COUNT };  // as image.py lists them
+
     float* const* plane;
     size_t stride;
 
     // The pass of some pixels, value_of(i) → a number or a Vec3 each.
-    template <class ValueOf> void write(ViewcamPass pass, const size_t* pixels, int count, const ValueOf& value_of) const {
+    template <class ValueOf> void write(Pass pass, const size_t* pixels, int count, const ValueOf& value_of) const {
         float* to = plane[pass];
         for (int i = 0; to && i < count; i++) {
             if constexpr (std::is_same_v<decltype(value_of(0)), Vec3>) {
@@ -24,7 +26,7 @@ struct GeometryPasses {
         }
     }
     bool any() const {
-        return std::any_of(plane, plane + VIEWCAM_PASSES, [](const float* each) { return each; });
+        return std::any_of(plane, plane + COUNT, [](const float* each) { return each; });
     }
 };
 
@@ -38,6 +40,7 @@ struct GeometryHits {
 // the planes.
 template <class RayOf, class HitOf>
 inline void write_geometry(const Scene& scene, const RayOf& ray_of, const HitOf& hit_of, int count, const GeometryPasses& passes, const size_t* pixels) {
+    using enum GeometryPasses::Pass;
     static constexpr double BACKGROUND_DEPTH = 1e10;
     Ray rays[PACKET];
     const Ray* met_by[PACKET];
@@ -52,21 +55,21 @@ inline void write_geometry(const Scene& scene, const RayOf& ray_of, const HitOf&
         else
             beside[none++] = pixels[i];
     }
-    passes.write(VIEWCAM_DEPTH, beside, none, [](int) { return BACKGROUND_DEPTH; });
-    for (ViewcamPass pass : {VIEWCAM_POSITION, VIEWCAM_NORMAL, VIEWCAM_UV}) passes.write(pass, beside, none, [](int) { return Vec3{}; });
-    for (ViewcamPass pass : {VIEWCAM_OBJECT_INDEX, VIEWCAM_MATERIAL_INDEX, VIEWCAM_MAGNITUDE, VIEWCAM_FACING})
+    passes.write(DEPTH, beside, none, [](int) { return BACKGROUND_DEPTH; });
+    for (GeometryPasses::Pass pass : {POSITION, NORMAL, UV}) passes.write(pass, beside, none, [](int) { return Vec3{}; });
+    for (GeometryPasses::Pass pass : {OBJECT_INDEX, MATERIAL_INDEX, MAGNITUDE, FACING})
         passes.write(pass, beside, none, [](int) { return 0.0; });
     if (!some) return;
 
-    scene.interactions(met_by, met, some, found, passes.plane[VIEWCAM_MAGNITUDE] ? magnitudes : nullptr);
-    passes.write(VIEWCAM_DEPTH, at, some, [&](int i) { return found[i].t; });
-    passes.write(VIEWCAM_POSITION, at, some, [&](int i) { return met_by[i]->direction * found[i].t + (scene.origin + met_by[i]->origin); });
-    passes.write(VIEWCAM_NORMAL, at, some, [&](int i) { return found[i].shading; });
-    passes.write(VIEWCAM_UV, at, some, [&](int i) { return Vec3{found[i].uv.x, found[i].uv.y, found[i].has_uv ? 1.0 : 0.0}; });
-    passes.write(VIEWCAM_OBJECT_INDEX, at, some, [&](int i) { return scene.objects[found[i].object].index; });
-    passes.write(VIEWCAM_MATERIAL_INDEX, at, some, [&](int i) { return scene.slots[found[i].slot].index; });
-    passes.write(VIEWCAM_FACING, at, some, [&](int i) { return max(0.0, min(found[i].cosine, 1.0)); });
-    passes.write(VIEWCAM_MAGNITUDE, at, some, [&](int i) { return max(max_component(abs(scene.origin + met_by[i]->origin)), magnitudes[i]); });
+    scene.interactions(met_by, met, some, found, passes.plane[MAGNITUDE] ? magnitudes : nullptr);
+    passes.write(DEPTH, at, some, [&](int i) { return found[i].t; });
+    passes.write(POSITION, at, some, [&](int i) { return met_by[i]->direction * found[i].t + (scene.origin + met_by[i]->origin); });
+    passes.write(NORMAL, at, some, [&](int i) { return found[i].shading; });
+    passes.write(UV, at, some, [&](int i) { return Vec3{found[i].uv.x, found[i].uv.y, found[i].has_uv ? 1.0 : 0.0}; });
+    passes.write(OBJECT_INDEX, at, some, [&](int i) { return scene.objects[found[i].object].index; });
+    passes.write(MATERIAL_INDEX, at, some, [&](int i) { return scene.slots[found[i].slot].index; });
+    passes.write(FACING, at, some, [&](int i) { return max(0.0, min(found[i].cosine, 1.0)); });
+    passes.write(MAGNITUDE, at, some, [&](int i) { return max(max_component(abs(scene.origin + met_by[i]->origin)), magnitudes[i]); });
 }
 
 // How much the UV and the normal of what the eye's ray through a place in the picture meets change with each pixel: of its own plane,

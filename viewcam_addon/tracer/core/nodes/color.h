@@ -242,4 +242,7 @@ struct LuminanceNode {
     Vec3 eval(const ShadingPoint& at) const { return grey(luminance(at.value(color))); }
 };
 
+using ColorNodes = std::variant<SeparateColorNode, CombineColorNode, MixColorNode, MixNumberNode, MixVectorNode,
+                                MixComponentsNode, GammaNode, BrightContrastNode, HueSaturationNode, InvertNode, LuminanceNode>;
+
 }  // namespace viewcam::VIEWCAM_ISA

@@ -10,7 +10,9 @@ struct Curves {
     bool extrapolate;
 
     explicit Curves(const Inputs& in)
-        : factor(in["factor"]), table(in["table"]), least(in["least"]), most(in["most"]), extrapolate(in.flag("extrapolate")) {}
+        : factor(in["factor"]), table(in["table"]), least(in["least"]), most(in["most"]), extrapolate(in.flag("extrapolate")) {
+        if (table.image == NONE) throw std::invalid_argument("curves have no table");
+    }
 
    protected:
     // Each component by the channel of its own.
@@ -53,5 +55,7 @@ struct FloatCurveNode : Curves {
     explicit FloatCurveNode(const Inputs& in) : Curves(in), given(in["value"]) {}
     Vec3 eval(const ShadingPoint& at) const { return changed(at, grey(at.number(given))); }
 };
+
+using CurveNodes = std::variant<RGBCurvesNode, VectorCurvesNode, FloatCurveNode>;
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -282,4 +282,7 @@ struct LayerWeightNode {
     }
 };
 
+using GeometryNodes = std::variant<TextureCoordinateNode, AttributeNode, MappingNode, VectorRotateNode, VectorTransformNode,
+                                   GeometryNode, TangentNode, WireframeNode, ObjectInfoNode, FresnelNode, LayerWeightNode>;
+
 }  // namespace viewcam::VIEWCAM_ISA

@@ -101,4 +101,6 @@ struct EnvironmentImageNode {
     }
 };
 
+using ImageNodes = std::variant<ImageNode, EnvironmentImageNode>;
+
 }  // namespace viewcam::VIEWCAM_ISA

@@ -249,4 +249,6 @@ struct CombineXYZNode : CombineNode {
     using CombineNode::CombineNode;
 };
 
+using MathNodes = std::variant<MathNode, VectorMathNode, MapRangeNode, MapRangeVectorNode, ClampNode, SeparateNode, CombineXYZNode>;
+
 }  // namespace viewcam::VIEWCAM_ISA

@@ -219,4 +219,6 @@ struct BrickNode {
     }
 };
 
+using ProceduralNodes = std::variant<NoiseNode, WhiteNoiseNode, CheckerNode, GradientNode, WaveNode, MagicNode, BrickNode>;
+
 }  // namespace viewcam::VIEWCAM_ISA

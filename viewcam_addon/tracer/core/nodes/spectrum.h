@@ -86,4 +86,6 @@ struct WavelengthNode {
     };
 };
 
+using SpectrumNodes = std::variant<BlackbodyNode, WavelengthNode>;
+
 }  // namespace viewcam::VIEWCAM_ISA

@@ -28,14 +28,16 @@ struct ConstantNode {
     Vec3 eval(const ShadingPoint&) const { return is; }
 };
 
-// One line a node. Each has a NAME, by which a scene asks for it, what it GIVES, by which it becomes a number, and `eval`; VARIES
-// or `varies` where it depends on more than its inputs; `gives` where the node itself knows what it gives.
-using ValueNode = std::variant<ConstantNode, ImageNode, EnvironmentImageNode, TextureCoordinateNode, AttributeNode, MappingNode, VectorRotateNode, VectorTransformNode, GeometryNode, NormalMapNode, BumpNode,
-                               TangentNode, WireframeNode, ObjectInfoNode, LightPathNode, FresnelNode, LayerWeightNode, MathNode, VectorMathNode, MapRangeNode, MapRangeVectorNode, ClampNode,
-                               SeparateNode, CombineXYZNode, SeparateColorNode, CombineColorNode, MixColorNode, MixNumberNode, MixVectorNode, MixComponentsNode,
-                               RGBCurvesNode, VectorCurvesNode, FloatCurveNode, BlackbodyNode, WavelengthNode, GammaNode,
-                               BrightContrastNode, HueSaturationNode, InvertNode, LuminanceNode, NoiseNode, WhiteNoiseNode, CheckerNode,
-                               GradientNode, WaveNode, MagicNode, BrickNode, VoronoiNode, IESNode>;
+// One variant of the nodes of several.
+template <class First, class... Others> struct Joined { using Variant = First; };
+template <class... First, class... Second, class... Others>
+struct Joined<std::variant<First...>, std::variant<Second...>, Others...> : Joined<std::variant<First..., Second...>, Others...> {};
+
+// Each file of several nodes lists them at its end, those of one stand here. A node has a NAME, by which a scene asks for it, what it
+// GIVES, by which it becomes a number, and `eval`; VARIES or `varies` where it depends on more than its inputs; `gives` where the node
+// itself knows what it gives.
+using ValueNode = Joined<std::variant<ConstantNode, BumpNode, IESNode, LightPathNode, NormalMapNode, VoronoiNode>, ImageNodes, GeometryNodes,
+                         MathNodes, ColorNodes, CurveNodes, SpectrumNodes, ProceduralNodes>::Variant;
 template <class Kind>
 concept IsValueNode = requires(const Kind& node, const ShadingPoint& at) {
     { Kind::NAME } -> std::convertible_to<std::string_view>;

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ..jobs import plan, render_server
 from . import Result, blender_room, check
-from .carry_out import carry_out
+from ._carry_out import carry_out
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:

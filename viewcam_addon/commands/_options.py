@@ -71,7 +71,7 @@ def add_light(added: argparse.ArgumentParser, samples: argparse._ActionsContaine
         "--level",
         choices=[*LEVELS, "auto"],
         default="geometry",
-        help="how much is modelled; auto is the least that shows the scene's light (default: %(default)s)",
+        help="how much is modeled; auto is the least that shows the scene's light (default: %(default)s)",
     )
     words = f"samples a pixel, for light (default: {SAMPLES})"
     (samples or added).add_argument("--samples", type=types.positive, metavar="N", help=words)
