@@ -10,7 +10,7 @@ SCRIPT = Path(__file__).with_name("tour_in_a_window.py")
 # A virtual screen on a busy machine may lose a click: one loss is no finding, two at different times are.
 ATTEMPTS = 2
 MOVING_SCRIPT = Path(__file__).with_name("moving_picture.py")
-PHOTO, PHOTO_SCRIPT = (Path(__file__).with_name(name) for name in ("photo_of_a_room.py", "photo_picture.py"))
+PHOTO, PICTURES_SCRIPT = (Path(__file__).with_name(name) for name in ("photo_of_a_room.py", "pictures_in_a_window.py"))
 
 
 def run_in_a_window(real_blender, script, height, *folder):
@@ -40,7 +40,7 @@ def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_b
     if folder:
         images = ROOT / folder[0] / ".."
         make_the_moving_picture(real_blender, tmp_path, images / "moving.webp")
-        take_the_picture_of_a_photo(real_blender, tmp_path / "photo.png", images / "photo-match.png")
+        take_the_other_pictures(real_blender, tmp_path / "photo.png", images)
 
 
 def make_the_moving_picture(real_blender, frames, target):
@@ -53,8 +53,8 @@ def make_the_moving_picture(real_blender, frames, target):
     first.save(target, save_all=True, append_images=rest, duration=90, loop=0, quality=48)
 
 
-def take_the_picture_of_a_photo(real_blender, photo, target):
-    """Match Photo's, in docs/artists.md."""
+def take_the_other_pictures(real_blender, photo, images):
+    """The pictures of docs/artists.md that no step of the tour takes."""
     subprocess.run([sys.executable, PHOTO, photo], check=True)
-    outcome = run_in_a_window(real_blender, PHOTO_SCRIPT, 1000, target, photo)
+    outcome = run_in_a_window(real_blender, PICTURES_SCRIPT, 1000, images, photo)
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 from panel_in_a_window import press, region, window
-from tour_hands import SIDEBAR, VIEWPORT, call, push, unfold
+from tour_hands import SIDEBAR, call, push, unfold
 from tour_step import Step, camera, is_at_its_values, room, values
 
 FILE = Path(tempfile.gettempdir(), f"shots_{os.getpid()}", "monkey.json")
@@ -146,8 +146,6 @@ class Preset(Step):
 class Preferences(Step):
     """Another axis is up by default, and Level knows it."""
 
-    picture = "preferences.png"
-    shows = (0.13, 0.783, 1.0, 0.865)  # without the folder that it is installed in
     edits, needs_a_window = 0, True
 
     def prepare(self):
@@ -161,22 +159,6 @@ class Preferences(Step):
 
     def check(self):
         assert room("preferences").up_axis() == (0, 1, 0)
-
-    def pose_for_the_picture(self):
-        view, _ = region(*VIEWPORT)
-        view.type = "PREFERENCES"
-        bpy.context.preferences.active_section = "ADDONS"
-        bpy.context.window_manager.addon_search = "Virtual Pinhole"
-        with bpy.context.temp_override(window=window(), area=view):
-            bpy.ops.preferences.addon_expand(module=room("preferences").PACKAGE)
-        for _ in range(6):
-            yield
-
-    def after_the_picture(self):
-        area, _ = region("PREFERENCES", "WINDOW")
-        area.type = "VIEW_3D"
-        yield
-        yield
 
     def tidy(self):
         self.mine.default_up = "Z"

@@ -1,11 +1,12 @@
-"""Runs inside a real Blender with a window: photographs Match Photo over the like of a photograph, for docs/artists.md.
+"""Runs inside a real Blender with a window: takes the pictures of docs/artists.md that no step of the tour (tour.py) takes.
 
-blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python photo_picture.py -- PICTURE PHOTO
+blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python pictures_in_a_window.py -- FOLDER PHOTO
 
-PICTURE : the file to write. PHOTO : that of photo_of_a_room.py. test_tour.py runs this.
+FOLDER : docs/images. PHOTO : that of photo_of_a_room.py. test_tour.py runs this.
 Leaves with status 0, or 5 and a traceback.
 """
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from panel_in_a_window import NOWHERE, move, press, region, start, window
 from tour_hands import VIEWPORT, call, hide_the_sidebar, photograph, settle
 from tour_step import room
 
-PICTURE, PHOTO = sys.argv[sys.argv.index("--") + 1 :]
+FOLDER, PHOTO = map(Path, sys.argv[sys.argv.index("--") + 1 :])
 # (axis, start, end) of edges of the room, world space.
 EDGES = (
     ("X", (-0.1, 0.8, 0.78), (1.3, 0.8, 0.78)),
@@ -31,16 +32,14 @@ EDGES = (
 )
 
 
-def steps():
+def photo_match():
     """Edges of the room, dragged over its picture, by a camera that looks elsewhere."""
-    yield
-    bpy.context.preferences.system.viewport_aa = "OFF"  # drawn in software
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     yield
     scene, camera = bpy.context.scene, bpy.data.objects["Camera"]
     for name in ("Cube", "Light"):
         bpy.data.objects.remove(bpy.data.objects[name])
-    photo = bpy.data.images.load(PHOTO)
+    photo = bpy.data.images.load(str(PHOTO))
     scene.render.resolution_x, scene.render.resolution_y = photo.size
     values = camera.virtual_pinhole
     values.enabled = True
@@ -77,10 +76,35 @@ def steps():
     yield from settle()
     assert matching._drawn.result, matching._drawn.sentence
     _, part = region(*VIEWPORT)
-    photograph((part.x, part.y, part.width, part.height), PICTURE, 60, (x1, y1))
+    photograph((part.x, part.y, part.width, part.height), FOLDER / "photo-match.png", 60, (x1, y1))
     press("ESC", *NOWHERE)
     yield from settle()
-    print("done: the photo", flush=True)
+
+
+def preferences():
+    """The add-on's own, without the folder that it is installed in."""
+    package = room("preferences").PACKAGE
+    bpy.ops.preferences.addon_enable(module=package)  # Blender lists what was enabled there, not from the command line
+    view, _ = region(*VIEWPORT)
+    view.type = "PREFERENCES"
+    bpy.context.preferences.active_section = "ADDONS"
+    bpy.context.window_manager.addon_search = "Virtual Pinhole"
+    with bpy.context.temp_override(window=window(), area=view):
+        bpy.ops.preferences.addon_expand(module=package)
+    yield from settle()
+    picture = FOLDER / "artists" / "preferences.png"
+    height = 0.46 * view.height  # below it is nothing
+    photograph((view.x, view.y + view.height - height, view.width, height), picture, 60)
+    over_the_folder = ("-fill", "rgb(40,39,38)", "-draw", "rectangle 110,127 775,141")
+    subprocess.run(["convert", picture, *over_the_folder, picture], check=True)
+
+
+def steps():
+    yield
+    bpy.context.preferences.system.viewport_aa = "OFF"  # drawn in software
+    yield from photo_match()
+    yield from preferences()
+    print("done: the pictures", flush=True)
 
 
 start(steps, interval=0.01)
