@@ -8,6 +8,7 @@ Leaves with status 0, or 5 and a traceback.
 
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import bpy
@@ -20,6 +21,8 @@ from tour_hands import VIEWPORT, call, hide_the_sidebar, photograph, settle
 from tour_step import room
 
 FOLDER, PHOTO = map(Path, sys.argv[sys.argv.index("--") + 1 :])
+STUDIO = Path(__file__).resolve().parent.parent.parent / "sample_scenes" / "studio.blend"
+LISTED = 222  # pixels of the file browser's list
 # (axis, start, end) of edges of the room, world space.
 EDGES = (
     ("X", (-0.1, 0.8, 0.78), (1.3, 0.8, 0.78)),
@@ -81,6 +84,29 @@ def photo_match():
     yield from settle()
 
 
+def export():
+    """The file browser with its options, without the empty middle of its list."""
+    bpy.ops.wm.open_mainfile(filepath=str(STUDIO), load_ui=False)
+    yield
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch, "shots")
+        folder.mkdir()
+        call(bpy.ops.viewcam.export_scene, filepath=str(folder / STUDIO.with_suffix(".json").name))
+        yield from settle()
+        area, files = region("FILE_BROWSER", "WINDOW")
+        _, name = region("FILE_BROWSER", "EXECUTE")
+        right, top = area.x + area.width, files.y + files.height
+        parts = [(files.x, top - LISTED, right - files.x, LISTED), (name.x, name.y, right - name.x, name.height)]
+        pictures = [Path(scratch, f"{number}.png") for number in range(2)]
+        for where, picture in zip(parts, pictures, strict=True):
+            photograph(where, picture, 60)
+        subprocess.run(["convert", *pictures, "-append", FOLDER / "artists" / "export.png"], check=True)
+        with bpy.context.temp_override(window=window(), area=area, region=files):
+            bpy.ops.file.cancel()
+        yield from settle()
+
+
 def preferences():
     """The add-on's own, without the folder that it is installed in."""
     package = room("preferences").PACKAGE
@@ -97,6 +123,8 @@ def preferences():
     photograph((view.x, view.y + view.height - height, view.width, height), picture, 60)
     over_the_folder = ("-fill", "rgb(40,39,38)", "-draw", "rectangle 110,127 775,141")
     subprocess.run(["convert", picture, *over_the_folder, picture], check=True)
+    view.type = "VIEW_3D"
+    yield from settle()
 
 
 def steps():
@@ -104,6 +132,7 @@ def steps():
     bpy.context.preferences.system.viewport_aa = "OFF"  # drawn in software
     yield from photo_match()
     yield from preferences()
+    yield from export()
     print("done: the pictures", flush=True)
 
 

@@ -76,8 +76,6 @@ def scroll(operator):
 class Export(Step):
     """File › Export › Virtual Pinhole Scene."""
 
-    picture = "export.png"
-    shows = (0.155, 0.5, 1.0, 0.975)  # without folders of whoever makes the pictures
     edits = 0
 
     def prepare(self):
@@ -85,7 +83,9 @@ class Export(Step):
         bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
 
     def by_hand(self):
-        yield from self.pose_for_the_picture()
+        call(bpy.ops.viewcam.export_scene, filepath=str(FILE))
+        for _ in range(8):
+            yield
         yield from in_the_file_browser(bpy.ops.file.execute)
 
     def by_script(self):
@@ -93,14 +93,6 @@ class Export(Step):
 
     def check(self):
         assert '"eye"' in FILE.read_text(encoding="utf-8")
-
-    def pose_for_the_picture(self):
-        call(bpy.ops.viewcam.export_scene, filepath=str(FILE))
-        for _ in range(8):
-            yield
-
-    def after_the_picture(self):
-        yield from in_the_file_browser(bpy.ops.file.cancel)
 
     def tidy(self):
         shutil.rmtree(FILE.parent)
