@@ -295,3 +295,9 @@ def photograph(where, path, share=100, pointer=None):
     few = ("-resize", f"{share}%", "+dither", "-colors", "192", "-depth", "8", "-strip")
     shot = subprocess.run([*screen, "png:-"], check=True, capture_output=True).stdout
     subprocess.run(["convert", "png:-", *arrow, *few, str(path)], input=shot, check=True)
+
+
+def beside(before, after, path):
+    """Save two pictures as one, with a gap between them."""
+    few = ("+dither", "-colors", "192", "-depth", "8", "-strip")
+    subprocess.run(["convert", before, "(", "-size", "12x1", "xc:none", ")", after, "+append", *few, path], check=True)

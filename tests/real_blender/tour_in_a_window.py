@@ -6,6 +6,7 @@ FOLDER : where the pictures of docs/artists.md go; without it none are taken. Le
 """
 
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -14,10 +15,12 @@ import bpy
 sys.path.append(str(Path(__file__).parent))
 import tour
 import tour_step
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 from panel_in_a_window import move, region, start, window
-from tour_hands import SIDEBAR, begin, lowest_button, photograph, push_undo, redo, survey_the_rest, undo
+from tour_hands import SIDEBAR, VIEWPORT, begin, beside, lowest_button, photograph, push_undo, redo, survey_the_rest, undo
 
 FOLDER = next(map(Path, sys.argv[sys.argv.index("--") + 1 :]), None)
+BEFORE, AFTER = (Path(tempfile.gettempdir(), f"{name}.png") for name in ("before", "after"))
 MOUSE_AWAY = (200, 700)
 BELOW_BUTTONS = 45  # pixels below the lowest button of a panel that a picture of it shows
 
@@ -37,6 +40,9 @@ def take(step):
     """The steps of a step: prepare, by hand, check, undo and redo."""
     step.prepare()
     yield
+    takes_pictures = bool(FOLDER and step.picture)
+    if takes_pictures and step.with_before:
+        yield from take_the_picture(step, BEFORE)
     push_undo("before")
     yield
     before = tour_step.state()
@@ -44,15 +50,10 @@ def take(step):
     yield
     after = tour_step.state()
     step.check()
-    if FOLDER and step.picture:
-        if step.shows == "sidebar":
-            yield from survey_the_rest(SIDEBAR)
-        yield from step.pose_for_the_picture()
-        move(*MOUSE_AWAY)
-        yield from draw_finely()
-        part, share = _shown(step.shows)
-        photograph(part, FOLDER / step.picture, share)
-        yield from step.after_the_picture()
+    if takes_pictures:
+        yield from take_the_picture(step, AFTER if step.with_before else FOLDER / step.picture)
+        if step.with_before:
+            beside(BEFORE, AFTER, FOLDER / step.picture)
     for _ in range(step.edits):
         yield from undo()
     assert not (lost := tour_step.differing(before, tour_step.state())), f"undo leaves {lost}"
@@ -63,15 +64,30 @@ def take(step):
     yield
 
 
+def take_the_picture(step, path):
+    """Steps that take what a step shows of the window as it is by now."""
+    if step.shows == "sidebar":
+        yield from survey_the_rest(SIDEBAR)
+    yield from step.pose_for_the_picture()
+    move(*MOUSE_AWAY)
+    yield from draw_finely()
+    part, share = _shown(step.shows)
+    photograph(part, path, share)
+    yield from step.after_the_picture()
+
+
 def _shown(name):
     """(left, bottom, width, height) of what a picture shows, and in how many percent of its size."""
     if name == "sidebar":
         _, sidebar = region("VIEW_3D", "UI")
         bottom = max(sidebar.y, lowest_button() - BELOW_BUTTONS)
         return (sidebar.x, bottom, sidebar.width, sidebar.y + sidebar.height - bottom), 100
-    if name == "window":
-        empty = 0.29 * window().height  # below the panel
-        return (0, empty, window().width, window().height - empty), 60
+    if name == "camera view":
+        area, part = region(*VIEWPORT)
+        matrix, data = tour_step.camera().matrix_world, tour_step.camera().data
+        corners = [matrix @ corner for corner in data.view_frame(scene=bpy.context.scene)]
+        xs, ys = zip(*(location_3d_to_region_2d(part, area.spaces.active.region_3d, each) for each in corners), strict=True)
+        return (part.x + min(xs), part.y + min(ys), max(xs) - min(xs), max(ys) - min(ys)), 45
     area = max(window().screen.areas, key=lambda area: area.width * area.height)
     left, bottom, right, top = (0.0, 0.0, 1.0, 1.0) if name == "area" else name
     x, y = area.x + left * area.width, area.y + bottom * area.height

@@ -5,8 +5,8 @@ import math
 import bpy
 import numpy as np
 from panel_in_a_window import region
-from tour_hands import call, push, unfold
-from tour_step import UPPER_PART, Step, axes, camera, is_at_its_values, select, values
+from tour_hands import call, hide_the_sidebar, push, unfold
+from tour_step import Step, axes, camera, is_at_its_values, select, values
 
 
 class _Move(Step):
@@ -29,13 +29,15 @@ class _Move(Step):
 class _SeenThroughTheCamera(_Move):
     """Its picture is taken through the camera."""
 
-    shows = UPPER_PART
+    shows, with_before = "camera view", True
 
     def pose_for_the_picture(self):
         view = self._view()
         self.was = view.view_rotation.copy(), view.view_location.copy(), view.view_distance
+        yield from hide_the_sidebar()
         view.view_perspective = "CAMERA"
         yield
+        call(bpy.ops.view3d.view_center_camera)
         yield
 
     def after_the_picture(self):
@@ -43,8 +45,7 @@ class _SeenThroughTheCamera(_Move):
         view = self._view()
         view.view_perspective = "PERSP"
         view.view_rotation, view.view_location, view.view_distance = self.was
-        yield
-        yield
+        yield from hide_the_sidebar(hidden=False)
 
     def _view(self):
         area, _ = region("VIEW_3D", "WINDOW")

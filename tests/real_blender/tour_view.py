@@ -3,15 +3,25 @@
 import bpy
 import numpy as np
 from panel_in_a_window import region, window
-from tour_hands import VIEWPORT, drag, on_screen
+from tour_hands import VIEWPORT, drag, hide_the_sidebar, on_screen
 from tour_step import UPPER_PART, Step, is_at_its_values, room, select, values
 
 
-class DragTheLookAtPoint(Step):
+class _WithoutTheSidebar(Step):
+    """Its picture shows all of the viewport."""
+
+    def pose_for_the_picture(self):
+        yield from hide_the_sidebar()
+
+    def after_the_picture(self):
+        yield from hide_the_sidebar(hidden=False)
+
+
+class DragTheLookAtPoint(_WithoutTheSidebar):
     """By its handle; the camera turns."""
 
     picture = "handles.png"
-    shows = UPPER_PART
+    shows, with_before = (0.0, 0.42, 0.78, 0.75), True
 
     def prepare(self):
         values().eye, values().look_at, values().up = (4, -6, 3.5), (0, 0, 1), (0, 0, 1)
@@ -90,7 +100,7 @@ class ShowTheDiagramElsewhere(Step):
         is_at_its_values()
 
 
-class FourViews(Step):
+class FourViews(_WithoutTheSidebar):
     """The quad view draws the diagram in each, orthographic ones too."""
 
     picture = "quad-view.png"
