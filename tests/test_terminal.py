@@ -107,7 +107,7 @@ def test_a_comparison_prints_the_names_of_a_scene_plain(scene, tmp_path, capfd):
     assert main(["compare", str(picture), str(picture), "--scene", str(scene), "--report", str(tmp_path / "report")]) == 0
     output = capfd.readouterr()
     assert_shows_itself(output.out + output.err)
-    assert rf"skipped: Wall\n{FORGED}\r\x1b[2K" in output.out, "the test's name never reached the terminal"
+    assert rf"skipped, Wall\n{FORGED}\r\x1b[2K" in output.out, "the test's name never reached the terminal"
 
 
 @pytest.mark.parametrize("change", ["key", "name", "geometry", "path", "word", "suffix", "camera"])
