@@ -225,7 +225,7 @@ def test_what_is_wrong_with_the_header_is_told_once_and_not_in_each_row(tmp_path
 
 
 def test_with_a_wrong_header_the_rows_are_looked_at_all_the_same(tmp_path):
-    problems = problems_in(tmp_path, "list.csv", "name,camera,colour,frame\na,Camera,red,1\nb,Camera,red,x\n")
+    problems = problems_in(tmp_path, "list.csv", "name,camera,color,frame\na,Camera,red,1\nb,Camera,red,x\n")
     assert [problem.split(" is ")[0] for problem in problems] == ["line 1, column 'color'", "line 3, column frame"]
 
 
