@@ -93,7 +93,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def outside(request, folder):
-    """What a stage names that is not in its folder, or is no file, by its name in OUTSIDE."""
+    """Assets outside of a stage's folder, or that are no files, by their names in OUTSIDE."""
     if request.param == "a link that leads out":
         request.getfixturevalue("symlink")(folder / "link.usda", folder.parent / "secret.usda")
     if request.param == "a pipe":

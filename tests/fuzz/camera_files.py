@@ -83,7 +83,7 @@ def _crate() -> bytes:
 
 
 def _with_lenses(transforms: dict) -> dict:
-    """The same with a lens of each frame's own."""
+    """The transforms with a lens of its own for each of the first two frames."""
     first, second, *_ = transforms["frames"]
     first |= {"camera_model": "OPENCV", "k1": -0.1, "k2": 0.02, "p1": 1e-3, "p2": -5e-4}
     second |= {"camera_model": "OPENCV_FISHEYE", "k1": 0.05, "k2": -0.01, "k3": 1e-3, "k4": -1e-4}

@@ -13,7 +13,7 @@ from viewcam_addon.blender.rendering.displayed import displayed
 
 
 def looked_up(table, light):
-    """What the shader makes of light, (n, 3), by a table of `swipe.shades`."""
+    """The colors that the shader shows for light, (n, 3), by a table of `swipe.shades`."""
     last = swipe._COLORS - 1
     at = np.clip(np.log2(np.maximum(light, 0) / 2.0**swipe._LOWEST + 1) / swipe._STOPS, 0, 1) * last
     low = np.minimum(at.astype(int), last - 1)
