@@ -161,7 +161,7 @@ def _unit(vector: mpmath.matrix) -> mpmath.matrix:
 
 def _cycles(places: Array) -> list[Curve]:
     """The median of a check, plain and recentered; nan where no pixel can be compared."""
-    methods = {"Cycles": False, "Cycles, recentred (ours)": True}
+    methods = {"Cycles": False, "Cycles, recentered (ours)": True}
     exported = {}
     with TemporaryDirectory() as name:
         for number, place in enumerate(places.tolist()):

@@ -88,8 +88,8 @@ def _searched(bench, fault, seed):
                 fault.of_picture(passes, np.random.default_rng(seed))  # the same place in all of them
             tests.append(rivals.without_the_tracers_own(Image(passes, attributes={"samples": str(samples // 8)})))
         rounds.add(samples, reference, tests, None)
-        shown = rounds.reference, rounds.tests, bench.camera, rounds.samples // 8, None
-        comparison = radiance.compare(*shown, sequential.FALSE_ALARMS_OF_EACH)
+        pictures = rounds.reference, rounds.tests, bench.camera, rounds.samples // 8
+        comparison = radiance.compare(*pictures, false_alarms=sequential.FALSE_ALARMS_OF_EACH)
         search = sequential.search(comparison, 0.005, rounds)
         if search.is_decided:
             return replace(comparison, search=search)
