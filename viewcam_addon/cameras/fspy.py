@@ -24,7 +24,7 @@ TITLE = "fSpy (project, exported parameters)"
 _NO_UNIT = "No unit"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return source.data[:4] == b"fspy" or _exported(source) is not None
 
 

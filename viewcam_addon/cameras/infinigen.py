@@ -21,7 +21,7 @@ SEVERAL = "a folder"
 _SHAPES = {"K": (3, 3), "T": (4, 4)}
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return all(name in source.npz and source.npz[name].shape == shape for name, shape in _SHAPES.items())
 
 

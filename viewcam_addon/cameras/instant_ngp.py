@@ -40,7 +40,7 @@ _SPLINE = "These are the path's keyframes: instant-ngp itself flies along a spli
 _BLUR = "The path has an aperture, of which a pinhole has none: everything is in focus"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     path = source.document.get("path")
     return isinstance(path, list) and bool(path) and isinstance(path[0], dict) and path[0].keys() >= _KEYS
 

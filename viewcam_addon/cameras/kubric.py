@@ -24,7 +24,7 @@ FILE = "metadata.json"
 _KEYS = {"positions", "quaternions", "focal_length", "sensor_width"}
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return _document(source) is not None
 
 

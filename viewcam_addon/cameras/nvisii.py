@@ -27,7 +27,7 @@ _LAST = [0.0, 0.0, 0.0, 1.0]
 _TAKEN = "Nothing says which way the camera looks along its z: it was taken as NVISII's, y up, z away from the view"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     data = source.document.get("camera_data")
     return isinstance(data, dict) and {"camera_view_matrix", "intrinsics"} <= data.keys()
 
