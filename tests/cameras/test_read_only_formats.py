@@ -731,3 +731,115 @@ def test_metashapes_slave_camera_stands_on_its_master(tmp_path):
     assert np.abs(axes_of_master @ np.column_stack([u, -v, -w]) - turn).max() < 1e-12
     with pytest.raises(InputError, match="of a rig"):
         cameras.read(text.replace("<rotation>" + text_of(turn) + "</rotation><location>0.25 0.01 -0.02</location>", ""))
+
+
+RC_HEADS = (
+    "#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2",
+    "#name,x,y,alt,yaw,pitch,roll,f_35mm,px_norm,py_norm,k1",
+)
+
+
+def realitycapture_table(known, head, *lens):
+    """Heading, pitch and roll by scipy: the turn of a camera that looks down, about z, x and y."""
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_matrix(known.opengl[:, :3])
+    yaw, pitch, roll = rotation.as_euler("ZXY", degrees=True).tolist()
+    longer = max(known.width, known.height)
+    middle = [(known.c_x - known.width / 2) / longer, (known.c_y - known.height / 2) / longer]
+    numbers = [*known.e.tolist(), -yaw, pitch, roll, known.f_x * 36 / longer, *middle, *lens]
+    numbers += [0] * (head.count(",") - len(numbers))
+    return f"#cameras 1\n{head}\nleft.jpg,{','.join(map(repr, numbers))}\n"
+
+
+@pytest.mark.parametrize("head", RC_HEADS)
+@pytest.mark.parametrize("name", ONE_FOCAL)
+def test_realitycaptures_table_turns_a_camera_that_looks_down(name, head):
+    known = Known(name)
+    read = the_same(
+        cameras.read(realitycapture_table(known, head), options=Options(size=(known.width, known.height))), known, 2.0**-47
+    )
+    assert read.name == "left" and read.image == "left.jpg" and read.lens is None and not read.size_stated
+
+
+def test_realitycaptures_table_and_its_xmp_of_one_photograph_are_one_rotation():
+    """Both as the program wrote them: "Different rotation of cameras in XMP and CSV", forum of RealityCapture."""
+    table = f"{RC_HEADS[0]}\na.jpg,1,2,3,163.736597399311,83.4154313461628,174.386496244756,30{',0' * 8}\n"
+    xmp = (  # of the last number there were three digits
+        '<x xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#" xcr:FocalLength35mm="30"><xcr:Rotation>0.982594073038806 '
+        "0.185426733553445 -0.0112166890261935 -0.032113633044729 0.11008102707942 -0.993403685341366 -0.18296885582437 "
+        "0.976472781986697 0.114</xcr:Rotation><xcr:Position>1 2 3</xcr:Position></x>"
+    )
+    (of_table,), (of_xmp,) = (cameras.read(text, options=Options(size=(640, 480))) for text in (table, xmp))
+    assert np.abs(np.array(of_table.pinhole.axes()) - of_xmp.pinhole.axes()).max() < 2e-4  # of those three digits
+    row = [0.982594073038806, 0.185426733553445, -0.0112166890261935]
+    assert np.abs(np.array(of_table.pinhole.axes())[0] - row).max() < 3 * np.radians(5e-13) + 1e-15  # the digits of both
+
+
+def test_realitycaptures_table_for_opencv_has_r_and_t_and_pixels():
+    known = Known("shifted")
+    turn = ",".join(f"R{row}{column}" for row in range(3) for column in range(3))
+    inner = [known.f_x, known.c_x, known.c_y, -0.1, 0.02, 3e-3, -1e-3, 0, 0]
+    numbers = [*(-known.opencv @ known.e), *known.opencv.ravel(), *inner]
+    text = f"#name,tx,ty,tz,{turn},f_pix,px_pix,py_pix,k1,k2,t2,t1,k3,k4\na.jpg,{','.join(repr(float(x)) for x in numbers)}\n"
+    read = the_same(cameras.read(text, options=Options(size=(known.width, known.height))), known)
+    assert read.lens.radial == (-0.1, 0.02) and read.lens.tangential == (3e-3, -1e-3)  # OpenCV's p1 is t2
+
+
+def test_realitycaptures_table_without_a_focal_length_has_poses():
+    known = Known("plain")
+    rows = realitycapture_table(known, RC_HEADS[0]).split("\n")[2].split(",")[:7]
+    text = f"#name,x,y,z,heading,pitch,roll\n{','.join(rows)}\n"
+    the_same(cameras.read(text, options=Options(base=known.pinhole)), known, 2.0**-47)
+    with pytest.raises(InputError, match="how it sees"):
+        cameras.read(text)
+
+
+def test_a_single_term_of_realitycaptures_table_is_divisions_and_several_are_browns():
+    known = Known("plain")
+    given = Options(size=(known.width, known.height))
+    (division,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1), options=given)
+    (brown,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1, 0.02), options=given)
+    assert division.lens.projection == "division" and division.lens.parameters == (-0.1,)
+    assert brown.lens.projection == "pinhole" and brown.lens.radial == (-0.1, 0.02)
+    assert all(any("does not name the lens's model" in note for note in camera.notes) for camera in (division, brown))
+
+
+def test_degrees_of_longitude_in_realitycaptures_table_are_refused():
+    rows = "".join(f"{name}.jpg,{15.00012 + at},{50.1 + at},230.5,0,0,0,30\n" for name, at in (("a", 0), ("b", 1e-4)))
+    with pytest.raises(InputError, match="longitude and latitude"):
+        cameras.read(f"#name,x,y,alt,yaw,pitch,roll,f\n{rows}", options=Options(size=(640, 480)))
+    meters = f"#name,x,y,alt,yaw,pitch,roll,f\n{rows}".replace("15.0", "5015.0")
+    assert len(cameras.read(meters, options=Options(size=(64, 48)))) == 2
+
+
+def visualsfm(known, kind="NVM_V3", term=0.0):
+    x, y, z, w = known.quaternion()
+    pose = [w, -x, -y, -z, *known.e]  # of the way back
+    if kind == "NVM_V3_R9T":
+        pose = [*known.opencv.ravel(), *(-known.opencv @ known.e)]
+    calibration = f"FixedK {known.f_x!r} {known.c_x!r} {known.f_y!r} {known.c_y!r}"
+    camera = f'the"left.jpg {known.f_x!r} {text_of(pose)} {term!r} 0\n'
+    return f"{kind} {calibration}\n\n1\n{camera}\n2\n1 2 3 9 9 9 1 0 0 5 5\n1 2 3 9 9 9 0\n\n1\n{camera}\n0\n\n0\n"
+
+
+@pytest.mark.parametrize("kind", ["NVM_V3", "NVM_V3_R9T"])
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_visualsfm_has_the_eye_beside_its_quaternion(name, kind):
+    known = Known(name)
+    read = the_same(cameras.read(visualsfm(known, kind), options=Options(size=(known.width, known.height))), known, 2.0**-48)
+    assert (read.name, read.image) == ("the left", "the left.jpg") and any("more models" in note for note in read.notes)
+
+
+@pytest.mark.parametrize("term", [-0.2, 0.3])
+def test_visualsfms_term_is_of_the_radius_in_the_photograph(term):
+    known = Known("wide")
+    (camera,) = cameras.read(
+        visualsfm(known, term=term).replace("FixedK", "Free"), options=Options(size=(known.width, known.height))
+    )
+    random = np.random.default_rng(5)
+    seen = random.uniform(-0.7, 0.7, (1000, 2))
+    straight = seen * (1 + term * (seen * seen).sum(axis=1, keepdims=True))  # its rule, as PBA's cost has it
+    assert np.abs(camera.lens.undistort(seen) - straight).max() < 16 * 2.0**-53
+    assert np.abs(camera.lens.distort(straight) - seen).max() < 64 * 2.0**-53
+    if term < 0:  # turns back at 1 / √(3 · 0.2) = 1.29
+        assert np.isnan(camera.lens.undistort([[1.3, 0.0]])).all() and not np.isnan(camera.lens.undistort([[1.28, 0.0]])).any()
+    assert camera.pinhole.principal_point == (known.width / 2, known.height / 2)

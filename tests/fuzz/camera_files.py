@@ -156,6 +156,8 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "realitycapture": {"a.xmp": documents.texts()[-1]},
         "meshroom": {"a.sfm": mixed.meshroom()},
         "openmvg": {"a.json": mixed.openmvg()},
+        "realitycapture_table": {"a.csv": published.realitycapture_table(known, published.RC_HEADS[0], -0.1, 0.02)},
+        "visualsfm": {"a.nvm": published.visualsfm(known, term=-0.1)},
         "bundler": {"a.out": f"# Bundle file v0.3\n2 0\n600 0 0\n{POSE}600 -0.2 0.1\n{POSE}", "list.txt": "a.jpg\nb.jpg\n"},
         "llff": {"poses_bounds.npy": _npy()},
         "polycam": {"a.json": json.dumps(phone)},

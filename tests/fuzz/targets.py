@@ -512,7 +512,7 @@ CAMERAS = (
     *("record3d", "gaussian_splatting", "ros", "ros_window", "opencv", "opencv_json", "opencv_xml", "opencv_npz", "kalibr"),
     *("tum", "kitti", "euroc", "chan", "three_js", "mitsuba", "mitsuba_dictionary", "pov_ray", "pbrt", "matrices", "look_at"),
     *("vtk", "textbook", "looks", "looks_gl", "looks_vtk", "text", "text_of_people", "colmap_lenses", "opencv_fisheye"),
-    *("transforms_lenses", "nerfstudio_path", "open3d", "opensfm"),
+    *("transforms_lenses", "nerfstudio_path", "open3d", "opensfm", "realitycapture_table", "visualsfm"),
 )
 """The kinds of camera_files.py, which makes them only when it is asked."""
 

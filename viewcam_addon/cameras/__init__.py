@@ -90,6 +90,7 @@ from . import (
     unity,
     unreal,
     usd,
+    visualsfm,
     vtk,
 )
 from .axes import leveled, moved, moved_back
@@ -128,6 +129,7 @@ FORMATS: dict[str, ModuleType] = {
     "meshroom": meshroom,
     "openmvg": openmvg,
     "bundler": bundler,
+    "visualsfm": visualsfm,
     "llff": llff,
     "arkit": arkit,
     "gaussian_splatting": gaussian_splatting,
