@@ -41,9 +41,9 @@ _SPOT = 1e-3  # of its distance from where the degrees begin, which 100 km are n
 _LONGEST = 2000  # characters before the names of columns end
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     if source.is_folder:
-        return any(map(recognises, source.files("*.xmp")))
+        return any(map(recognizes, source.files("*.xmp")))
     if "capturingreality" in source.text[:2000].lower():
         return source.xml is not None
     return _columns(source) is not None
@@ -52,7 +52,7 @@ def recognises(source: Source) -> bool:
 def read(source: Source, options: Options) -> list[Camera]:
     if columns := _columns(source):
         return _of_table(source, *columns, options)
-    files = [file for file in source.files("*.xmp") if recognises(file)] if source.is_folder else [source]
+    files = [file for file in source.files("*.xmp") if recognizes(file)] if source.is_folder else [source]
     left_out, cameras = LeftOut(), []
     for file in files:
         with left_out.unless_pinhole(naming.stem(file.path.stem) if file.path else "RealityCapture"):

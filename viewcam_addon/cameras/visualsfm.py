@@ -27,7 +27,7 @@ TITLE = "VisualSFM NVM"
 _BEGINS = ("NVM_V3", "NVM_V3_R9T")
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return source.text[:20].split()[:1] in ([name] for name in _BEGINS)
 
 
@@ -35,6 +35,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     lines = numbered_lines(source)
     kind, *calibration = lines[0][1].split()
     count, after = _count(source, lines, 1)
+    if not count:
+        return []
     cameras_of_file = [line.split() for _, line in lines[after : after + count]]
     length = 16 if kind == "NVM_V3_R9T" else 11
     if len(cameras_of_file) < count or any(len(words) != length for words in cameras_of_file):
