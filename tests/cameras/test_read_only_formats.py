@@ -497,7 +497,7 @@ def open3d(known):
 
 
 @pytest.mark.parametrize("name", UNMIRRORED)
-def test_open3d_has_column_after_column_and_counts_from_the_first_pixels_centre(name):
+def test_open3d_has_column_after_column_and_counts_from_the_first_pixels_center(name):
     known = Known(name)
     alone = cameras.read(json.dumps(open3d(known)))
     flight = cameras.read(json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": [open3d(known)] * 2}))

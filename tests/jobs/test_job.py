@@ -261,7 +261,7 @@ def test_all_shards_together_are_the_batch_and_none_has_much_more_than_another(t
     assert all(part == sorted(part) for part in parts)
 
 
-def test_neighbours_go_to_different_shards():
+def test_neighbors_go_to_different_shards():
     assert [shard("abcdefg", f"{number}/3") for number in (1, 2, 3)] == [["a", "d", "g"], ["b", "e"], ["c", "f"]]
 
 

@@ -140,7 +140,7 @@ def make_the_scene():
     select("Camera")
 
 
-def _mesh(add, name, colour, **where):
+def _mesh(add, name, color, **where):
     add(**where)
     block = bpy.context.object
     block.name = name
@@ -149,11 +149,11 @@ def _mesh(add, name, colour, **where):
     material = bpy.data.materials.new(name)
     if not material.node_tree:  # new materials have one from 5.0 on
         material.use_nodes = True
-    material.diffuse_color = (*colour, 1)
+    material.diffuse_color = (*color, 1)
     tree = material.node_tree
     tree.nodes.clear()
     diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
-    diffuse.inputs["Color"].default_value = (*colour, 1)
+    diffuse.inputs["Color"].default_value = (*color, 1)
     tree.links.new(diffuse.outputs["BSDF"], output.inputs["Surface"])
     block.data.materials.append(material)
 

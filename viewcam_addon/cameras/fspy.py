@@ -22,7 +22,7 @@ TITLE = "fSpy"
 _NO_UNIT = "No unit"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return source.data[:4] == b"fspy"
 
 

@@ -19,7 +19,7 @@ _KEYS = {"position", "rotation", "fx", "fy", "width", "height"}
 _MIDDLE = "The file says no principal point: it was taken in the picture's middle, as the training does"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return (
         isinstance(source.json, list)
         and bool(source.json)

@@ -32,7 +32,7 @@ _FPS = 24
 _OF_NERFSTUDIO = f"The path is in the world that nerfstudio trains in: with {WORLD} beside it, the original world can be chosen"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     path = source.document.get("camera_path")
     return isinstance(path, list) and bool(path) and isinstance(path[0], dict) and "camera_to_world" in path[0]
 

@@ -71,7 +71,7 @@ _UNSAID = f"whose axes it means and which way it goes is not said: give --pose, 
 _WAY = "R and t were taken as from world to camera, x right, y down, z into the view"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return any(True for _ in _cameras_in(source))
 
 

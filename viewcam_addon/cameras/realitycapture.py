@@ -21,14 +21,14 @@ _PICTURES = ("jpg", "jpeg", "png", "tif", "JPG", "JPEG", "PNG", "TIF")
 _LENS = ("k1", "k2", "k3", "k4", "t1", "t2")
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     if source.is_folder:
-        return any(map(recognises, source.files("*.xmp")))
+        return any(map(recognizes, source.files("*.xmp")))
     return "capturingreality" in source.text[:2000].lower() and source.xml is not None
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    files = [file for file in source.files("*.xmp") if recognises(file)] if source.is_folder else [source]
+    files = [file for file in source.files("*.xmp") if recognizes(file)] if source.is_folder else [source]
     left_out, cameras = LeftOut(), []
     for file in files:
         with left_out.unless_pinhole(naming.stem(file.path.stem) if file.path else "RealityCapture"):

@@ -54,7 +54,7 @@ def record(pinhole: Pinhole, camera_data: CameraData | None = None) -> dict[str,
     }
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return _is_ours(source) or any(map(_is_ours, source.files("*.json")))
 
 

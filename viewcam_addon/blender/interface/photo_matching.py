@@ -236,11 +236,11 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         drawing = self.drawing
         if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
-            return self._leave(context, cancelled=True)
+            return self._leave(context, canceled=True)
         if event.type in ("RET", "NUMPAD_ENTER") and event.value == "PRESS":
-            return self._leave(context, cancelled=self.result is None)
+            return self._leave(context, canceled=self.result is None)
         if context.region_data is None or context.region_data.view_perspective != "CAMERA":
-            return self._leave(context, cancelled=True)
+            return self._leave(context, canceled=True)
         if event.type in ("WHEELUPMOUSE", "WHEELDOWNMOUSE") or (event.type == "MIDDLEMOUSE" and (event.shift or event.ctrl)):
             return {"PASS_THROUGH"}
         if self.frame is None:  # nothing has been drawn yet
@@ -265,7 +265,7 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender closes the window or the file."""
-        self._leave(context, cancelled=True)
+        self._leave(context, canceled=True)
 
     def _in_picture(self, event: bpy.types.Event) -> tuple[Pair, float]:
         """The mouse's place in the picture, and how many of its pixels one of the screen shows."""
@@ -290,13 +290,13 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
         context.workspace.status_text_set(f"{_HELP[self.drawing.kind]}{axis}   Enter: confirm   Esc: cancel")
         context.area.tag_redraw()
 
-    def _leave(self, context: bpy.types.Context, cancelled: bool) -> set[str]:
+    def _leave(self, context: bpy.types.Context, canceled: bool) -> set[str]:
         global _drawn
         _drawn = None
         context.workspace.status_text_set(None)
         if context.area:
             context.area.tag_redraw()
-        if cancelled:
+        if canceled:
             kept.restore(self.camera_object, self.before)
             return {"CANCELLED"}
         self.report({"INFO"}, summary_of(self.result, self.camera_object.data.lens)[0])
@@ -373,20 +373,20 @@ def _draw() -> None:
     elif drawing.kind == RECTANGLE:
         closed = [*ends, ends[0]] if len(ends) == 4 else ends
         along = [theme[drawing.axes[i % 2]] for i in range(4)]
-        lines = [(a, b, colour) for a, b, colour in zip(closed, closed[1:], along, strict=False)]
+        lines = [(a, b, color) for a, b, color in zip(closed, closed[1:], along, strict=False)]
     else:
         lines = []
     gpu.state.blend_set("ALPHA")
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     for width, dark in ((5.0, True), (2.5, False)):
-        for start, end, colour in lines:
+        for start, end, color in lines:
             shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
             shader.uniform_float("lineWidth", width * scale)
-            shader.uniform_float("color", (0.0, 0.0, 0.0, 0.5) if dark else colour)
+            shader.uniform_float("color", (0.0, 0.0, 0.0, 0.5) if dark else color)
             batch_for_shader(shader, "LINES", {"pos": [(*start, 0.0), (*end, 0.0)]}).draw(shader)
     flat = gpu.shader.from_builtin("UNIFORM_COLOR")
-    for half, colour in ((_HANDLE + 1.5, (0.0, 0.0, 0.0, 0.6)), (_HANDLE, (1.0, 1.0, 1.0, 1.0))):
-        flat.uniform_float("color", colour)
+    for half, color in ((_HANDLE + 1.5, (0.0, 0.0, 0.0, 0.6)), (_HANDLE, (1.0, 1.0, 1.0, 1.0))):
+        flat.uniform_float("color", color)
         for x, y in ends:
             r = half * scale
             square = [(x - r, y - r), (x + r, y - r), (x - r, y + r), (x + r, y + r)]
