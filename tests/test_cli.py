@@ -79,7 +79,7 @@ def test_what_differs_is_drawn_where_it_is_wanted(tmp_path):
     assert main(["compare", str(picture), str(picture), "--difference", str(drawn), "--json", str(result)]) == 0
     assert drawn.read_bytes().startswith(b"\x89PNG")
     record = json.loads(result.read_text())["difference"]
-    assert record["image"] == str(drawn) and "px off" in record["colours"]
+    assert record["image"] == str(drawn) and "px off" in record["colors"]
 
 
 def test_two_cameras_a_pixel_apart_are_not_the_same_picture(tmp_path, capfd):
@@ -95,7 +95,7 @@ def test_two_cameras_a_pixel_apart_are_not_the_same_picture(tmp_path, capfd):
     assert "Not the same picture" in (report / "index.html").read_text(encoding="utf-8")
 
 
-def test_what_is_not_modelled_is_named_with_its_share_and_fails_under_strict(tmp_path, capfd):
+def test_what_is_not_modeled_is_named_with_its_share_and_fails_under_strict(tmp_path, capfd):
     ledger = [
         {"object": "Ball", "status": "approximated", "reason": "is made of jelly"},
         {"object": "Sun", "status": "exported"},
@@ -109,7 +109,7 @@ def test_what_is_not_modelled_is_named_with_its_share_and_fails_under_strict(tmp
         record = json.loads((tmp_path / "a.json").read_text())
         assert (record["exit_status"], record["answer"], record["passed"]) == (status, "same_but", True)
         seen = (image.read(picture)["Object Index"] == 3).mean()
-        assert record["not_modelled"] == {
+        assert record["not_modeled"] == {
             "count": 1,
             "names": ["Ball"],
             "in_one_place": [],

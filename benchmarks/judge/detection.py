@@ -178,9 +178,9 @@ class Block:
         values = {rivals.OURS: max(of_geometry, rivals.of_light(reference, pictures))}
         if not by_all:
             return values
-        colours = np.mean([picture["Combined"][..., :3].astype(float) for picture in pictures], axis=0)
+        colors = np.mean([picture["Combined"][..., :3].astype(float) for picture in pictures], axis=0)
         expected, variance = reference["Combined"][..., :3].astype(float), reference["Variance"] * float(_REFERENCE_SAMPLES)
-        settings = expected, colours, variance, _PICTURES * _SAMPLES
+        settings = expected, colors, variance, _PICTURES * _SAMPLES
         return values | {name: judge(*settings) for name, judge in rivals.RIVALS.items()}
 
     def _of_geometry(self, test: Passes) -> float:

@@ -146,13 +146,13 @@ class _Fans:
     def __init__(self, size: float, side: int, random: np.random.Generator) -> None:
         count, n = side**2, self._TRIANGLES
         place = (np.stack(np.divmod(np.arange(count), side), axis=-1) + 0.5) / side * 2 - 1
-        centre = place + random.uniform(-0.1, 0.1, (count, 2)) / side
+        center = place + random.uniform(-0.1, 0.1, (count, 2)) / side
         depth = np.exp(random.uniform(-0.7, 0.7, count))
         angle = 2 * np.pi * (np.arange(n) + random.uniform(-0.3, 0.3, (count, n))) / n
         reach = size * random.uniform(0.5, 1, (count, n))
-        rim = centre[:, None] + reach[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        rim = center[:, None] + reach[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         rim_depth = depth[:, None] * (1 + 0.5 * size * random.uniform(-1, 1, (count, n)))
-        middle = np.concatenate([centre, np.ones((count, 1))], axis=1) * depth[:, None]
+        middle = np.concatenate([center, np.ones((count, 1))], axis=1) * depth[:, None]
         ring = np.concatenate([rim, np.ones((count, n, 1))], axis=2) * rim_depth[..., None]
         corners = np.stack([np.repeat(middle[:, None], n, axis=1), ring, np.roll(ring, -1, axis=1)]).reshape(3, -1, 3)
         start = random.integers(0, 3, corners.shape[1])  # which corner a triangle names first

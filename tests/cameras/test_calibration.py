@@ -123,6 +123,7 @@ def test_a_calibration_comes_back_from_json_and_a_camera_from_its_sidecar(tmp_pa
         {"tangential": [1]},
         {"projection": "panorama"},
         {"projection": "fov"},
+        {"projection": "measured", "parameters": [0]},
         {"radial": [float("nan")]},
         {"terms": 3},
         {"more": 1},

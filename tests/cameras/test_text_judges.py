@@ -41,7 +41,7 @@ def test_what_we_write_we_read_as_the_same_camera(name, form):
             cameras.write([of(name)], form)
         return
     text = cameras.write([of(name)], form)
-    assert cameras.recognised(text) == form
+    assert cameras.recognized(text) == form
     (camera,) = cameras.read(text)
     assert camera.size_stated
     same_picture(camera, CAMERAS[name])

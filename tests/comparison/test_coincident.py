@@ -19,14 +19,14 @@ from viewcam_addon.tracer.scene.shader_nodes import node
 
 CAMERA = Pinhole((0.5, -6.0, 3.0), (0.0, 0.0, 0.4), (0.0, 0.0, 1.0), 70.0, 64, 48)
 SAMPLES_OF_A_PICTURE = 64
-COLOURS = {"Floor": (0.6, 0.6, 0.6), "Carpet": (0.8, 0.2, 0.1), "Wall": (0.3, 0.5, 0.7), "Side": (0.5, 0.5, 0.5)}
+COLORS = {"Floor": (0.6, 0.6, 0.6), "Carpet": (0.8, 0.2, 0.1), "Wall": (0.3, 0.5, 0.7), "Side": (0.5, 0.5, 0.5)}
 
 
 def quad(*corners):
     return Mesh(np.array(corners, float), np.array([(0, 1, 2), (0, 2, 3)], np.int32), np.zeros(2, np.int32))
 
 
-def a_scene(lift=0.0, only=None, colours=COLOURS, energy=2.0):
+def a_scene(lift=0.0, only=None, colors=COLORS, energy=2.0):
     """A floor with a carpet in its plane, a wall beside that, in a plane of its own, and another far off."""
     slope = 0.07
     floor = quad((-3, -3, -3 * slope), (3, -3, 3 * slope), (3, 3, 3 * slope), (-3, 3, -3 * slope))
@@ -39,7 +39,7 @@ def a_scene(lift=0.0, only=None, colours=COLOURS, energy=2.0):
         CAMERA,
         geometries,
         tuple(Object(name, name, np.eye(4), i, materials=(name,)) for i, name in enumerate(kept_names, start=1)),
-        materials={name: Material(surface=node("diffuse", color=color)) for name, color in colours.items()},
+        materials={name: Material(surface=node("diffuse", color=color)) for name, color in colors.items()},
         lamps=(Sun("sun", towards=(0.2, -0.6, 1.0), irradiance=(energy,) * 3, angle=0.3),),
         film=Film("BOX"),
         bounces=Bounces(total=3, diffuse=3),
@@ -142,8 +142,8 @@ def test_where_nearly_all_is_taken_out_there_is_no_answer_and_the_rest_may_still
 
 FAULTS = {
     "a lamp 2 % too bright": {"energy": 2.04},
-    "another wall": {"colours": {**COLOURS, "Wall": (0.3, 0.5, 0.74)}},
-    "a floor that is 3 % darker": {"colours": {**COLOURS, "Floor": (0.582, 0.582, 0.582)}},
+    "another wall": {"colors": {**COLORS, "Wall": (0.3, 0.5, 0.74)}},
+    "a floor that is 3 % darker": {"colors": {**COLORS, "Floor": (0.582, 0.582, 0.582)}},
 }
 
 

@@ -23,8 +23,8 @@ TRUTH = np.stack([0.2 + 0.5 * columns / WIDTH, 0.3 + 0.3 * rows / HEIGHT, np.ful
 
 def picture(rng, samples, truth=TRUTH, attribute="samples", **passes):
     """The mean of so many exponential variates in every pixel, gray noise, and its variance."""
-    colour = rng.gamma(samples, 1.0 / samples, (HEIGHT, WIDTH, 1)) * truth
-    combined = np.concatenate([colour, np.ones((HEIGHT, WIDTH, 1))], axis=-1)
+    color = rng.gamma(samples, 1.0 / samples, (HEIGHT, WIDTH, 1)) * truth
+    combined = np.concatenate([color, np.ones((HEIGHT, WIDTH, 1))], axis=-1)
     channels = {"Combined": combined, "Variance": TRUTH**2 / samples, "Depth": np.full((HEIGHT, WIDTH, 1), 8.0), **passes}
     channels = {name: values.astype(np.float32) for name, values in channels.items()}
     return Image(channels, PINHOLE, {attribute: str(samples)}, f"{attribute}.exr")

@@ -103,6 +103,12 @@ def _lenses() -> dict[str, str]:
     }
 
 
+def _camview(known: published.Known) -> bytes:
+    file = io.BytesIO()
+    published.infinigen(file, known)
+    return file.getvalue()
+
+
 def _ros() -> str:
     return published.ros("flow", (1280, 800), (2, 2), (320, 200, 640, 480))
 
@@ -156,6 +162,8 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "realitycapture": {"a.xmp": documents.texts()[-1]},
         "meshroom": {"a.sfm": mixed.meshroom()},
         "openmvg": {"a.json": mixed.openmvg()},
+        "realitycapture_table": {"a.csv": published.realitycapture_table(known, published.RC_HEADS[0], -0.1, 0.02)},
+        "visualsfm": {"a.nvm": published.visualsfm(known, term=-0.1)},
         "bundler": {"a.out": f"# Bundle file v0.3\n2 0\n600 0 0\n{POSE}600 -0.2 0.1\n{POSE}", "list.txt": "a.jpg\nb.jpg\n"},
         "llff": {"poses_bounds.npy": _npy()},
         "polycam": {"a.json": json.dumps(phone)},
@@ -167,6 +175,14 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
             "dataparser_transforms.json": json.dumps({"transform": np.eye(4)[:3].tolist(), "scale": 0.5}),
         },
         "open3d": {"a.json": json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": [published.open3d(known)]})},
+        "instant_ngp": {
+            "a.json": json.dumps({"path": [published.instant_ngp(known)] * 3, "time": 0.0}),
+            "transforms.json": json.dumps({"scale": 0.5, "offset": [0.5, 0.4, 0.3], "frames": []}),
+        },
+        "kubric": {"metadata.json": json.dumps(published.kubric(known, known))},
+        "nvisii": {"a.json": json.dumps(published.nvisii(known))},
+        "infinigen": {"a.npz": _camview(known)},
+        "fspy_exported": {"a.json": json.dumps(published.FSPY_EXPORTED)},
         "opensfm": {"reconstruction.json": json.dumps(published.opensfm(known, k1=-0.1, k2=0.02))},
         "tum": {"a.txt": "".join(f"{i} 1 2 3 0 0 0 1\n" for i in range(5))},
         "kitti": {"a.txt": "1 0 0 1 0 1 0 2 0 0 1 3\n" * 3},

@@ -15,7 +15,7 @@ from viewcam_addon.jobs import run
 from viewcam_addon.jobs.folder import Folder, Outputs
 
 FULL = FullDiskError("a.exr can't be written (No space left on device): choose another folder or free some space")
-UNCHECKED = {"checked": 0, "checks_failed": 0, "not_all_modelled": 0}
+UNCHECKED = {"checked": 0, "checks_failed": 0, "not_all_modeled": 0}
 
 
 def test_a_batch_leaves_its_shots_a_summary_and_a_contact_sheet(tmp_path, painting):

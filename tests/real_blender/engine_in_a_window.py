@@ -45,7 +45,7 @@ def on_complete(*_):
 
 @persistent
 def on_cancel(*_):
-    ended.append("cancelled")
+    ended.append("canceled")
 
 
 def pick_the_engine():
@@ -118,7 +118,7 @@ def cancel():
         assert not ended, f"the render has {ended} already: make it heavier"
         pressed = time.perf_counter()
         subprocess.run(["xdotool", "key", "Escape"], check=True)
-        yield from wait_for("cancelled")
+        yield from wait_for("canceled")
         seconds.append(time.perf_counter() - pressed)
     Path(OUT).write_text(json.dumps(seconds))
 

@@ -16,7 +16,7 @@ from viewcam_addon.tracer.render import PASSES, Keeper, Tracer, render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Point, Sun
-from viewcam_addon.tracer.scene.materials import Colour, sum_of
+from viewcam_addon.tracer.scene.materials import Color, sum_of
 from viewcam_addon.tracer.scene.sameness import same, same_things
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -44,7 +44,7 @@ def test_pictures_are_the_same_bit_for_bit_for_any_number_of_threads_and_any_til
 
 @settings(max_examples=5)
 @given(seed=SEEDS)
-def test_single_samples_at_pixel_centres_are_the_picture(random_scene, seed):
+def test_single_samples_at_pixel_centers_are_the_picture(random_scene, seed):
     scene = random_scene(seed)
     tracer = Tracer(scene)
     rows, columns = np.mgrid[: scene.camera.height, : scene.camera.width]
@@ -57,7 +57,7 @@ def test_single_samples_at_pixel_centres_are_the_picture(random_scene, seed):
 
 @settings(max_examples=10)
 @given(seed=SEEDS)
-def test_positions_appear_at_their_pixels_centre_and_at_their_depth(random_scene, seed):
+def test_positions_appear_at_their_pixels_center_and_at_their_depth(random_scene, seed):
     scene = random_scene(seed)
     camera, passes = scene.camera, render(scene)
     hit = passes["Depth"][..., 0] < image.BACKGROUND_DEPTH
@@ -104,7 +104,7 @@ def test_a_cropped_picture_is_a_part_of_the_whole(random_scene):
 
 @settings(max_examples=5)
 @given(seed=SEEDS)
-def test_a_scene_a_million_metres_off_the_origin_shows_the_same_picture(random_scene, seed):
+def test_a_scene_a_million_meters_off_the_origin_shows_the_same_picture(random_scene, seed):
     scene = random_scene(seed)
     # A power of two, and eye, look-at and matrices that stay exact beside it: multiples of 2⁻²⁴.
     far = 2.0**20
@@ -197,7 +197,7 @@ def first_of(scene, x, y):
     return np.where(objects == 0, primitives, -1), depth, directions
 
 
-def centres(scene):
+def centers(scene):
     rows, columns = np.mgrid[: scene.camera.height, : scene.camera.width]
     return scene.camera.view_plane(columns.ravel() + 0.5, rows.ravel() + 0.5)
 
@@ -288,7 +288,7 @@ def test_spheres_that_touch_one_depth_overlap_or_coincide_are_all_found(make_sce
         "fifty spheres of one center, each larger by 1e-9": make_spheres(nested, 0.3 * (1 + 1e-9 * np.arange(50))),
     }.items():
         scene = make_scene(Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 100, 60, 60), spheres)
-        number, traced, directions = first_of(scene, *centres(scene))
+        number, traced, directions = first_of(scene, *centers(scene))
         depth = depths_by_testing_each(scene, spheres, directions)
         hits = np.isfinite(depth)
         assert hits.any() and np.array_equal(number >= 0, hits), name
@@ -301,7 +301,7 @@ def test_spheres_that_touch_one_depth_overlap_or_coincide_are_all_found(make_sce
 
 
 WIDTH, HEIGHT = 96, 64
-GREEN, RED = sum_of(diffuse=Colour((0.1, 0.8, 0.2))), sum_of(diffuse=Colour((0.9, 0.1, 0.1)))
+GREEN, RED = sum_of(diffuse=Color((0.1, 0.8, 0.2))), sum_of(diffuse=Color((0.9, 0.1, 0.1)))
 GROUND = np.array([[-300, -300, -1.2], [300, -300, -1.2], [300, 300, -1.2], [-300, 300, -1.2]], float)
 
 

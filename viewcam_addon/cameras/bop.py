@@ -24,7 +24,7 @@ _FOLDERS = ("rgb", "gray")
 _UNITS = "BOP counts in millimeters: a scale of 0.001 makes them meters"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return _document(source) is not None
 
 

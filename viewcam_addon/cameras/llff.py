@@ -20,7 +20,7 @@ FILE = "poses_bounds.npy"
 _FOLDERS = ("images", "images_4", "images_8")
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return _array(source) is not None
 
 

@@ -147,6 +147,19 @@ def refuse_mirrored(cameras: Iterable[Camera], written: str) -> None:
         raise InputError(f"{written} can't say that a camera is mirrored, as in {several(mirrored)}: make its scale positive")
 
 
+def refuse_shifted(cameras: Iterable[Camera], written: str, square: bool) -> None:
+    """Raise InputError if a camera's principal point is not the middle, or, if `square`, its pixels are not square.
+
+    written : what can't say it, as a sentence names it.
+    """
+    for camera in cameras:
+        pinhole = camera.pinhole
+        if pinhole.principal_point != (pinhole.width / 2, pinhole.height / 2):
+            raise InputError(f"{written} can't say that a camera is shifted, as {checks.quoted(camera.name)} is")
+        if square and pinhole.distance[0] != pinhole.distance[1]:
+            raise InputError(f"{written} has square pixels, and those of {checks.quoted(camera.name)} are none")
+
+
 def _is_unseen(character: str) -> bool:
     """True if it is no character of a line of text: a control or format character, half of one, or a line's end."""
     category = unicodedata.category(character)

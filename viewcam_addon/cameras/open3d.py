@@ -18,7 +18,7 @@ TITLE = "camera parameters and trajectories of Open3D (JSON)"
 _ONE, _SEVERAL = "PinholeCameraParameters", "PinholeCameraTrajectory"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return source.document.get("class_name") in (_ONE, _SEVERAL)
 
 

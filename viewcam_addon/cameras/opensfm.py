@@ -29,7 +29,7 @@ _LENSES = {
 }
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return bool(_reconstructions(source))
 
 

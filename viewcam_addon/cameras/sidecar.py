@@ -17,7 +17,7 @@ from ..pinhole import Pinhole
 from . import naming
 from .axes import camera_to_world, intrinsics, world_to_camera
 from .camera import Camera, Options
-from .distortion import Lens
+from .distortion import Lens, settle
 from .source import Record, Source
 
 TITLE = "the sidecars of a batch"
@@ -57,13 +57,13 @@ def record(pinhole: Pinhole, camera_data: CameraData | None = None, lens: Lens |
     }
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return _is_ours(source) or any(map(_is_ours, source.files("*.json")))
 
 
-def read(source: Source, _options: Options) -> list[Camera]:
+def read(source: Source, options: Options) -> list[Camera]:
     files = [source] if not source.is_folder else [file for file in source.files("*.json") if _is_ours(file)]
-    return [_camera(file) for file in files]
+    return [_camera(file, options) for file in files]
 
 
 def write(cameras: Sequence[Camera], _options: Options) -> dict[str, str]:
@@ -78,7 +78,7 @@ def _is_ours(source: Source) -> bool:
     return {"camera", "cameraToWorld", "worldToCamera", "K"} <= source.document.keys()
 
 
-def _camera(source: Source) -> Camera:
+def _camera(source: Source, options: Options) -> Camera:
     document = Record(source.document, source.name)
     camera = document.record("camera")
     fields = {field.name for field in dataclasses.fields(Pinhole)}
@@ -88,5 +88,10 @@ def _camera(source: Source) -> Camera:
         raise InputError(f"{camera.place} has no {min(missing)}: it can't be a camera without")
     preview = next((document.get(key) for key in ("preview", "image") if isinstance(document.get(key), str)), None)
     name = naming.stem(preview) if preview else source.path.stem if source.path else "camera"
-    lens = Lens.from_json(document.record("lens").values) if "lens" in document else None
-    return Camera(name, Pinhole(**camera.values), image=preview, lens=lens)
+    pinhole = Pinhole(**camera.values)
+    lens: Lens | None = None
+    notes: tuple[str, ...] = ()
+    if "lens" in document:
+        stated = Lens.from_json(document.record("lens").values)
+        lens, notes = settle(stated, pinhole.plane, camera.place, options.without_distortion)
+    return Camera(name, pinhole, notes=notes, image=preview, lens=lens)

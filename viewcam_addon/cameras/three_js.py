@@ -25,7 +25,7 @@ SUFFIX = ".json"
 _DEEPEST = 50
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return bool(_tops(source))
 
 

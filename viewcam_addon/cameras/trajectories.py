@@ -31,7 +31,7 @@ _W_FIRST = re.compile(r"^#.*\bq_?w\b.*\bq_?x\b", re.MULTILINE)
 _KITTI_STEP = 0.1  # seconds; its pictures are taken at 10 Hz
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return _kind(source) is not None
 
 

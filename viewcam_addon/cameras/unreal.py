@@ -16,7 +16,7 @@ from .camera import Camera, Options
 TITLE = "Unreal camera poses (CSV)"
 SUFFIX = ".csv"
 
-_CENTIMETRES = 100.0
+_CENTIMETERS = 100.0
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
@@ -45,7 +45,7 @@ def _continued(quaternion: axes.Quaternion, before: axes.Quaternion) -> axes.Qua
 def _line(camera: Camera, quaternion: axes.Quaternion) -> str:
     pinhole = camera.pinhole
     qw, qx, qy, qz = quaternion
-    place = [_CENTIMETRES * part for part in (pinhole.eye[0], -pinhole.eye[1], pinhole.eye[2])]
+    place = [_CENTIMETERS * part for part in (pinhole.eye[0], -pinhole.eye[1], pinhole.eye[2])]
     fov = centered_field_of_view(camera, "Unreal")[0]
     name = camera.name.replace('"', '""')
     name = f'"{name}"' if any(sign in name for sign in ',"\n\r') else name

@@ -39,7 +39,7 @@ def write(comparison: GeometryComparison | RadianceComparison, path: str | os.Pa
     """
     picture, words, scale = _of_light(comparison) if isinstance(comparison, RadianceComparison) else _of_geometry(comparison)
     _write(picture, path)
-    return {"image": str(path), "colours": words, "scale": scale}
+    return {"image": str(path), "colors": words, "scale": scale}
 
 
 def write_sides(
@@ -104,10 +104,10 @@ def _of_geometry(comparison: GeometryComparison) -> tuple[pictures.Picture, str,
     levels = pictures.on_scale(comparison.maps[row.name], low, high) if row.count else None
     marks = pictures.stain(comparison.mismatches, size)
     drawn = np.zeros(marks.shape[:2], np.uint8) if levels is None else levels
-    colours = _painted(drawn, pictures.colour_scale())
-    marks = marks[: len(colours), : len(colours[0])]
+    colors = _painted(drawn, pictures.color_scale())
+    marks = marks[: len(colors), : len(colors[0])]
     share = marks[..., 3:] / 255.0
-    blended = np.round(colours * (1 - share) + marks[..., :3] * share).astype(np.uint8)
+    blended = np.round(colors * (1 - share) + marks[..., :3] * share).astype(np.uint8)
     unit = "px" if row.unit == "px" else "of the depth"
     words = f"Dark {figure(low)} {unit} off, light {figure(high)} {unit}. Another surface seen: red, or teal where explained"
     return blended, words, {"kind": "logarithmic", "low": low, "high": high, "unit": unit}

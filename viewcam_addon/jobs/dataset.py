@@ -83,7 +83,7 @@ def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suf
     if missing:
         return f"no dataset is written, since {len(missing)} of {len(shots)} shots are missing: {several(missing)}"
     cameras = [replace(_camera(folder, name, record), image=f"{name}.{suffix}") for name, record in records.items()]
-    top, frames = _labelled(records)
+    top, frames = _labeled(records)
     model, points = folder.path.joinpath(*MODEL), 0
     if {"depth_file_path", "mask_path"} <= frames[0].keys():
         told = [(path, label_files.read(path)) for path in (folder.path / f"{name}.labels.json" for name in records)]
@@ -112,7 +112,7 @@ def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suf
     return f"dataset of {len(cameras)} pictures{of_points}: {folder.path / transforms.FILE} and {model}"
 
 
-def _labelled(records: Mapping[str, Mapping[str, Any]]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+def _labeled(records: Mapping[str, Mapping[str, Any]]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """The keys at the top of transforms.json and those of each frame that say which labels all shots have."""
     told = {name: record.get("labels", {}) for name, record in records.items()}
     steps = {each["depth_steps"] for each in told.values() if each}

@@ -102,7 +102,7 @@ class Tracing(child_process.ServerOnDemand):
         may_be_empty : whether pictures that show no object are different, and no error.
         is_first_round : of a job that finds a bias: else the samples are added to those of the calls before.
 
-        Returns `passed`, `answer`, `sentence` and `not_modelled` as comparison/answer.py has them; `lines` for a terminal;
+        Returns `passed`, `answer`, `sentence` and `not_modeled` as comparison/answer.py has them; `lines` for a terminal;
         `seconds`, how long it was traced; `result`, all that --json has; and `figures`, the few of them that a sidecar keeps:
         of geometry `pixels` compared, `position` in pixels, `share_of_tolerance` of each pass where it is largest,
         `mismatches`, and `conversion`, the stated camera against this one; of light its `samples` and `quantities`. None is

@@ -58,7 +58,7 @@ class _Sampled(NamedTuple):
     source: NDArray[np.intp]
     depth: Array
     state: NDArray[np.int64]
-    colours: NDArray[np.uint8]
+    colors: NDArray[np.uint8]
 
 
 def write(folder: Path, output: Path, points: int = POINTS, overwrite: bool = False) -> dict[str, int]:
@@ -109,7 +109,7 @@ def tracks_of(
     for number, (view, (path, document)) in enumerate(zip(views, pictures, strict=True)):
         with files.understood(path):
             depth, state, ids = _planes(path, document, states)
-            pieces.append(_sampled(number, view, depth, state, _colours(path, document, ids), points))
+            pieces.append(_sampled(number, view, depth, state, _colors(path, document, ids), points))
     sampled = _Sampled(*map(np.concatenate, zip(*pieces, strict=True)))
     for number, (view, (path, document)) in enumerate(zip(views, pictures, strict=True)):
         visible.append(_visible(sampled, number, view, *_planes(path, document, states)[:2]))
@@ -119,7 +119,7 @@ def tracks_of(
     new = np.cumsum(often) - 1
     return colmap.Tracks(
         sampled.positions[often],
-        sampled.colours[often],
+        sampled.colors[often],
         [(new[which[often[which]]], places[often[which]]) for which, places in visible],
     )
 
@@ -149,7 +149,7 @@ def _ply(tracks: colmap.Tracks) -> bytes:
         *((name, "u1") for name in ("red", "green", "blue")),
     ]
     vertices = np.zeros(len(tracks.positions), types)
-    for names, columns in (("x", "y", "z"), tracks.positions), (("red", "green", "blue"), tracks.colours):
+    for names, columns in (("x", "y", "z"), tracks.positions), (("red", "green", "blue"), tracks.colors):
         for name, column in zip(names, np.transpose(columns), strict=True):
             vertices[name] = column
     kinds = {"<f4": "float", "u1": "uchar"}
@@ -160,17 +160,17 @@ def _ply(tracks: colmap.Tracks) -> bytes:
     )
 
 
-def _colours(path: Path, document: Document, ids: NDArray[np.float32]) -> NDArray[np.uint8]:
+def _colors(path: Path, document: Document, ids: NDArray[np.float32]) -> NDArray[np.uint8]:
     """(height, width, 3): the picture beside a label file, if it is a PNG, or else its ids."""
     picture = files.photograph(path, document)
     if picture is None or picture.suffix != ".png":
-        return files.id_colours(ids)
+        return files.id_colors(ids)
     try:
         pixels = decoded(picture.read_bytes())
     except (OSError, ValueError) as error:
         raise InputError(f"{picture} is no PNG of 8 or 16 bits that can be read: render it again, or move it away") from error
-    colours = pixels[..., :3] if pixels.shape[-1] > 2 else np.repeat(pixels[..., :1], 3, axis=-1)
-    return (colours >> 8 * (colours.dtype.itemsize - 1)).astype(np.uint8)
+    colors = pixels[..., :3] if pixels.shape[-1] > 2 else np.repeat(pixels[..., :1], 3, axis=-1)
+    return (colors >> 8 * (colors.dtype.itemsize - 1)).astype(np.uint8)
 
 
 def _planes(path: Path, document: Document, states: dict[str, int]) -> tuple[Array, NDArray[np.int64], NDArray[np.float32]]:
@@ -202,7 +202,7 @@ def _has_no_points(folder: Path) -> bool:
 
 
 def _sampled(
-    number: int, view: cameras.Camera, depth: Array, state: NDArray[np.int64], colours: NDArray[np.uint8], points: int
+    number: int, view: cameras.Camera, depth: Array, state: NDArray[np.int64], colors: NDArray[np.uint8], points: int
 ) -> _Sampled:
     rows, columns = np.nonzero(state >= 0)
     rank = (columns * _EVENLY[0] + rows * _EVENLY[1]) % 1.0
@@ -213,7 +213,7 @@ def _sampled(
     u, v, w = camera.basis()
     z = depth[rows, columns]
     positions = np.array(camera.eye) + z[:, None] * (x[:, None] * u + y[:, None] * v - w)
-    return _Sampled(positions, np.full(len(z), number), z, state[rows, columns], colours[rows, columns])
+    return _Sampled(positions, np.full(len(z), number), z, state[rows, columns], colors[rows, columns])
 
 
 def _visible(

@@ -87,7 +87,7 @@ def _content(ending: str, values: NDArray[np.float32], depth_steps: float) -> by
     if ending == "depth.png":
         return encoded(depth_levels(values[..., 0], depth_steps))
     if ending == "instances.png":
-        return encoded(id_colours(values[..., 0]))
+        return encoded(id_colors(values[..., 0]))
     return middlebury(values) if ending.endswith(".flo") else encoded(np.uint8(255) * (values[..., 0] != 0).astype(np.uint8))
 
 
@@ -258,7 +258,7 @@ def depth_levels(depth: NDArray[np.float32], steps: float) -> NDArray[np.uint16]
     return np.where((depth < BACKGROUND_DEPTH) & (levels <= 65535), levels, 0).astype(np.uint16)
 
 
-def id_colours(ids: NDArray[np.float32]) -> NDArray[np.uint8]:
+def id_colors(ids: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Ids as COCO's panoptic PNG has them: R + 256 G + 65536 B; 0 where nothing is."""
     whole = ids.astype(np.uint32)
     return np.stack([whole & 255, whole >> 8 & 255, whole >> 16], axis=-1).astype(np.uint8)

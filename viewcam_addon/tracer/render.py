@@ -28,7 +28,7 @@ __all__ = ["Keeper", "Passes", "Stopped", "Tracer", "Watcher", "render"]
 BAND = 16
 # The sampler tells no more of them apart (core/samplers/sobol.h).
 MOST_SAMPLES = 2**24
-CENTRES = ("Depth", "Object Index")
+CENTERS = ("Depth", "Object Index")
 """The passes that tell what is at the pixels' centers, at the levels of light."""
 SLOPES = ("UV Slope", "Normal Slope")
 """The passes that `Tracer.surfaces_at` has beside the passes of level `geometry`."""
@@ -93,17 +93,17 @@ class Tracer:
         error, steps : as in `render`; with an error there is the pass Sample Count, too.
         """
         names = LIGHT_PASSES if error is None else (*LIGHT_PASSES, "Sample Count")
-        passes = self._blank(lambda shape: _dark(shape, names) | unwritten(shape, CENTRES))
+        passes = self._blank(lambda shape: _dark(shape, names) | unwritten(shape, CENTERS))
         light = CoreLight(self._core, self._scene, level, samples, seed, error)
         width, height = self._camera.width, self._camera.height
-        centres = {name: passes[name] for name in CENTRES}
+        centers = {name: passes[name] for name in CENTERS}
         steps = steps or (samples,)
         for step in steps:
 
             def trace(tile: tuple[int, int], stop: int, step: int = step) -> None:
                 row, column = tile
                 if column == 0 and step == steps[0]:
-                    self._core.render_geometry(centres, range(row, min(row + native.TILE, height)), stop)
+                    self._core.render_geometry(centers, range(row, min(row + native.TILE, height)), stop)
                 light.trace(passes, row, column, step, stop)
 
             left = {first: -(-width // native.TILE) for first in range(0, height, native.TILE)}  # tiles of each band of rows

@@ -142,7 +142,7 @@ def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
     assert lines[0][1] == "Rendering with Cycles" and lines[-1][1] == "Comparing"
     rows = dict(outcome.rows)
     assert rows["Median"].endswith(" px") and "Mismatches" in rows and rows["Modeled"] == "1 of 1 objects"
-    assert outcome.report.is_file() and all(path.is_file() for path in outcome.pictures.values()) and outcome.colours
+    assert outcome.report.is_file() and all(path.is_file() for path in outcome.pictures.values()) and outcome.colors
     assert "check untitled.blend --camera Camera --level geometry" in outcome.report.read_text()
     exported = json.loads((outcome.folder / "scene.json").read_text())
     assert "0.25" in json.dumps(exported["objects"]), "the edit is not in the picture that was compared"
@@ -191,14 +191,14 @@ def test_light_is_compared_with_as_many_samples_as_it_takes(seen, add_lamp):
     outcome = proof.background.latest
     assert outcome.answer == SAME, outcome.verdict
     assert outcome.what == "Camera, frame 1, direct" and "Light, to Tracer's" in dict(outcome.rows)
-    assert "Orange where Cycles is brighter" in outcome.colours
+    assert "Orange where Cycles is brighter" in outcome.colors
     assert set(outcome.pictures) == {"cycles", "tracer", "difference"}, "all of it is modeled"
     page = outcome.report.read_text(encoding="utf-8")
     assert "--find 2%" in page and "--clay" in page
     assert len(list(outcome.folder.glob("cycles-*.exr"))) == 8
 
 
-def test_cancelled_while_it_renders_it_leaves_no_process_and_no_file(seen):
+def test_canceled_while_it_renders_it_leaves_no_process_and_no_file(seen):
     seen.render.resolution_x, seen.render.resolution_y = 1920, 1080
     bpy.context.view_layer.update()
     before, there = state(seen), set(Path(bpy.app.tempdir).iterdir())
@@ -256,10 +256,10 @@ def test_a_search_for_a_bias_tells_how_much_longer_it_takes(stand_in):
 
 def test_a_report_that_is_kept_stands_in_its_folder_and_nothing_else_changes_there(stand_in, tmp_path):
     (tmp_path / "own.txt").write_text("the artist's")
-    cancelled = stand_in(keep_in=tmp_path)
-    cancelled.let(4)
-    wait_for((cancelled.folder / "report" / "index.html").exists)
-    cancelled.cancel()
+    canceled = stand_in(keep_in=tmp_path)
+    canceled.let(4)
+    wait_for((canceled.folder / "report" / "index.html").exists)
+    canceled.cancel()
     assert [path.name for path in tmp_path.iterdir()] == ["own.txt"]
     comparison = stand_in(keep_in=tmp_path / "new")
     comparison.let(8)

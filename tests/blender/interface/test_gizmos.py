@@ -79,7 +79,7 @@ def test_up_dragged_into_the_eye_stays(posed_camera, steps):
 
 @pytest.mark.parametrize("mode", ["XYZ", "ZYX", "QUATERNION", "AXIS_ANGLE"])
 @pytest.mark.parametrize("name", NAMES)
-def test_cancelling_restores_all_to_the_bit_though_the_camera_was_not_at_its_values(posed_camera, scene, steps, name, mode):
+def test_canceling_restores_all_to_the_bit_though_the_camera_was_not_at_its_values(posed_camera, scene, steps, name, mode):
     posed_camera.rotation_mode = mode
     posed_camera.virtual_pinhole.pole = "HOLD"
     cameras.CameraSync.of(posed_camera).edited(scene)

@@ -399,7 +399,7 @@ def test_in_the_narrowest_sidebar_no_words_stand_beside_others(posed_camera, eac
         assert (len(rows) > len(set(map(id, rows)))) == is_beside, f"at {width} pixels"
 
 
-def test_a_camera_that_is_not_enabled_shows_its_own_values_greyed_and_one_button(posed_camera):
+def test_a_camera_that_is_not_enabled_shows_its_own_values_grayed_and_one_button(posed_camera):
     """Stored values are stale: its own are where it stands."""
     posed_camera.virtual_pinhole.enabled = False
     posed_camera.location, posed_camera.rotation_euler, posed_camera.data.lens = (0, -8, -1e-8), (math.pi / 2, 0, 0), 50
@@ -453,7 +453,7 @@ def test_what_is_linked_can_not_be_set_by_buttons(posed_camera, tmp_path):
     assert not dead
 
 
-def test_of_an_override_it_is_said_why_lens_and_roll_are_grey(posed_camera, tmp_path):
+def test_of_an_override_it_is_said_why_lens_and_roll_are_gray(posed_camera, tmp_path):
     path = str(tmp_path / "library.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -780,7 +780,7 @@ def test_blenders_panels_that_matter_are_shown(name):
 
 
 @pytest.mark.parametrize("name", ["DATA_PT_light", "DATA_PT_spot", "RENDER_PT_simplify", "RENDER_PT_freestyle"])
-def test_panels_of_what_is_not_modelled_or_is_shown_by_ours_are_not(name):
+def test_panels_of_what_is_not_modeled_or_is_shown_by_ours_are_not(name):
     assert "VIEWCAM" not in engines_of_panels()[name]
 
 

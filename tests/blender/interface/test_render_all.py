@@ -115,7 +115,7 @@ def test_it_tells_how_far_it_is_and_ends_with_the_contact_sheet(two, stand_in, t
     assert (own_picture._numbers(two), two.camera, bpy.data.is_dirty) == before
 
 
-def test_cancelled_it_leaves_the_pictures_that_are_there_and_no_process(two, stand_in, tmp_path):
+def test_canceled_it_leaves_the_pictures_that_are_there_and_no_process(two, stand_in, tmp_path):
     rendering = render_all.Rendering(two, tmp_path)
     ends = time.monotonic() + 60
     while rendering.progress()[0] == 0 and time.monotonic() < ends:

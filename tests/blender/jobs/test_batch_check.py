@@ -139,10 +139,8 @@ def test_shots_of_four_values_and_of_a_camera_pass_and_their_figures_say_so(stag
     assert all(each["verdict"].startswith("The same picture") for each in checks.values())
     bent = ["Suzanne: material 'Bumpy' turns the normals, and a plain one stands in"]
     assert [each["ledger"] for each in checks.values()] == [bent] * 3
-    assert all(each["answer"] == "same_but" and each["not_modelled"]["names"] == ["Suzanne"] for each in checks.values()), (
-        checks
-    )
-    assert all(0.01 < each["not_modelled"]["share"] < 0.9 for each in checks.values()), checks
+    assert all(each["answer"] == "same_but" and each["not_modeled"]["names"] == ["Suzanne"] for each in checks.values()), checks
+    assert all(0.01 < each["not_modeled"]["share"] < 0.9 for each in checks.values()), checks
     assert checks["left"]["figures"]["conversion"]["share"] <= 1
     assert checks["as it stands"]["figures"]["conversion"] is None, "nobody stated it"
 

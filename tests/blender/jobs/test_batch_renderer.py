@@ -512,7 +512,7 @@ def test_a_colmap_model_is_rendered_camera_by_camera_and_comes_back(blend, tmp_p
             assert np.abs(np.array(pinhole.eye) - exact.eye).max() <= (0 if form == "transforms" else 1e-14)
 
 
-def test_a_mirrored_camera_with_y_up_in_centimetres_renders_as_such(blend, tmp_path):
+def test_a_mirrored_camera_with_y_up_in_centimeters_renders_as_such(blend, tmp_path):
     pytest.importorskip("pxr", reason="make test installs what reads USD")
     wanted = Options(axes="y_up", scale=0.01)
     cameras.save([Camera("left", MIRRORED)], tmp_path / "camera.usda", "usd", wanted)

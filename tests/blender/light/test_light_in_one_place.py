@@ -55,7 +55,7 @@ def test_light_on_surfaces_in_one_place_is_taken_out_and_named(room, tmp_path, r
     assert comparison.answer.answer == "same_but", comparison.sentence
     assert set(comparison.taken_out.names) == {"Floor", kind.capitalize()}
     assert 0.02 < comparison.taken_out.pixels.mean() < 0.9
-    assert 0.02 < comparison.not_modelled.share < 0.9 and set(comparison.not_modelled.names) == {"Floor", kind.capitalize()}
+    assert 0.02 < comparison.not_modeled.share < 0.9 and set(comparison.not_modeled.names) == {"Floor", kind.capitalize()}
     brighter = tuple(replace(lamp, irradiance=tuple(1.03 * x for x in lamp.irradiance)) for lamp in exported.lamps)
     assert not compared(replace(exported, lamps=brighter), level, tests, exported).passed
 
@@ -137,7 +137,7 @@ def test_light_past_what_not_all_rays_see_is_taken_out_and_named(lit_past_a_shee
     assert comparison.passed, "\n".join(comparison.lines())
     assert comparison.taken_out.seen_otherwise.keys() == {name} and not comparison.pairs
     assert 0.02 < comparison.taken_out.pixels.mean() < 0.7
-    assert comparison.not_modelled.names == (name,)
+    assert comparison.not_modeled.names == (name,)
     if light != "shadowless":  # which the ledger tells as approximated already
         assert "but for 1 shadow that not all rays see" in comparison.sentence and "not modeled" not in comparison.sentence
     brighter = [replace(image, passes={**image.passes, "Combined": 1.03 * image["Combined"]}) for image in tests]

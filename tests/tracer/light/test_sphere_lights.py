@@ -138,15 +138,15 @@ def test_every_sample_looks_where_rays_run_into_the_lamp_and_carries_its_radianc
     """The same light over the same density for all samples: they are spread evenly over the solid angle."""
     assume(abs(radius - 2) > 1e-6)  # on the sphere itself, where a rounding decides what is inside
     rng = np.random.default_rng(seed)
-    centre = unit(rng) * 2
-    lighting = make_lighting(point(7.0, centre, radius=radius, soft_falloff=soft))
-    aimed, cosine = lighting.aimed((0, 0, 0), centre, 200)
+    center = unit(rng) * 2
+    lighting = make_lighting(point(7.0, center, radius=radius, soft_falloff=soft))
+    aimed, cosine = lighting.aimed((0, 0, 0), center, 200)
     ahead = aimed.direction
-    inwards = 1e-7 * centre[:, None] / 2  # rays along the outline may miss by a rounding
+    inwards = 1e-7 * center[:, None] / 2  # rays along the outline may miss by a rounding
     ahead = (ahead + inwards) / np.linalg.norm(ahead + inwards, axis=0)
     seen = lighting.seen(np.zeros((3, 200)), ahead)
     assert seen[0] == pytest.approx(np.full(200, 7 / (4 * np.pi**2 * radius**2)), rel=1e-12)
-    at = ahead * aimed.distance - centre[:, None]
+    at = ahead * aimed.distance - center[:, None]
     if not soft:
         assert np.linalg.norm(at, axis=0) == pytest.approx(np.full(200, radius), rel=1e-5, abs=1e-6)
     if radius <= 2 or soft:  # else the point is inside

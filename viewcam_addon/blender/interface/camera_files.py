@@ -77,7 +77,7 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, file_menu.IntoScene, bpy.types.O
             paths = self._paths()
             read_cameras, notes, kinds = [], [], set()
             for path in paths:
-                kinds.add(formats.recognised(path))
+                kinds.add(formats.recognized(path))
                 more, more_notes = read(path, context.scene, self.distance, self)
                 read_cameras, notes = read_cameras + more, notes + more_notes
             as_flight = self.made == "FLIGHT" or (self.made == "BY_FILE" and kinds == {"trajectories"})
@@ -141,7 +141,7 @@ def read(
     base = None
     if distance > 0:
         plane = ViewPlane((distance, distance * aspect), (width / 2, height / 2), width, height)
-    elif formats.recognised(path) == "trajectories":
+    elif formats.recognized(path) == "trajectories":
         camera_object = datablocks.render_camera(scene)
         if camera_object is None:
             raise InputError(f"{path.name} says where the camera is but not how it sees: give the Distance in pixels")

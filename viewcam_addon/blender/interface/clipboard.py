@@ -124,7 +124,7 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
         cls = type(self)
         try:
             text = self.text or _clipboard()
-            formats.recognised(text)
+            formats.recognized(text)
         except InputError:
             return self.execute(context)
         try:
@@ -154,7 +154,7 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
         findings = paste(camera, before, camera_object, scene, self.set_size)
         self.report({"INFO"}, f"Pasted {_said(camera.pinhole, before)} on {camera_object.name}")
         is_lying = camera.pinhole.up == _Y_UP != before.up == preferences.up_axis()
-        if is_lying and self.axes == "as_is" and formats.recognised(text) != OWN:
+        if is_lying and self.axes == "as_is" and formats.recognized(text) != OWN:
             findings.append("In this text y is up, and in the scene it is not: the arrow beside Paste has Paste Upright")
         for finding in findings:  # after it, since the status bar shows what was reported last
             self.report({"WARNING"}, finding)

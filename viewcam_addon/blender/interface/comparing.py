@@ -50,7 +50,7 @@ class Outcome:
     what : of what it was: camera, frame and level. camera : the camera's name. seen : the camera then, None if it was none.
     answer : one of comparison/answer.py's, None where there is none. verdict : one sentence. headline : a few words of it.
     rows : (label, text) of the figures. lacking : (object, sentence) of what is not modeled as it is.
-    folder : that of the report. colours : what those of the difference say. scale : their ends, as difference.write has them.
+    folder : that of the report. colors : what those of the difference say. scale : their ends, as difference.write has them.
     temporary : what `discard` removes.
     """
 
@@ -63,7 +63,7 @@ class Outcome:
     rows: tuple[tuple[str, str], ...] = ()
     lacking: tuple[tuple[str, str], ...] = ()
     folder: Path | None = None
-    colours: str = ""
+    colors: str = ""
     scale: dict[str, Any] = field(default_factory=dict)
     temporary: Path | None = None
 
@@ -213,7 +213,7 @@ class RunningComparison:
             tuple(figures(result)),
             tuple(lacking(result["ledger"])),
         )
-        return Outcome(*of, *verdict, folder, drawn.get("colours", ""), drawn.get("scale", {}), temporary)
+        return Outcome(*of, *verdict, folder, drawn.get("colors", ""), drawn.get("scale", {}), temporary)
 
     def _said(self) -> str:
         return (self.folder / _SAID).read_text(encoding="utf-8", errors="replace")
@@ -271,7 +271,7 @@ def headline(result: dict[str, Any]) -> str:
     if result["answer"] == DIFFERENT:
         return "Cycles renders another picture"
     words = _agreement(result)
-    return f"{words}, {but_for(result['not_modelled'])}" if result["answer"] == SAME_BUT else words
+    return f"{words}, {but_for(result['not_modeled'])}" if result["answer"] == SAME_BUT else words
 
 
 def _agreement(result: dict[str, Any]) -> str:

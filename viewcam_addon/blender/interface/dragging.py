@@ -1,7 +1,7 @@
 """Moves of the camera that follow the mouse: orbit, dolly, dolly zoom, truck, or a typed number in the mouse's place.
 
 `Drag` is what goes on, and knows no event; the operator in moving.py feeds it. Every change starts from the camera as it was,
-so that nothing adds up, and cancelling gives it back to the bit (kept.py).
+so that nothing adds up, and canceling gives it back to the bit (kept.py).
 """
 
 import contextlib

@@ -282,7 +282,7 @@ def _draw_figures(layout: bpy.types.UILayout, outcome: Outcome, context: bpy.typ
     column = body.column(align=True)
     for label, text in outcome.rows:
         panel_rows.described(column, context, label, (text,), share=0.46)
-    panel_rows.sentence(column, context, outcome.colours)
+    panel_rows.sentence(column, context, outcome.colors)
 
 
 def _is_playing(context: bpy.types.Context) -> bool:

@@ -39,7 +39,7 @@ from ..temporary_settings import Overrides, numbered_indices, overridden
 from . import obstacles, origins, persistent_data, pictures
 from .checking import Checker
 from .job_settings import JobSettings
-from .labelling import ShotLabels
+from .labeling import ShotLabels
 from .stage import staged
 
 _NAME = "viewcam batch"
@@ -172,7 +172,7 @@ class BlenderRenderer:
         }
 
     def label(self, shot: Job, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
-        """Write the labels of the shot that was just rendered beside a picture; the names of their files (labelling.py).
+        """Write the labels of the shot that was just rendered beside a picture; the names of their files (labeling.py).
 
         Raises
         ------
@@ -210,7 +210,7 @@ class BlenderRenderer:
         ------
         InputError
             if there is no such camera, or one that is no pinhole.
-        NotModelledError
+        NotModeledError
             if `strict` and anything is approximated or left out.
         """
         self._set(job)

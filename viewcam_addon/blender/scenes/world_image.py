@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...files import temporary_folder
-from ...tracer.scene.colours import LARGEST_RADIANCE
+from ...tracer.scene.colors import LARGEST_RADIANCE
 from ...tracer.scene.lamps import RAYS, Sun, World
 from ...tracer.scene.materials import Picture
 from .. import another_blender, versions
