@@ -118,7 +118,7 @@ def document(
 
 
 def _said_of_world(cameras: Sequence[Camera]) -> dict[str, Any]:
-    """What was done to the world of the file that the cameras were read from, as nerfstudio says it: p′ = scale (R p + t)."""
+    """The keys for what was done to the world that the cameras were read in, as nerfstudio has them: p′ = scale (R p + t)."""
     worlds = {camera.world for camera in cameras}
     if len(worlds) != 1 or (world := worlds.pop()) is None:
         return {}
