@@ -444,7 +444,7 @@ def test_gaussian_splattings_principal_point_counts_where_it_is_said():
 
 
 def nerfstudio_path(*known, fov=None):
-    """As get_path_from_json takes it: the focal length is height / 2 / tan(fov / 2)."""
+    """A path as get_path_from_json takes it: the focal length is height / 2 / tan(fov / 2)."""
     path = [
         {
             "camera_to_world": [*each.opengl.ravel().tolist(), 0, 0, 0, 1],
@@ -508,11 +508,11 @@ def test_open3d_has_column_after_column_and_counts_from_the_first_pixels_center(
 def opensfm(known, **camera):
     rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_matrix(known.opencv).as_rotvec().tolist()
     longer = max(known.width, known.height)
-    said = {"projection_type": "brown", "width": known.width, "height": known.height}
-    said |= {"focal_x": known.f_x / longer, "focal_y": known.f_y / longer}
-    said |= {"c_x": (known.c_x - known.width / 2) / longer, "c_y": (known.c_y - known.height / 2) / longer}
+    entry = {"projection_type": "brown", "width": known.width, "height": known.height}
+    entry |= {"focal_x": known.f_x / longer, "focal_y": known.f_y / longer}
+    entry |= {"c_x": (known.c_x - known.width / 2) / longer, "c_y": (known.c_y - known.height / 2) / longer}
     shot = {"rotation": rotation, "translation": (-known.opencv @ known.e).tolist(), "camera": "c"}
-    return [{"cameras": {"c": said | camera}, "shots": {"a.jpg": shot}, "points": {}}]
+    return [{"cameras": {"c": entry | camera}, "shots": {"a.jpg": shot}, "points": {}}]
 
 
 @pytest.mark.parametrize("name", UNMIRRORED)

@@ -23,7 +23,7 @@ EDGES = (
 )
 
 
-_made = []  # camera, its matrix while the photo was taken, the ends of the edges as it shows them, and what it is now
+_photo = []  # camera, its matrix while the photo was taken, the ends of the edges as it shows them, and what it is now
 
 
 def make_a_photo():
@@ -55,7 +55,7 @@ def make_a_photo():
     region("VIEW_3D", "WINDOW")[0].spaces.active.region_3d.view_perspective = "CAMERA"
     yield from settle()
     push_undo("before")
-    _made[:] = matrix, seen, room("interface.kept").state(camera)
+    _photo[:] = matrix, seen, room("interface.kept").state(camera)
 
 
 def _draw_the_edges():
@@ -69,7 +69,7 @@ def _draw_the_edges():
     yield from settle()
     assert matching._drawn is not None and matching._drawn.frame is not None
     left, bottom, right, top = matching._drawn.frame
-    for (axis, *_), ends in zip(EDGES, _made[1], strict=True):
+    for (axis, *_), ends in zip(EDGES, _photo[1], strict=True):
         (x0, y0), (x1, y1) = [(part.x + left + u * (right - left), part.y + bottom + v * (top - bottom)) for u, v in ends]
         press(axis, *NOWHERE)
         yield
@@ -88,7 +88,7 @@ def _draw_the_edges():
 
 
 def _is_as_before():
-    return room("interface.kept").state(bpy.data.objects["Camera"]) == _made[2]
+    return room("interface.kept").state(bpy.data.objects["Camera"]) == _photo[2]
 
 
 def escape_from_a_match():
@@ -110,7 +110,7 @@ def match_a_photo():
     yield
     yield
     bpy.context.view_layer.update()
-    camera, matrix = bpy.data.objects["Camera"], _made[0]
+    camera, matrix = bpy.data.objects["Camera"], _photo[0]
     low, high = result.distance_between
     off = np.degrees(np.arccos(np.clip((np.array(camera.matrix_world)[:3, 2] @ matrix[:3, 2]), -1, 1)))
     print(f"{camera.data.lens:.2f} mm of {LENS:g}, {off:.3f}° off, d from {low:.1f} to {high:.1f} px", flush=True)
