@@ -34,11 +34,13 @@ NO_MIRROR = (
     "vtk",
     "textbook",
     "nerfstudio_path",
+    "instant_ngp",
+    "gaussian_splatting",
 )
-NO_SHIFT = ("gltf", "textbook", "nerfstudio_path")
-SQUARE = ("mitsuba", "vtk", "textbook", "nerfstudio_path")
+NO_SHIFT = ("gltf", "textbook", "nerfstudio_path", "instant_ngp", "gaussian_splatting")
+SQUARE = ("mitsuba", "vtk", "textbook", "nerfstudio_path", "instant_ngp")
 NO_POSE = ("ros",)
-ANGLES = ("gltf", "nerfstudio_path")
+ANGLES = ("gltf", "nerfstudio_path", "instant_ngp")
 """Formats that say the distance by an angle, so that a wide or narrow one keeps fewer digits."""
 WRITTEN = [form for form in cameras.writable() if form not in ("unity", "unreal")]
 SEVERAL = ("sidecar", "transforms", "colmap", "colmap_binary", "bop", "gltf", "usd", "three_js", "mitsuba")
@@ -268,7 +270,7 @@ def test_several_are_written_in_their_order_and_none_is_chosen_silently(tmp_path
 
 NUMBERED = ("bop",)
 """Formats that have no place for a camera's name."""
-OF_PICTURES = ("sidecar", "transforms", "gltf", "mitsuba")
+OF_PICTURES = ("sidecar", "transforms", "gltf", "mitsuba", "gaussian_splatting")
 """Formats whose cameras are called as their pictures are, or by an identifier."""
 names = st.sampled_from(["left", "right", "Kamera 1", "größer", "a{b}", "x.y", "it's", "\u3042", '"quoted"', "# / , ;"])
 
@@ -285,7 +287,7 @@ def test_several_cameras_are_read_as_they_were_written_to_the_bit_and_by_name(tm
     written = [Camera(name, fitting(data.draw(pinholes()), form)) for name in called]
     if form in NUMBERED:  # whose pictures say their size
         written = [replace(camera, pinhole=replace(camera.pinhole, width=640, height=360)) for camera in written]
-    if form == "nerfstudio_path":  # which has one size for all
+    if form in ("nerfstudio_path", "instant_ngp"):  # which have one size for all
         sizes = {"width": 640, "height": 360, "principal_point": None}
         written = [replace(camera, pinhole=replace(camera.pinhole, **sizes)) for camera in written]
     options = Options(

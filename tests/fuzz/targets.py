@@ -513,6 +513,9 @@ CAMERAS = (
     *("tum", "kitti", "euroc", "chan", "three_js", "mitsuba", "mitsuba_dictionary", "pov_ray", "pbrt", "matrices", "look_at"),
     *("vtk", "textbook", "looks", "looks_gl", "looks_vtk", "text", "text_of_people", "colmap_lenses", "opencv_fisheye"),
     *("transforms_lenses", "nerfstudio_path", "open3d", "opensfm"),
+    *("instant_ngp", "kubric", "nvisii", "infinigen", "fspy_exported"),
+    *("realitycapture_table", "visualsfm", "mvsnet", "middlebury", "middlebury_pair", "neus", "kitti_calibration", "pmvs"),
+    "bop_sensor",
 )
 """The kinds of camera_files.py, which makes them only when it is asked."""
 

@@ -10,6 +10,7 @@ import subprocess
 
 import bpy
 import tour_step
+from bpy_extras.object_utils import world_to_camera_view
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Euler, Vector
 from panel_in_a_window import NOWHERE, click, move, open_the_panels, press, region, window
@@ -244,6 +245,43 @@ def drag(start, by, **modifiers):
     window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(x + by[0]), y=int(y + by[1]), **modifiers)
     yield
     yield
+
+
+def seen(camera_object, edges):
+    """Edges (axis, start, end) of the world as a camera sees them now: shares of the picture, from its lower left corner."""
+    scene = bpy.context.scene
+    return [(axis, *(world_to_camera_view(scene, camera_object, Vector(end))[:2] for end in ends)) for axis, *ends in edges]
+
+
+def match_photo(edges):
+    """Steps that begin Match Photo in camera view, and drag along edges of the picture, as `seen` gives them.
+
+    They end with the operator, which goes on, and where the mouse is.
+    """
+    move(*NOWHERE)
+    yield
+    call(bpy.ops.viewcam.match_photo)
+    yield from settle()
+    matching = tour_step.room("interface.photo_matching")._drawn
+    assert matching is not None and matching.frame is not None, "Match Photo has not begun"
+    _, part = region(*VIEWPORT)
+    left, bottom, right, top = matching.frame
+    for axis, *ends in edges:
+        (x0, y0), (x1, y1) = [(part.x + left + u * (right - left), part.y + bottom + v * (top - bottom)) for u, v in ends]
+        press(axis, *NOWHERE)
+        yield
+        move(x0, y0)
+        yield
+        window().event_simulate(type="LEFTMOUSE", value="PRESS", x=int(x0), y=int(y0))
+        yield
+        for share in (0.5, 1.0):
+            move(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
+            yield
+        window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(x1), y=int(y1))
+        yield
+    yield from settle()
+    assert len(matching.drawing.along) == len(edges), matching.drawing.along
+    return matching, (x1, y1)
 
 
 def call(operator, where=VIEWPORT, **properties):

@@ -82,9 +82,6 @@ def _area_and_share(name):
         _, sidebar = region("VIEW_3D", "UI")
         bottom = max(sidebar.y, lowest_button() - BELOW_BUTTONS)
         return (sidebar.x, bottom, sidebar.width, sidebar.y + sidebar.height - bottom), 100
-    if name == "window":
-        empty = 0.29 * window().height  # below the panel
-        return (0, empty, window().width, window().height - empty), 60
     if name == "camera view":
         area, part = region(*VIEWPORT)
         matrix, data = tour_step.camera().matrix_world, tour_step.camera().data

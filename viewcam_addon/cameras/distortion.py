@@ -84,6 +84,11 @@ class Lens:
             case "division":
                 (k,) = self.parameters
                 return 2 * r / (1 + np.sqrt(1 - 4 * k * r * r))
+            case "measured":  # the root of k s³ + s − r that goes to 0 with r
+                (k,) = self.parameters
+                size = math.sqrt(3 * abs(k))
+                triple = 1.5 * size * r
+                return 2 / size * (np.sinh(np.arcsinh(triple) / 3) if k > 0 else np.sin(np.arcsin(triple) / 3))
             case "eucm":
                 alpha, beta = self.parameters
                 return r / (alpha * np.sqrt(beta * r * r + 1) + 1 - alpha)
@@ -100,6 +105,9 @@ class Lens:
             case "division":
                 (k,) = self.parameters
                 return np.where(k * r * r < 1, r / (1 + k * r * r), np.nan)
+            case "measured":
+                (k,) = self.parameters
+                return np.where(1 + 3 * k * r * r > 0, r * (1 + k * r * r), np.nan)
             case "eucm":
                 alpha, beta = self.parameters
                 depth = (1 - beta * alpha * alpha * r * r) / (alpha * np.sqrt(1 - (2 * alpha - 1) * beta * r * r) + 1 - alpha)
@@ -142,7 +150,7 @@ class Lens:
         return np.where(is_right[..., None], inverse, np.nan)
 
 
-PROJECTIONS = ("pinhole", "equidistant", "fov", "division", "eucm")
+PROJECTIONS = ("pinhole", "equidistant", "fov", "division", "measured", "eucm")
 """The laws by which a lens moves a point along its radius, but for its polynomial."""
 
 
@@ -174,6 +182,11 @@ def fisheye(k: Mapping[str, float]) -> Lens:
 def division(k: float, name: str = "k") -> Lens:
     """The division model: a place at the radius r in the photograph is the pinhole's at r / (1 + k r²)."""
     return Lens(((name, k),), "division", (k,))
+
+
+def measured(k: float, name: str = "k") -> Lens:
+    """VisualSFM's model: a place at the radius r in the photograph is the pinhole's at r (1 + k r²). k : not 0."""
+    return Lens(((name, k),), "measured", (k,))
 
 
 def _along_radius(points: np.ndarray, profile: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:

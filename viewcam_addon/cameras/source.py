@@ -2,13 +2,17 @@
 
 Each is parsed once, whoever asks. JSON may have comments, as instant-ngp's has; keys that appear twice are refused, since
 nobody knows which counts. XML is read without a document type, entities or anything outside, and no deeper than 100 elements:
-what attacks XML parsers needs one of these.
+what attacks XML parsers needs one of these. Of an NPZ the small arrays of numbers are read, without pickle.
 """
 
 import codecs
+import contextlib
+import io
 import json
 import re
 import struct
+import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -19,13 +23,14 @@ from xml.parsers import expat
 
 import numpy as np
 
-from .. import checks
+from .. import checks, npy
 from ..errors import InputError
 from ..files import read_bytes
 from . import yaml
 
 _MOST_BYTES = 2**30
 _DEEPEST = 100
+_MOST_BYTES_OF_ARRAY, _MOST_ARRAYS = 2**16, 1000
 _STRING = r'"[^"\\]*(?:\\.[^"\\]*)*"?'
 _COMMENT = re.compile(rf"{_STRING}|//[^\n]*|/\*.*?(?P<end>\*/|\Z)", re.DOTALL)
 _TRAILING_COMMA = re.compile(rf"{_STRING}|,(?=\s*[\]}}])", re.DOTALL)
@@ -184,6 +189,22 @@ class Source:
     def yaml(self) -> dict[str, Any]:
         """The keys of the part of YAML in which cameras are written."""
         return yaml.read(self.text)
+
+    @cached_property
+    def npz(self) -> dict[str, np.ndarray]:
+        """The arrays of an NPZ by their names, of those as small as a camera's are; none if this is no NPZ."""
+        result: dict[str, np.ndarray] = {}
+        if self.data[:4] != b"PK\x03\x04":
+            return result
+        try:
+            with zipfile.ZipFile(io.BytesIO(self.data)) as archive:
+                for name, member in npy.members(archive).items():
+                    if member.file_size < _MOST_BYTES_OF_ARRAY and len(result) < _MOST_ARRAYS:
+                        with contextlib.suppress(ValueError), archive.open(member) as file:
+                            result[name] = npy.read(file.read(member.file_size))  # and no more, whatever is packed there
+        except (ValueError, OSError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error):
+            return {}
+        return result
 
     def file(self, *parts: str) -> "Source | None":
         """The file of that name in the folder, or beside this file; None if there is none."""

@@ -49,8 +49,8 @@ class Drawing:
     like : the camera as it was, whose picture it is. kind : EDGES, RECTANGLE or POINTS. axes : of the rectangle's sides.
     sides : their lengths. origin : of the rectangle, world space. places : of the points, world space.
     ends : pixels, two an edge, or one a corner or point. along : the axis of each edge. axis : of the next. exact : the largest
-    error of what is drawn, pixels of the picture. is_lens_known : it stays as it was. length : world units, of the first edge,
-    which begins at the origin then; 0 where that is not known.
+    error of what is drawn, pixels of the picture. is_lens_known : it stays as it was. is_principal_point_free : edges say where
+    it is. length : world units, of the first edge, which begins at the origin then; 0 where that is not known.
     """
 
     like: Pinhole
@@ -64,6 +64,7 @@ class Drawing:
     axis: str = "X"
     exact: float = 1.0
     is_lens_known: bool = False
+    is_principal_point_free: bool = False
     length: float = 0.0
     taken: int | None = None
 
@@ -114,7 +115,7 @@ class Drawing:
             edges = [(axis, *self.ends[2 * i : 2 * i + 2]) for i, axis in enumerate(self.along)]
             whole = [edge for edge in edges if np.hypot(*np.subtract(edge[2], edge[1])) >= 1.0]
             known = photo_match.KnownEdge(0, self.length, self.origin) if self.length > 0 else None
-            return photo_match.from_edges(whole, self.like, self.exact, distance, known)
+            return photo_match.from_edges(whole, self.like, self.exact, distance, known, self.is_principal_point_free)
         if self.kind == RECTANGLE:
             if len(self.ends) < 4:
                 raise InputError(f"the rectangle has {len(self.ends)} of 4 corners: click the next")
@@ -129,7 +130,12 @@ def summary_of(match: photo_match.Match, lens: float) -> list[str]:
     share = (high - low) / 2 / d
     size = f"{lens:.4g} mm ± {100 * share:.2g} %,  d = {d:.5g} px ± {(high - low) / 2:.2g} px"
     lines = [size if high > low else f"{lens:.4g} mm as it was,  d = {d:.5g} px"]
-    names = {"look_at": "look-at", "up": "roll", "distance": "lens", "eye": "eye"}
+    if match.principal_point_error:
+        middle = match.pinhole.width / 2, match.pinhole.height / 2
+        off = zip(np.subtract(match.pinhole.principal_point, middle), match.principal_point_error, strict=True)
+        right, up = (f"{value:+.4g} ± {error:.2g} px" for value, error in off)
+        lines.append(f"Principal point: {right} to the right of the middle, {up} above it")
+    names = {"look_at": "look-at", "up": "roll", "distance": "lens", "eye": "eye", "principal_point": "principal point"}
     lines.append("In the picture: " + ",  ".join(f"{names[name]} ± {value:.2g} px" for name, value in match.pixels.items()))
     if match.error:
         lines.append(f"What is drawn misses by {match.error:.2g} px")
@@ -169,6 +175,11 @@ class MatchSettings(bpy.types.PropertyGroup):
     )
     is_lens_known: bpy.props.BoolProperty(
         name="Keep the Lens", description="The camera has the photo's lens already, from its EXIF data: only the pose is asked"
+    )
+    is_principal_point_free: bpy.props.BoolProperty(
+        name="Free Principal Point",
+        description="Find the camera's Shift as well, as of a photo that was cropped or taken with a shift lens: it takes "
+        "edges along all three axes, which converge. Else the camera keeps its own",
     )
     length: bpy.props.FloatProperty(
         name="First Edge",
@@ -316,6 +327,7 @@ def begun(camera_object: bpy.types.Object | None, context: bpy.types.Context) ->
         raise InputError("the picture is mirrored or its pixels are not square: a photo's are neither")
     drawing = Drawing(like, settings.kind, settings.axes, tuple(settings.sides), tuple(scene.cursor.location))
     drawing.is_lens_known, drawing.length = settings.is_lens_known, settings.length
+    drawing.is_principal_point_free = settings.is_principal_point_free
     if drawing.kind == POINTS:
         chosen = [each for each in context.selected_objects if each != camera_object]
         drawing.places = tuple(tuple(each.matrix_world.translation) for each in chosen)
@@ -408,6 +420,7 @@ class VIEWCAM_PT_sidebar_match(SubPanel, BelowSidebar, bpy.types.Panel):
             panel_rows.field(column, settings, "axes")
         elif settings.kind == EDGES:
             column.prop(settings, "length")
+            column.prop(settings, "is_principal_point_free")
         column.prop(settings, "is_lens_known")
         column.prop(settings, "precision")
         layout.operator("viewcam.match_photo", icon="CAMERA_DATA")
