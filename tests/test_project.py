@@ -56,7 +56,7 @@ ROOMS = {
     "api": "errors image comparison tracer labels",
     "pytest_plugin": "errors junit jobs",
     "jobs": (
-        "errors checks machine files terminal events argument_types html_page child_process pinhole moves image cameras "
+        "errors checks machine files terminal events argument_types html_page child_process png pinhole moves image cameras "
         "comparison "
         "tracer labels api"
     ),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import viewcam_addon as vp
+from viewcam_addon.cameras import Camera
 from viewcam_addon.cli import main
 from viewcam_addon.errors import InputError
 from viewcam_addon.labels import colmap, files
@@ -132,7 +133,7 @@ def test_what_moves_from_picture_to_picture_has_no_track_from_one_to_the_other(t
 
 def test_points_lie_evenly_over_what_is_shown():
     state = np.zeros((48, 64), int)
-    actual = colmap._sampled(0, CAMERA, np.full((48, 64), 5.0), state, np.zeros((48, 64, 3), np.uint8), 192)
+    actual = colmap._sampled(0, Camera("shot", CAMERA), np.full((48, 64), 5.0), state, np.zeros((48, 64, 3), np.uint8), 192)
     column, row, _ = CAMERA.project(actual.positions)
     counts = np.histogram2d(row, column, bins=(6, 8), range=((0, 48), (0, 64)))[0]
     assert counts.sum() == 192 and counts.min() > 0

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras import Camera, colmap, save, transforms
+from ..cameras.distortion import Lens
 from ..errors import InputError, several
 from ..files import check_writable, written_whole
 from ..labels import colmap as labels
@@ -44,6 +45,11 @@ _NGP_SCALE = 0.33
 def refuse(shots: Sequence[Job], suffix: str, test: str | None = None) -> None:
     """Raise InputError for what no dataset could say, before any shot is rendered. suffix, test : as of `write`."""
     colmap.check_names([f"{shot.name}.{suffix}" for shot in shots])
+    for calibration in {shot.calibration for shot in shots if shot.calibration is not None}:
+        place = calibration.at(Pinhole((0, 0, 1), (0, 0, 0), (0, 1, 0), 1, 1, 1))
+        camera = Camera("--distort", place, image="picture", lens=calibration.lens)
+        transforms.document([camera])
+        colmap.texts([camera])
     if test is not None:
         if suffix != "png":
             raise InputError("--test writes the original NeRF's files, whose pictures are PNGs: give --transforms png")
@@ -76,7 +82,7 @@ def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suf
     missing = [name for name, record in records.items() if record is None]
     if missing:
         return f"no dataset is written, since {len(missing)} of {len(shots)} shots are missing: {several(missing)}"
-    cameras = [Camera(name, _pinhole(folder, name, record), image=f"{name}.{suffix}") for name, record in records.items()]
+    cameras = [replace(_camera(folder, name, record), image=f"{name}.{suffix}") for name, record in records.items()]
     top, frames = _labeled(records)
     model, points = folder.path.joinpath(*MODEL), 0
     if {"depth_file_path", "mask_path"} <= frames[0].keys():
@@ -147,9 +153,10 @@ def _held_out(names: Sequence[str], test: str) -> set[str]:
     return result
 
 
-def _pinhole(folder: Folder, name: str, record: Mapping[str, Any]) -> Pinhole:
+def _camera(folder: Folder, name: str, record: Mapping[str, Any]) -> Camera:
     try:
-        return Pinhole(**record["camera"])
+        lens = Lens.from_json(record["lens"]) if "lens" in record else None
+        return Camera(name, Pinhole(**record["camera"]), lens=lens)
     except (KeyError, TypeError, InputError) as error:
         raise InputError(
             f"{folder.sidecar(name)} has no camera that can be read: render the shot again, with --overwrite"

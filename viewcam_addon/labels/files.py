@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import image
+from ..cameras import Camera
+from ..cameras.distortion import Lens
 from ..cameras.source import image_size
 from ..errors import InputError
 from ..files import check_writable, is_replaced, read_bytes, written_whole
@@ -120,7 +122,7 @@ def _check(document: dict[str, Any]) -> None:
 
     So that they ask for no more memory than the picture has pixels, and write no file that nobody can read.
     """
-    camera = Pinhole(**document["camera"])
+    camera, _ = Pinhole(**document["camera"]), lens(document)
     size = camera.height, camera.width
     texts = [document["picture"], *document.get("passes", ())]
     if len({each["id"] for each in document["instances"]}) < len(document["instances"]):
@@ -177,6 +179,17 @@ def name(path: Path) -> str:
     return path.name.removesuffix(".labels.json")
 
 
+def lens(document: dict[str, Any]) -> Lens | None:
+    """The lens that bends a label file's picture. Raises InputError for one that is none."""
+    return Lens.from_json(document["lens"]) if "lens" in document else None
+
+
+def camera(path: Path, document: dict[str, Any]) -> Camera:
+    """The camera that a label file tells of, called as its picture. Raises InputError as `photograph` does."""
+    picture_name = picture(path, document)
+    return Camera(picture_name, Pinhole(**document["camera"]), image=picture_name, lens=lens(document))
+
+
 def photograph(path: Path, document: dict[str, Any]) -> Path | None:
     """The PNG or JPEG of what a label file tells of, if one stands beside it.
 
@@ -225,6 +238,7 @@ def _document(path: Path, labels: Labels, names: list[str], depth_steps: float) 
         "version": _VERSION,
         "picture": path.name,
         "camera": asdict(labels.image.camera),
+        **({} if labels.lens is None else {"lens": labels.lens.to_json()}),
         "files": names,
         "passes": list(labels.image.passes),
         "depth_png_steps": depth_steps,
