@@ -280,8 +280,8 @@ def solve_edges(
         return residual, slopes[..., : len(units)] * units
 
     start = distance * half if known_distance is None else np.full_like(distance, known_distance)
-    rotation, moved, *rest = _refined(measured, rotation, half * center[..., :free], start, half, known_distance is not None)
-    principal_point = moved if free else np.zeros((*distance.shape, 2))
+    rotation, refined, *rest = _refined(measured, rotation, half * center[..., :free], start, half, known_distance is not None)
+    principal_point = refined if free else np.zeros((*distance.shape, 2))
     return Solution(rotation, np.zeros((*distance.shape, 3)), principal_point, *rest), is_mirrored
 
 
