@@ -327,7 +327,7 @@ def vague_beginnings(source: str) -> list[str]:
 NO_NAMES = "found|given|made|one|said|shown|some|told"
 POOR = rf"_?(?:{NO_NAMES})_?"
 SPELLED_AS_NAMES = [  # more or less: whole trees of syntax take ten seconds for all files
-    re.compile(rf"\b{POOR}\)?( [|+*/-]?= |, [^\"\n]* = )"),
+    re.compile(rf"\b{POOR}\)?( [:|+*/-]?= |, [^\"\n]* = )"),
     re.compile(rf"(?m)^ *{POOR}: "),
     re.compile(rf"\bfor [^\"\n#]*\b{POOR}[,) ][^\"\n#]*\bin "),
     re.compile(rf"\b(?:def|lambda|class) ([^\"\n]*[(* ])?{POOR}[,:=()]"),

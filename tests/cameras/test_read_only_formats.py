@@ -1208,7 +1208,7 @@ def test_pmvs_counts_from_the_corner_and_dtu_from_the_first_pixels_center(tmp_pa
     read = cameras.read(tmp_path, options=options)
     assert [camera.name for camera in read] == ["pos_000", "pos_001"]
     the_same(read[1:], known, 2.0**-48)
-    with pytest.raises(InputError, match="no camera"):  # a pose, in which K is missing
+    with pytest.raises(InputError, match="--pose"):  # a pose, in which K is missing
         cameras.read("1 0 0 5\n0 1 0 6\n0 0 1 7\n", options=options)
 
 
@@ -1220,3 +1220,50 @@ def test_bops_camera_json_is_k_alone():
     assert column[0] == pytest.approx(572.4114 / 15 + 325.2611 + 0.5, rel=1e-14)
     assert 480 - row[0] == pytest.approx(-573.57043 * 2 / 15 + 242.04899 + 0.5, rel=1e-13)
     assert any("no world" in note for note in camera.notes)
+
+
+def pose_text(known):
+    return "\n".join(map(text_of, [*np.column_stack([known.opencv.T, known.e]), [0, 0, 0, 1]])) + "\n"
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_redwoods_log_has_five_lines_a_pose_and_replicas_trajectory_one(name):
+    known = Known(name)
+    plane = ViewPlane(known.pinhole.distance, known.pinhole.principal_point, known.width, known.height)
+    line = pose_text(known).replace("\n", " ")
+    for text in (f"0 0 1\n{pose_text(known)}1 1 2\n{pose_text(known)}", f"{line}\n{line}\n"):
+        first, second = cameras.read(text, options=Options(view_plane=plane))
+        the_same([first], known)
+        the_same([second], known)
+        assert second.time == pytest.approx(1 / 30) and any("whose poses" in note for note in first.notes)
+
+
+def test_scannets_folder_has_its_intrinsics_and_pictures(tmp_path):
+    known = Known("shifted")
+    for name in ("pose", "color", "intrinsic"):
+        (tmp_path / name).mkdir()
+    k = [[known.f_x, 0, known.c_x - 0.5, 0], [0, known.f_y, known.c_y - 0.5, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    (tmp_path / "intrinsic" / "intrinsic_color.txt").write_text("\n".join(map(text_of, k)))
+    (tmp_path / "color" / "0.jpg").write_bytes(png(known.width, known.height))
+    for number in (0, 2, 10):
+        (tmp_path / "pose" / f"{number}.txt").write_text(pose_text(known))
+    (tmp_path / "pose" / "3.txt").write_text("-inf -inf -inf -inf\n" * 4)
+    for place in (tmp_path, tmp_path / "pose"):
+        read = cameras.read(place)
+        assert [(camera.name, camera.image) for camera in read] == [(f"{i}", f"{i}.jpg") for i in (0, 2, 10)]
+        assert the_same(read[2:], known).size_stated and any(
+            "1 pictures that were not placed" in note for note in read[0].notes
+        )
+    the_same(cameras.read(tmp_path / "pose" / "2.txt", options=Options(size=(known.width, known.height))), known)
+
+
+def test_seven_scenes_frames_go_to_the_world_and_a_pose_of_nobody_knows_is_asked_for(tmp_path):
+    known = Known("plain")
+    (tmp_path / "frame-000001.pose.txt").write_text(pose_text(known))
+    options = Options(base=known.pinhole)
+    assert the_same(cameras.read(tmp_path, options=options), known).name == "frame-000001"
+    with pytest.raises(InputError, match="--pose"):
+        cameras.read(pose_text(known), options=options)
+    the_same(cameras.read(pose_text(known), options=Options(base=known.pinhole, pose="c2w_opencv")), known)
+    with pytest.raises(InputError, match="how it sees"):
+        cameras.read(tmp_path)

@@ -177,6 +177,13 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "neus": {"cameras_sphere.npz": _neus(published.projection(known))},
         "kitti_calibration": {"calib.txt": published.KITTI},
         "pmvs": {"a.txt": "CONTOUR\n" + "\n".join(map(published.text_of, published.projection(known)))},
+        "pose_files": {
+            ".": "",
+            "intrinsic/intrinsic_color.txt": "500 0 32 0\n0 500 24 0\n0 0 1 0\n0 0 0 1\n",
+            **{f"pose/{number}.txt": published.pose_text(known) for number in range(2)},
+        },
+        "redwood": {"a.log": f"0 0 1\n{published.pose_text(known)}" * 2},
+        "replica": {"traj.txt": f"{published.pose_text(known).replace(chr(10), ' ')}\n" * 2},
         "bop_sensor": {"camera.json": json.dumps(dict(fx=572, fy=573, cx=325, cy=242, width=640, height=480, depth_scale=1))},
         "llff": {"poses_bounds.npy": _npy()},
         "polycam": {"a.json": json.dumps(phone)},
