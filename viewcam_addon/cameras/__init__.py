@@ -189,10 +189,10 @@ def writable() -> list[str]:
     return [name for name, module in FORMATS.items() if hasattr(module, "write")]
 
 
-def read(given: str | Path, *, format: str | None = None, options: Options | None = None) -> list[Camera]:
+def read(content: str | Path, *, format: str | None = None, options: Options | None = None) -> list[Camera]:
     """The cameras of a text, a file or a folder.
 
-    given : a text, or the Path of a file or folder. format : one of `readable()`; None to recognize it by its content.
+    content : a text, or the Path of a file or folder. format : one of `readable()`; None to recognize it by its content.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
         if there is no camera in it, or one that is no pinhole, lacks something, or is not what it should be.
     """
     options = options or Options()
-    source = Source(given)
+    source = Source(content)
     module = _module(format or recognized(source), "read")
     with _told_of_damage(source, module.TITLE), np.errstate(all="ignore"):  # anything may stand in a file
         if format and not _recognizes(module, source):

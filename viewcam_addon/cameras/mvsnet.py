@@ -75,5 +75,5 @@ def _picture(file: Source, name: str) -> Path | None:
     if file.path is None:
         return None
     places = [file.path.parent / up / place for place in _PICTURES for up in ("..", "../..")]
-    found = (naming.near(f"{name}.{suffix}", place) for place in places for suffix in ("jpg", "png"))
-    return next(filter(None, found), None)
+    images = (naming.near(f"{name}.{suffix}", place) for place in places for suffix in ("jpg", "png"))
+    return next(filter(None, images), None)
