@@ -147,9 +147,9 @@ def test_a_data_set_without_points_or_ground_is_refused(tmp_path):
     shots = dataset(tmp_path, points, eyes, views, ups)
     (tmp_path / "transforms.json").write_text(cameras.write(shots, "transforms"))
     (tmp_path / "points3D.txt").write_text("# none\n")
-    for given in (tmp_path / "cameras.txt", tmp_path / "transforms.json", cameras.write(shots, "transforms")):
+    for path in (tmp_path / "cameras.txt", tmp_path / "transforms.json", cameras.write(shots, "transforms")):
         with pytest.raises(InputError, match="no points to find the ground by"):
-            cameras.read(given, options=Options(up_from="ground"))
+            cameras.read(path, options=Options(up_from="ground"))
     dataset(tmp_path, np.random.default_rng(6).uniform(-3, 3, (4000, 3)), eyes, views, ups)  # a cloud
     with pytest.raises(InputError, match="no plane below the cameras"):
         cameras.read(tmp_path, options=Options(up_from="ground"))

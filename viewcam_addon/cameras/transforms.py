@@ -124,8 +124,8 @@ def _said_of_world(cameras: Sequence[Camera]) -> dict[str, Any]:
         return {}
     rows = np.array(world)
     scale = float(np.cbrt(np.linalg.det(rows[:, :3])))
-    said = {"applied_transform": (rows / scale + 0.0).tolist()}
-    return said | ({} if abs(scale - 1) < 2.0**-40 else {"applied_scale": scale})
+    keys = {"applied_transform": (rows / scale + 0.0).tolist()}
+    return keys | ({} if abs(scale - 1) < 2.0**-40 else {"applied_scale": scale})
 
 
 def _said_of(camera: Camera) -> dict[str, Any]:
