@@ -34,7 +34,7 @@ from viewcam_addon.files import written_whole
 from viewcam_addon.terminal import silent_libraries
 
 # matplotlib's categories, as dark as paper needs them, without the gray of the grid and the blue of the method in use.
-_COLOURS = ("#d2620a", "#248c24", "#d62728", "#9467bd", "#8c564b", "#c9519f", "#85860f", "#0e8a99")
+_COLORS = ("#d2620a", "#248c24", "#d62728", "#9467bd", "#8c564b", "#c9519f", "#85860f", "#0e8a99")
 _MARKERS = "osv^Dd<>"
 _OURS = "#0b3d91"
 _OURS_STYLES = tuple((_OURS, marker, line) for marker, line in zip("osD^", ("-", "--", "-.", ":"), strict=True))
@@ -43,7 +43,7 @@ _INK, _BACKGROUND, _FAINT, _GRID = "#1f2328", "#ffffff", "#656d76", "#e5e8eb"
 # brings its paper along.
 _IN_THE_DARK = {_INK: "#e6edf3", _BACKGROUND: "#0d1117", _FAINT: "#9198a1", _GRID: "#30363d", _OURS: "#58a6ff"}
 _LIGHTER = ("#ff9a3c", "#4cc24c", "#ff7b72", "#bc8cff", "#c69083", "#f19cd2", "#cfd03a", "#39cfe0")
-_IN_THE_DARK |= dict(zip(_COLOURS, _LIGHTER, strict=True))
+_IN_THE_DARK |= dict(zip(_COLORS, _LIGHTER, strict=True))
 _FEW = 300  # times the least x, up to which the greatest leaves room for numbers between the powers of ten
 # What a measurement stands on, as far as it is installed.
 _PACKAGES = ("numpy", "embreex", "bpy", "mitsuba")
@@ -267,12 +267,12 @@ def _draw_rows(chart: Chart, axes: Axes) -> None:
     axes.set_yticks(range(len(curves)), [curve.name for curve in curves])
     axes.tick_params(axis="y", length=0)
     for place, curve in enumerate(curves):
-        colour = _OURS if curve.ours else _COLOURS[0]
+        color = _OURS if curve.ours else _COLORS[0]
         axes.axhline(place, color=_GRID, linewidth=0.8, zorder=0)
         if curve.spread:
-            axes.hlines([place] * len(curve.x), *np.transpose(curve.spread), color=colour, linewidth=2.5, alpha=0.5)
-        for x, fill in zip(curve.x, (colour, _BACKGROUND), strict=False):
-            axes.plot(x, place, "o", markersize=8, markeredgewidth=2, markeredgecolor=colour, markerfacecolor=fill)
+            axes.hlines([place] * len(curve.x), *np.transpose(curve.spread), color=color, linewidth=2.5, alpha=0.5)
+        for x, fill in zip(curve.x, (color, _BACKGROUND), strict=False):
+            axes.plot(x, place, "o", markersize=8, markeredgewidth=2, markeredgecolor=color, markerfacecolor=fill)
         answer = f"{curve.y[0]:.2g}" if math.isfinite(curve.y[0]) else "no answer"
         axes.annotate(answer, (1.02, place), xycoords=("axes fraction", "data"), va="center")
     axes.annotate(textwrap.fill(chart.y_label, 23), (1.02, 1.01), xycoords="axes fraction", va="bottom", color=_FAINT)
@@ -309,7 +309,7 @@ def _decades(chart: Chart) -> tuple[float, float]:
 def _styles(chart: Chart) -> list[tuple[Curve, str, str, str]]:
     """Each curve with its color, marker and line; those in use last, so that they lie on top."""
     ours = itertools.cycle(_OURS_STYLES)
-    others = iter(zip(_COLOURS, _MARKERS, strict=True))
+    others = iter(zip(_COLORS, _MARKERS, strict=True))
     styled = [
         (curve, *(next(ours) if curve.ours else (_FAINT, "", "--") if curve.limit else (*next(others), "-")))
         for curve in chart.curves
@@ -317,7 +317,7 @@ def _styles(chart: Chart) -> list[tuple[Curve, str, str, str]]:
     return sorted(styled, key=lambda style: style[0].ours)
 
 
-def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str, line: str) -> None:
+def _draw_curve(curve: Curve, axes: Axes, color: str, marker: str, line: str) -> None:
     x, y = np.asarray(curve.x, float), np.asarray(curve.y, float)
     low, high = axes.get_ylim()
     answered = np.isfinite(y)
@@ -325,11 +325,11 @@ def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str, line: str) -
     style = {"linewidth": 2.8, "markersize": 5} if curve.ours else {"linewidth": 1.6, "markersize": 4}
     if curve.minor:
         style = {"linewidth": 1.0, "markersize": 3, "alpha": 0.45}
-    axes.plot(x, clipped, color=colour, marker=marker, linestyle=line, label=_label(curve), clip_on=False, **style)
+    axes.plot(x, clipped, color=color, marker=marker, linestyle=line, label=_label(curve), clip_on=False, **style)
     if curve.spread and not curve.minor:
-        axes.hlines(clipped, *np.transpose(curve.spread), color=colour, linewidth=1.2, alpha=0.6)
+        axes.hlines(clipped, *np.transpose(curve.spread), color=color, linewidth=1.2, alpha=0.6)
     if not answered.all():
-        axes.plot(x[~answered], np.full((~answered).sum(), high), "x", color=colour, markersize=6, clip_on=False)
+        axes.plot(x[~answered], np.full((~answered).sum(), high), "x", color=color, markersize=6, clip_on=False)
 
 
 def _label(curve: Curve) -> str:

@@ -1,4 +1,4 @@
-"""Labels beside pictures that Blender writes: shots of the studio still, labelled by the tracer and by Cycles' own passes.
+"""Labels beside pictures that Blender writes: shots of the studio still, labeled by the tracer and by Cycles' own passes.
 
     python -m benchmarks.labels [--shots 1000] [--size 640x480]
 
@@ -48,7 +48,7 @@ PASSES = ("Depth", "Normal", "Position", "Object Index", "Material Index")
 # Calibrated: of the studio a pixel in a thousand differs by a quarter of these. Depth and place as shares of the depth.
 TOLERANCES = {"Object Index": 0.0, "Material Index": 0.0, "Depth": 1e-4, "Position": 1e-4, "Normal": 0.01}
 ON_EDGES = 1e-3
-"""Of all pixels: more may not differ in any pass. Calibrated: the studio has a tenth of it, and more the larger its pixels."""
+"""The share of pixels that may differ in a pass. Calibrated: the studio has a tenth, and more the larger its pixels."""
 
 # BlenderProc's: RendererUtility.render_init, and of render_segmap set_light_bounces, samples, noise threshold and denoiser.
 _CYCLES = {
@@ -108,15 +108,15 @@ def measured(shots: Sequence[Job], folder: Path) -> dict[str, Spent]:
     blend, middle = folder / "indexed.blend", len(shots) // 2
     with race.Contestant(prepare_passes, blend, list(shots), folder / "passes") as blender:
         passes = blender.runners()["passes"]
-        ours = [labelled(blend, shots[:middle], folder / "ours")]
+        ours = [labeled(blend, shots[:middle], folder / "ours")]
         expected = [passes(1, middle), passes(middle + 1, len(shots))]
-        ours += [labelled(blend, shots[middle:], folder / "ours")]
+        ours += [labeled(blend, shots[middle:], folder / "ours")]
     pictures = sorted((folder / "passes").iterdir())
     masks_spent = spent(lambda: [of_passes(path, folder / "theirs") for path in pictures])
     return {"ours": Spent(*np.sum(ours, axis=0)), "passes": Spent(*np.sum(expected, axis=0)), "made of them": masks_spent}
 
 
-def labelled(blend: Path, shots: Sequence[Job], folder: Path) -> Spent:
+def labeled(blend: Path, shots: Sequence[Job], folder: Path) -> Spent:
     """The time of `viewcam batch`, which makes a folder named as the first shot; SystemExit if it fails."""
     listed = blend.with_name("shots.json")
     listed.write_text(json.dumps([shot.to_json() for shot in shots]), encoding="utf-8")
@@ -185,7 +185,7 @@ def of_passes(path: Path, folder: Path) -> None:
     entries = [{"object_index": number, "visible": each} for number, each in enumerate(values) if each]
     for ending, content in (
         ("depth.png", encoded(levels)),
-        ("instances.png", encoded(files.id_colours(index[::-1]))),
+        ("instances.png", encoded(files.id_colors(index[::-1]))),
         ("json", json.dumps(entries).encode()),
     ):
         with written_whole(folder / f"{path.stem}.{ending}") as temporary:

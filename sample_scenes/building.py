@@ -9,7 +9,7 @@ import bmesh
 import bpy
 
 
-def colour(code: str) -> tuple[float, float, float, float]:
+def color(code: str) -> tuple[float, float, float, float]:
     """The scene-linear color of an sRGB hex code such as "e7a58b"."""
     levels = [int(code[i : i + 2], 16) / 255 for i in (0, 2, 4)]
     linear = [level / 12.92 if level <= 0.04045 else ((level + 0.055) / 1.055) ** 2.4 for level in levels]
@@ -20,7 +20,7 @@ def matte(name: str, code: str):
     """A Lambert surface."""
     material, tree, output = _empty_material(name, code)
     shader = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    shader.inputs["Color"].default_value = colour(code)
+    shader.inputs["Color"].default_value = color(code)
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
     return material
 
@@ -29,7 +29,7 @@ def glossy(name: str, code: str, roughness: float = 0.35, metallic: float = 0.0)
     """A Principled surface: glaze, lacquer or metal."""
     material, tree, output = _empty_material(name, code)
     shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
-    shader.inputs["Base Color"].default_value = colour(code)
+    shader.inputs["Base Color"].default_value = color(code)
     shader.inputs["Roughness"].default_value = roughness
     shader.inputs["Metallic"].default_value = metallic
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
@@ -40,7 +40,7 @@ def glowing(name: str, code: str, strength: float = 1.0):
     """A surface that only emits."""
     material, tree, output = _empty_material(name, code)
     shader = tree.nodes.new("ShaderNodeEmission")
-    shader.inputs["Color"].default_value = colour(code)
+    shader.inputs["Color"].default_value = color(code)
     shader.inputs["Strength"].default_value = strength
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
     return material
@@ -50,7 +50,7 @@ def mirror(name: str, code: str):
     """A perfect mirror."""
     material, tree, output = _empty_material(name, code)
     shader = tree.nodes.new("ShaderNodeBsdfAnisotropic")  # as Blender calls its Glossy BSDF
-    shader.inputs["Color"].default_value = colour(code)
+    shader.inputs["Color"].default_value = color(code)
     shader.inputs["Roughness"].default_value = 0.0
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
     return material
@@ -60,7 +60,7 @@ def clear_glass(name: str, code: str, ior: float = 1.5):
     """Clear glass."""
     material, tree, output = _empty_material(name, code)
     shader = tree.nodes.new("ShaderNodeBsdfGlass")
-    shader.inputs["Color"].default_value = colour(code)
+    shader.inputs["Color"].default_value = color(code)
     shader.inputs["Roughness"].default_value = 0.0
     shader.inputs["IOR"].default_value = ior
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
@@ -70,7 +70,7 @@ def clear_glass(name: str, code: str, ior: float = 1.5):
 def _empty_material(name: str, code: str):
     material = bpy.data.materials.new(name)
     material.use_nodes = True
-    material.diffuse_color = colour(code)  # what the solid viewport shows
+    material.diffuse_color = color(code)  # what the solid viewport shows
     material.node_tree.nodes.clear()
     output = material.node_tree.nodes.new("ShaderNodeOutputMaterial")
     output.location = (220, 0)
@@ -216,7 +216,7 @@ def text(name: str, body: str, material, size: float, location=(0, 0, 0), rotati
 def sun(strength: float, code: str, elevation: float, azimuth: float, angle: float = 1.0):
     """Sunlight from a height above the horizon and a bearing (0 from +y, 90 from +x), all in degrees."""
     data = bpy.data.lights.new("Sun", "SUN")
-    data.energy, data.color, data.angle = strength, colour(code)[:3], math.radians(angle)
+    data.energy, data.color, data.angle = strength, color(code)[:3], math.radians(angle)
     return place("Sun", data, rotation=(90 - elevation, 0, 180 - azimuth), location=(0, 0, 6))
 
 
@@ -224,7 +224,7 @@ def softbox(name: str, watts: float, code: str, location, target, width: float, 
     """A rectangular area light that faces `target`."""
     data = bpy.data.lights.new(name, "AREA")
     data.shape, data.size, data.size_y = "RECTANGLE", width, height
-    data.energy, data.color = watts, colour(code)[:3]
+    data.energy, data.color = watts, color(code)[:3]
     dx, dy, dz = (t - s for t, s in zip(target, location, strict=True))
     tilt = math.degrees(math.atan2(math.hypot(dx, dy), -dz))
     turn = math.degrees(math.atan2(dy, dx)) - 90 if dx or dy else 0  # straight down, the width lies along x
@@ -236,7 +236,7 @@ def sky(code: str, strength: float = 1.0):
     world = bpy.data.worlds.new("Sky")
     world.use_nodes = True
     background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-    background.inputs["Color"].default_value = colour(code)
+    background.inputs["Color"].default_value = color(code)
     background.inputs["Strength"].default_value = strength
     bpy.context.scene.world = world
     return world

@@ -371,16 +371,16 @@ def toys():
     paint = shading.material("Painted", painted)
     for number, (x, y, size) in enumerate([(-1.2, 0.2, 0.5), (0.1, 0.0, 0.6), (1.3, 0.4, 0.45)], 1):
         toy = b.suzanne(f"Toy {number}", paint, (x, y, size), (0, 0, 20 * number - 40), size)
-        colours = toy.data.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
-        for vertex, each in zip(toy.data.vertices, colours.data, strict=True):
+        colors = toy.data.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
+        for vertex, each in zip(toy.data.vertices, colors.data, strict=True):
             each.color = (*(0.5 + 0.5 * math.cos(3 * value + number) for value in vertex.co), 1.0)
-        toy.data.color_attributes.active_color = colours
+        toy.data.color_attributes.active_color = colors
     _sheet("Shelf", 8, 6, boards("Shelf"), (0, 0, 0))
     _sheet("Wall", 8, 4, concrete("Wall", "c8c4d0"), (0, 1.6, 1.5), (90, 0, 0))
     for number, (x, code) in enumerate([(-2.0, "ffd8a8"), (2.2, "a8d0ff")], 1):
         lamp = bpy.data.lights.new(f"Spot {number}", "SPOT")
         lamp.energy, lamp.spot_size, lamp.spot_blend, lamp.shadow_soft_size = 400, math.radians(55), 0.4, 0.15
-        lamp.color = b.colour(code)[:3]
+        lamp.color = b.color(code)[:3]
         b.place(f"Spot {number}", lamp, location=(x, -2.6, 3.0), rotation=(48, 0, math.degrees(math.atan2(x, 2.6))))
     b.sky("404858", 0.4)
     return scene

@@ -10,8 +10,8 @@ import building as b
 from nodes import Nodes, use_nodes
 from staging import fresh_scene, state_camera
 
-BAY, STOREY, DEPTH = 3.2, 4.1, 1.1  # of the façade's arches, in meters
-BAYS, STOREYS = 6, 6
+BAY, STORY, DEPTH = 3.2, 4.1, 1.1  # of the façade's arches, in meters
+BAYS, STORIES = 6, 6
 
 
 def build():
@@ -34,18 +34,18 @@ def palace(stone, inner_stone):
     arch = _arch()
     for name, location, turn in [("Front", (0, 0, 0.9), 0), ("Side", (0, width, 0.9), -90)]:
         wall = b.place(name, arch, location=location, rotation=(0, 0, turn))
-        for axis, count, step in [("bays", BAYS, (BAY, 0, 0)), ("storeys", STOREYS, (0, 0, STOREY))]:
+        for axis, count, step in [("bays", BAYS, (BAY, 0, 0)), ("storeys", STORIES, (0, 0, STORY))]:
             array = wall.modifiers.new(f"{count} {axis}", "ARRAY")
             array.count, array.use_relative_offset, array.use_constant_offset = count, False, True
             array.constant_offset_displace = step
     arch.materials.append(stone)
-    height = STOREYS * STOREY
+    height = STORIES * STORY
     b.box("Core", (width - 7, width - 7, height), inner_stone, (width / 2, width / 2, 0.9), bevel=0)
-    for level in range(STOREYS + 1):
-        thickness = 1.5 if level == STOREYS else 0.28
-        overhang = 0.12 if level == STOREYS else 0.06
+    for level in range(STORIES + 1):
+        thickness = 1.5 if level == STORIES else 0.28
+        overhang = 0.12 if level == STORIES else 0.06
         size = (width + 2 * overhang, width + 2 * overhang, thickness)
-        b.box(f"Floor {level}", size, stone, (width / 2, width / 2, 0.9 + level * STOREY - 0.14), bevel=0.03)
+        b.box(f"Floor {level}", size, stone, (width / 2, width / 2, 0.9 + level * STORY - 0.14), bevel=0.03)
     b.box("Corner", (0.5, 0.5, height), stone, (0.2, 0.2, 0.9), bevel=0.02)
 
 
@@ -73,7 +73,7 @@ def _arch():
 
 def _on_frame(x: float, z: float, spring: float):
     """The point where the ray from the arch's center through (x, z) meets the bay's outline."""
-    reach = min(BAY / 2 / abs(x) if x else math.inf, (STOREY - spring) / z if z else math.inf)
+    reach = min(BAY / 2 / abs(x) if x else math.inf, (STORY - spring) / z if z else math.inf)
     return BAY / 2 + x * reach, spring + z * reach
 
 

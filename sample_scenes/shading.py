@@ -4,7 +4,7 @@ import math
 
 import bpy
 import numpy as np
-from building import colour
+from building import color
 
 
 class Shading:
@@ -28,7 +28,7 @@ class Shading:
             if isinstance(value, bpy.types.NodeSocket):
                 self.tree.links.new(value, socket)
             else:
-                socket.default_value = colour(value) if isinstance(value, str) else value
+                socket.default_value = color(value) if isinstance(value, str) else value
         return next(each for each in node.outputs if each.enabled) if output is None else _socket(node.outputs, output)
 
     def principled(self, **inputs):
@@ -53,7 +53,7 @@ class Shading:
         while len(ramp.elements) < len(stops):
             ramp.elements.new(1.0)
         for element, (position, code) in zip(ramp.elements, stops, strict=True):
-            element.position, element.color = position, colour(code)
+            element.position, element.color = position, color(code)
         return socket
 
     def range(self, value, low: float, high: float):

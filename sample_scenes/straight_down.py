@@ -107,8 +107,8 @@ def settings(china, glaze):
     berry = b.glossy("Berries", "7b2140", 0.3)
     for i in range(9):
         angle, reach = 2.4 * i, 0.016 * math.sqrt(i)
-        centre = (middle + reach * math.cos(angle), reach * math.sin(angle), top + 0.062)
-        b.ball(f"Berry {i + 1}", 0.0105, berry, centre, into=kit)
+        center = (middle + reach * math.cos(angle), reach * math.sin(angle), top + 0.062)
+        b.ball(f"Berry {i + 1}", 0.0105, berry, center, into=kit)
     mint, leaf_spot = b.matte("Mint", "5f8f4e"), (middle + 0.05, 0.02, top + 0.062)
     b.ball("Mint", 0.02, mint, leaf_spot, (1, 0.5, 0.15), rotation=(0, 10, 50), into=kit)
     b.box("Napkin", (0.2, 0.1, 0.004), b.matte("Napkin", "c8705a"), (middle, 0.25, top), bevel=0.002, into=kit)
@@ -176,7 +176,7 @@ def vase(glaze, leaf):
     petal = b.matte("Blossom", "f6c9c4")
     for i in range(14):
         angle, reach, height = 2.4 * i, 0.03 + 0.008 * i, 0.3 - 0.007 * i
-        centre = (x + reach * math.cos(angle), y + reach * math.sin(angle), top + height)
-        b.ball(f"Blossom {i + 1}", 0.021, petal, centre, scale=(1, 1, 0.7))
+        center = (x + reach * math.cos(angle), y + reach * math.sin(angle), top + height)
+        b.ball(f"Blossom {i + 1}", 0.021, petal, center, scale=(1, 1, 0.7))
         far = (x + 1.35 * reach * math.cos(angle + 0.5), y + 1.35 * reach * math.sin(angle + 0.5), top + height - 0.05)
         b.ball(f"Vase leaf {i + 1}", 0.04, leaf, far, (1, 0.36, 0.08), rotation=(10, -20, math.degrees(angle) + 30))

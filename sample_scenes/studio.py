@@ -2,7 +2,7 @@
 
 Suzanne (subdivided, smooth) stands in the right third on a turned plinth. The meadow is scattered by geometry nodes: a
 few small plants and pebbles, as dense as a noise says, clear of the furniture. One warm sun, one cool softbox, one cyclorama.
-Every surface is a Lambert surface of one colour.
+Every surface is a Lambert surface of one color.
 """
 
 import math
@@ -13,7 +13,7 @@ import building as b
 from nodes import Nodes, use_nodes
 from staging import fresh_scene, state_camera
 
-GATE_CENTRE, GATE_RADIUS = (1.5, 1.66), 1.25
+GATE_CENTER, GATE_RADIUS = (1.5, 1.66), 1.25
 SUN_ELEVATION, SUN_BEARING = 34, 222
 
 
@@ -53,14 +53,14 @@ def cyclorama(material):
 
 def moon_gate(plaster, trim):
     """A wall with a round opening, and a stone ring set into it."""
-    centre_x, centre_z = GATE_CENTRE
+    center_x, center_z = GATE_CENTER
     left, right, top, thickness, count = -7.0, 7.0, 3.55, 0.42, 96
     angles = sorted(
         [2 * math.pi * i / count for i in range(count)]
-        + [math.atan2(z - centre_z, x - centre_x) % (2 * math.pi) for x in (left, right) for z in (0.0, top)]
+        + [math.atan2(z - center_z, x - center_x) % (2 * math.pi) for x in (left, right) for z in (0.0, top)]
     )
-    inner = [(centre_x + GATE_RADIUS * math.cos(a), centre_z + GATE_RADIUS * math.sin(a)) for a in angles]
-    outer = [_to_rectangle(centre_x, centre_z, a, left, right, 0.0, top) for a in angles]
+    inner = [(center_x + GATE_RADIUS * math.cos(a), center_z + GATE_RADIUS * math.sin(a)) for a in angles]
+    outer = [_to_rectangle(center_x, center_z, a, left, right, 0.0, top) for a in angles]
     n = len(angles)
     rings = [(x, y, z) for y in (-thickness / 2, thickness / 2) for ring in (inner, outer) for x, z in ring]
     faces = []
@@ -73,12 +73,12 @@ def moon_gate(plaster, trim):
     b.place("Gate wall", b.mesh("Gate wall", rings, faces), plaster, (0, 2.0, 0))
     outline = [(1.0, -0.27), (1.085, -0.27), (1.1, -0.255), (1.1, 0.255), (1.085, 0.27), (1.0, 0.27), (0.985, 0.255)]
     outline = [(radius * GATE_RADIUS, height) for radius, height in [*outline, (0.985, -0.255), (1.0, -0.27)]]
-    b.turned("Gate ring", outline, trim, (centre_x, 2.0, centre_z), rotation=(90, 0, 0), steps=128)
+    b.turned("Gate ring", outline, trim, (center_x, 2.0, center_z), rotation=(90, 0, 0), steps=128)
 
 
 def bust(stone):
     """Suzanne on a turned plinth."""
-    x, y = GATE_CENTRE[0] - 0.1, 0.95
+    x, y = GATE_CENTER[0] - 0.1, 0.95
     plinth = [(0, 0), (0.42, 0), (0.44, 0.02), (0.44, 0.1), (0.42, 0.12), (0.36, 0.14), (0.33, 0.2), (0.31, 0.3), (0.305, 0.7)]
     plinth += [(0.31, 0.8), (0.33, 0.84), (0.38, 0.87), (0.4, 0.89), (0.4, 0.97), (0.385, 0.985), (0, 0.985)]
     b.turned("Plinth", plinth, stone, (x, y, 0))

@@ -1,4 +1,4 @@
-"""The moon over a ridge, through a lens of half a degree: five kilometres away, a photographer at work.
+"""The moon over a ridge, through a lens of half a degree: five kilometers away, a photographer at work.
 
 At d = 146,677 pixels a pixel is seven millionths of a radian, which is 3.4 cm at the ridge. The moon here is a ball of 103 m at
 a distance of 60 km. Terrain, trees and craters are geometry nodes.
@@ -57,10 +57,10 @@ def moon(seen_at, distance: float, radius: float):
     offset = nodes.add("ShaderNodeVectorMath", {0: normal, "Scale": lift}, "Vector", operation="SCALE")
     cratered = nodes.add("GeometryNodeSetPosition", {"Geometry": shape, "Offset": offset})
     noise = nodes.add("ShaderNodeTexNoise", {"Scale": 0.0105, "Detail": 5.0, "Roughness": 0.55, "Distortion": 0.4}, "Fac")
-    coloured = nodes.add("GeometryNodeSetMaterial", {"Geometry": cratered, "Material": highland})
+    colored = nodes.add("GeometryNodeSetMaterial", {"Geometry": cratered, "Material": highland})
     is_sea = nodes.math("GREATER_THAN", noise, 0.5)
-    coloured = nodes.add("GeometryNodeSetMaterial", {"Geometry": coloured, "Selection": is_sea, "Material": sea})
-    group = nodes.finish(nodes.add("GeometryNodeSetShadeSmooth", {"Geometry": coloured}))
+    colored = nodes.add("GeometryNodeSetMaterial", {"Geometry": colored, "Selection": is_sea, "Material": sea})
+    group = nodes.finish(nodes.add("GeometryNodeSetShadeSmooth", {"Geometry": colored}))
     highland = b.matte("Highland", "f2e3c9")
     ball = b.place("Moon", b.mesh("Moon", []), highland, (x, distance, z), rotation=(0, 20, 35))
     use_nodes(ball, group, highland=highland, sea=b.matte("Sea", "b3a08a"))
@@ -124,8 +124,8 @@ def clouds():
     for number, (x, z, long, thick) in enumerate(
         [(-9, 3.4, 14, 0.32), (8, 2.3, 16, 0.28), (-2, 1.5, 18, 0.3), (15, 4.6, 6, 0.16)], 1
     ):
-        centre = (x * reach, 25000.0, EYE[2] + (z - EYE[2]) * reach)
-        b.ball(f"Cloud {number}", reach, mist, centre, scale=(long / 2, 2, thick / 2))
+        center = (x * reach, 25000.0, EYE[2] + (z - EYE[2]) * reach)
+        b.ball(f"Cloud {number}", reach, mist, center, scale=(long / 2, 2, thick / 2))
 
 
 def photographer(foot):

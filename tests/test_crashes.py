@@ -127,11 +127,11 @@ def test_a_signal_that_comes_when_blender_has_ended_changes_no_status(command):
 import os, signal
 from viewcam_addon import crashes
 waitpid = os.waitpid
-def wait_and_be_signalled(*process):
+def wait_and_be_signaled(*process):
     ended = waitpid(*process)
     os.kill(os.getpid(), signal.SIGTERM)
     return ended
-os.waitpid = wait_and_be_signalled
+os.waitpid = wait_and_be_signaled
 if crashes.survived([{command!r}]) is None:
     os._exit(143)
 """

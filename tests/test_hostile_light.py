@@ -23,8 +23,8 @@ SCENE = {
     "version": 1,
     "camera": {"eye": [0, 0, 5], "look_at": [0, 0, 0], "up": [0, 1, 0], "distance": 20, "width": 16, "height": 12},
     "geometries": {"plane": PLANE, "ball": BALL, "cube": CUBE},
-    "materials": {"grey": {"diffuse": [0.5, 0.5, 0.5]}, "glass": {"glass": [1, 1, 1], "ior": 1.5}},
-    "objects": [{"name": "floor", "geometry": "plane", "materials": ["grey"]}],
+    "materials": {"gray": {"diffuse": [0.5, 0.5, 0.5]}, "glass": {"glass": [1, 1, 1], "ior": 1.5}},
+    "objects": [{"name": "floor", "geometry": "plane", "materials": ["gray"]}],
     "film": {"filter": "BOX"},
 }
 SUN = {"type": "sun", "name": "Sun", "irradiance": [1, 1, 1]}
@@ -76,11 +76,11 @@ def test_a_lamp_of_no_extent_or_power_lights_nothing_and_leaves_the_others_alone
 
 
 def test_black_surfaces_stay_black(tmp_path):
-    assert not render(tmp_path, lamps=[SUN], materials={"grey": {"diffuse": [0, 0, 0]}}).any()
+    assert not render(tmp_path, lamps=[SUN], materials={"gray": {"diffuse": [0, 0, 0]}}).any()
 
 
 def test_surfaces_that_reflect_more_than_they_get_shine_brighter(tmp_path):
-    picture = render(tmp_path, lamps=[SUN], materials={"grey": {"diffuse": [1.5, 2, 20]}})
+    picture = render(tmp_path, lamps=[SUN], materials={"gray": {"diffuse": [1.5, 2, 20]}})
     np.testing.assert_allclose(picture, np.broadcast_to(np.array([1.5, 2, 20]) / np.pi, picture.shape), rtol=4 * FLOAT32)
 
 
@@ -100,19 +100,19 @@ def test_a_closed_box_that_reflects_more_than_it_gets_ends_with_its_bounces(tmp_
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-1", "1e300"])
 @pytest.mark.parametrize("owner", ["material", "lamp", "world"])
-def test_colours_that_are_none_are_refused_by_name(tmp_path, capfd, number, owner):
-    colour = f"[0.5, {number}, 0.5]"
+def test_colors_that_are_none_are_refused_by_name(tmp_path, capfd, number, owner):
+    color = f"[0.5, {number}, 0.5]"
     changes = {
-        "material": {"materials": {"grey": {"diffuse": "COLOUR"}}},
-        "lamp": {"lamps": [SUN | {"irradiance": "COLOUR"}]},
-        "world": {"world": {"radiance": "COLOUR"}},
+        "material": {"materials": {"gray": {"diffuse": "COLOR"}}},
+        "lamp": {"lamps": [SUN | {"irradiance": "COLOR"}]},
+        "world": {"world": {"radiance": "COLOR"}},
     }[owner]
     scene = tmp_path / "scene.json"
-    scene.write_text(json.dumps(SCENE | changes).replace('"COLOUR"', colour))
+    scene.write_text(json.dumps(SCENE | changes).replace('"COLOR"', color))
     assert main(["render", str(scene), str(tmp_path / "out.exr"), "--level", "path"]) == 2
     lines = capfd.readouterr().err.strip().splitlines()
     assert len(lines) == 1 and "bug" not in lines[0], lines
-    assert number in ("NaN", "Infinity") or {"material": "grey", "lamp": "Sun", "world": "world"}[owner] in lines[0], lines[0]
+    assert number in ("NaN", "Infinity") or {"material": "gray", "lamp": "Sun", "world": "world"}[owner] in lines[0], lines[0]
 
 
 @pytest.mark.parametrize("power", [1e10, 1e17])
@@ -176,14 +176,14 @@ def test_a_camera_inside_glass_sees_the_world_as_it_is(tmp_path):
 def test_a_camera_inside_a_closed_mesh_sees_no_lamp_outside(tmp_path):
     camera = SCENE["camera"] | {"eye": [0.1, 0.2, 0.3], "look_at": [1, 0, 0], "up": [0, 0, 1]}
     lamps = [SUN, {"type": "point", "name": "Lamp", "position": [3, 0, 0], "power": [1000] * 3, "radius": 0.5}]
-    room = [{"name": "room", "geometry": "cube", "materials": ["grey"]}]
+    room = [{"name": "room", "geometry": "cube", "materials": ["gray"]}]
     assert not render(tmp_path, camera=camera, objects=room, lamps=lamps, world={"radiance": [1, 1, 1]}).any()
 
 
 def test_a_lamp_inside_a_closed_mesh_lights_it_and_nothing_else(tmp_path):
     lamps = [{"type": "point", "name": "Lamp", "position": [0, 0, 0], "power": [100] * 3}]
     objects = [
-        {"name": "box", "geometry": "cube", "location": [0, 0, 1.5], "materials": ["grey"]},
+        {"name": "box", "geometry": "cube", "location": [0, 0, 1.5], "materials": ["gray"]},
         *SCENE["objects"],
     ]
     inside = [lamps[0] | {"position": [0, 0, 1.5]}]
@@ -207,8 +207,8 @@ def test_a_scene_of_nothing_is_the_world(tmp_path):
         ({"lamps": [SUN | {"angle": 4}]}, ["Sun", "angle"]),
         ({"lamps": [SUN | {"towards": [0, 0, 0]}]}, ["Sun", "towards"]),
         ({"lamps": [{"type": "laser", "name": "Beam"}]}, ["Beam", "laser"]),
-        ({"materials": {"grey": {"velvet": [1, 1, 1]}}}, ["grey", "velvet"]),
-        ({"materials": {"grey": {"diffuse": {"image": "lost"}}}}, ["grey", "lost"]),
+        ({"materials": {"gray": {"velvet": [1, 1, 1]}}}, ["gray", "velvet"]),
+        ({"materials": {"gray": {"diffuse": {"image": "lost"}}}}, ["gray", "lost"]),
         ({"bounces": {"total": -1}}, ["bounces", "total"]),
         ({"film": {"filter": "LANCZOS"}}, ["LANCZOS"]),
     ],

@@ -100,14 +100,14 @@ def stage(model, scene):
     assert camera.apply(scene.camera, Pinhole((0.6, -5.5, 2.2), (0, 0, 0.6), (0, 0, 1), 95, 80, 48), scene) == []
 
 
-def material(name, shader, colour):
+def material(name, shader, color):
     """A material of one shader, perfectly smooth if it can be."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     node, output = nodes.new(shader), nodes.new("ShaderNodeOutputMaterial")
-    node.inputs["Color"].default_value = (*colour, 1)
+    node.inputs["Color"].default_value = (*color, 1)
     node.inputs["Roughness"].default_value = 0
     links.new(node.outputs[0], output.inputs["Surface"])
     return material

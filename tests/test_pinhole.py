@@ -27,8 +27,8 @@ def exact_basis(e, l, up):
     """(u, v, w) at 4500 bits: more than two products of float64 numbers of any size can need."""
     with mpmath.workprec(4500):
         apart = [mpmath.mpf(a) - mpmath.mpf(b) for a, b in zip(e, l, strict=True)]
-        w = normalised(apart)
-        u = normalised(cross([mpmath.mpf(a) for a in up], apart))
+        w = normalized(apart)
+        u = normalized(cross([mpmath.mpf(a) for a in up], apart))
         return u, cross(w, u), w
 
 
@@ -36,7 +36,7 @@ def cross(a, b):
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def normalised(a):
+def normalized(a):
     length = mpmath.sqrt(sum(x * x for x in a))
     return [x / length for x in a]
 
@@ -73,7 +73,7 @@ def test_basis_is_exact_over_10_000_poses_from_1_to_1e_16_radians_from_vertical(
             apart = [mpmath.mpf(a) - mpmath.mpf(b) for a, b in zip(e[i].tolist(), l[i].tolist(), strict=True)]
             across = cross([mpmath.mpf(a) for a in up[i].tolist()], apart)
             assert any(across), f"pose {i} came out exactly singular: the sweep must not hold such a one"
-            u, w = normalised(across), normalised(apart)
+            u, w = normalized(across), normalized(apart)
             true = [*u, *cross(w, u), *w]
             errors.append(
                 max(abs(float(mpmath.mpf(have) - want)) for have, want in zip(axes[i].ravel().tolist(), true, strict=True))

@@ -74,7 +74,7 @@ def test_one_process_answers_all(echo):
     assert len({echo.ask({})["process"] for _ in range(3)}) == 1
 
 
-@pytest.mark.parametrize("kind", ["InputError", "FullDiskError", "NotModelledError"])
+@pytest.mark.parametrize("kind", ["InputError", "FullDiskError", "NotModeledError"])
 def test_an_error_is_raised_here_as_it_was_there(echo, kind):
     with pytest.raises(errors.InputError, match=r"^the lamp is broken: mend it$") as caught:
         echo.ask({"raise": kind})

@@ -144,7 +144,7 @@ def compare(
     from .comparison import geometry, radiance, renderers
     from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
     from .comparison.coincident import CoincidentLight
-    from .comparison.everything import not_modelled
+    from .comparison.everything import not_modeled
     from .comparison.light_verdict import FALSE_ALARMS
     from .comparison.sides import samples_of, seed_of
     from .comparison.tolerances import ROUNDINGS
@@ -183,17 +183,17 @@ def compare(
         lit = radiance.compare(of, pictures, camera, test_samples, coincident, trace_anew, alarms)
         lit = replace(lit, stated=stated)
         _check_not_empty(lit, may_be_empty)
-        names = tuple(dict.fromkeys((*framed.not_modelled, *lit.taken_out.names)))
+        names = tuple(dict.fromkeys((*framed.not_modeled, *lit.taken_out.names)))
         if not names:
             return lit
-        surfaces = makes_tracer().pixels_of(framed.not_modelled)
+        surfaces = makes_tracer().pixels_of(framed.not_modeled)
         surfaces |= {name: surfaces.get(name, False) | lit.taken_out.pixels for name in lit.taken_out.names}
-        parts = not_modelled(names, surfaces, of, pictures, whole, camera)
+        parts = not_modeled(names, surfaces, of, pictures, whole, camera)
         one_place, otherwise = (
-            [name for name in group if name not in framed.not_modelled]
+            [name for name in group if name not in framed.not_modeled]
             for group in (lit.taken_out.in_one_place, lit.taken_out.seen_otherwise)
         )
-        return replace(lit, not_modelled=parts.sorted_by(one_place, otherwise))
+        return replace(lit, not_modeled=parts.sorted_by(one_place, otherwise))
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
     by = renderer or renderers.CYCLES
@@ -202,8 +202,8 @@ def compare(
     else:
         tracer = (keeper or tracing.Keeper()).tracer(framed, threads)
         comparison = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, framed.origin, by, partial)
-        names = framed.not_modelled
-        comparison = replace(comparison, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
+        names = framed.not_modeled
+        comparison = replace(comparison, not_modeled=not_modeled(names, tracer.pixels_of(names), of, pictures, whole))
     _check_not_empty(comparison, may_be_empty)
     return comparison
 

@@ -35,7 +35,7 @@ from multiprocessing import connection
 from pathlib import Path
 from typing import Any, Self
 
-from .errors import FullDiskError, InputError, NotModelledError, bug
+from .errors import FullDiskError, InputError, NotModeledError, bug
 from .events import Events
 
 _PACKAGE = Path(__file__).parent
@@ -56,7 +56,7 @@ START_TIMEOUT = 300.0
 _GRACE = 1.0
 """Seconds for an answer to be finished that nobody waits for any more."""
 
-_KINDS = {kind.__name__: kind for kind in (InputError, FullDiskError, NotModelledError)}
+_KINDS = {kind.__name__: kind for kind in (InputError, FullDiskError, NotModeledError)}
 """The errors that are raised here where the child raises them."""
 
 

@@ -22,7 +22,7 @@ class FullDiskError(InputError):
     """Nothing more can be written there, so that there is no use in trying the next."""
 
 
-class NotModelledError(InputError):
+class NotModeledError(InputError):
     """Something in the scene has no counterpart in the model, and `--strict` does not let it pass."""
 
     exit_status = 3

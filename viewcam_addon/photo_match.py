@@ -1,8 +1,9 @@
 """A camera from a photograph: from edges that run along known axes, or from points whose places are known.
 
-Pixels count from the lower left corner of the picture, with centers at + 0.5. The principal point is given (the picture's
-middle, unless it is known better) and pixels are square. What is unknown is d, unless the lens is known, the turn of the camera
-and the eye: points tell it, and so does one edge of known length and place.
+Pixels count from the lower left corner of the picture, with centers at + 0.5, and are square. What is unknown is d, unless the
+lens is known, the turn of the camera and the eye: points tell it, and so does one edge of known length and place. The principal
+point is given (the picture's middle, unless it is known better), or free where edges along all three axes tell it: it is the
+orthocenter of their vanishing points.
 
 An edge is where the picture of a straight line begins and ends; which way it was drawn says which way its axis points, and so
 two axes are enough for one camera without a mirror image. All of an axis' edges meet in its vanishing point, and by how far
@@ -21,7 +22,7 @@ camera calibration (2000), for the homography's constraint; R. Hartley and A. Zi
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -37,6 +38,7 @@ _STEPS = 60
 _CONVERGED = 1e-11  # of the parameters: what is left of them after one step more is their rounding
 _SHORTEST, _LONGEST = 0.02, 200.0  # d of a start, of half the picture's larger side
 _LARGEST_ERROR = math.log(2.0)  # of d, as a factor: what is less certain than that is no answer
+_LARGEST_SHIFT = 0.5  # of the principal point's error, of half the picture's larger side: what is less certain is no answer
 _OPEN = 1e-13  # an eigenvalue of 7 by 7 numbers near 1 that is less than this is rounding
 # Of the coordinates' spread: what lies nearer to a plane than this is in it.
 _FLAT = 1e-6
@@ -50,8 +52,10 @@ class Match:
     error : root mean square in pixels of what is left, 0 where there was nothing to spare.
     distance_between : d with a probability of 68 %, lowest and highest.
     eye_error : one standard deviation along each axis, world units; None where the eye is not asked.
+    principal_point_error : one standard deviation of column and row, pixels; None where it was fixed.
     pixels : by how many pixels the picture moves as each value goes off by one standard deviation: "look_at" (where its middle
-    is), "up" (the roll, at the corners), "distance" (the lens, at the corners), and "eye" where it is asked.
+    is), "up" (the roll, at the corners), "distance" (the lens, at the corners), and "eye" and "principal_point" where they are
+    asked.
     """
 
     pinhole: Pinhole
@@ -59,6 +63,7 @@ class Match:
     error: float
     distance_between: Pair
     eye_error: Triple | None
+    principal_point_error: Pair | None
     pixels: dict[str, float]
 
 
@@ -66,12 +71,15 @@ class Match:
 class Solution:
     """Cameras that were found, over leading axes.
 
-    rotation : (..., 3, 3), its rows are u, v, w. eye : (..., 3). distance : (...). residuals : (..., m) in pixels.
-    covariance : (..., p, p) for a precision of one pixel, of the turn about u, v and w in radians, of log d, and of the eye.
+    rotation : (..., 3, 3), its rows are u, v, w. eye : (..., 3); of edges, which don't tell it, 0. principal_point : (..., 2)
+    pixels from the one that was given, 0 where it is fixed. distance : (...). residuals : (..., m) in pixels.
+    covariance : (..., p, p) for a precision of one pixel, of the turn about u, v and w in radians, of log d, and then of the
+    eye (points), of the principal point (edges, where it is free) or of nothing more.
     """
 
     rotation: Array
     eye: Array
+    principal_point: Array
     distance: Array
     residuals: Array
     covariance: Array
@@ -95,6 +103,7 @@ def from_edges(
     precision: float = 1.0,
     distance: float | None = None,
     known: KnownEdge | None = None,
+    is_principal_point_free: bool = False,
 ) -> Match:
     """The camera whose picture has these edges.
 
@@ -102,11 +111,13 @@ def from_edges(
     towards where the axis points. like : its eye, distance to the look-at point, size and principal point are kept.
     precision : of start and end, pixels, one standard deviation. distance : d in pixels where the lens is known.
     known : the edge whose length and place say how far away the camera stands, and where; without it its eye is kept.
+    is_principal_point_free : it is asked as well, which takes edges along all three axes; else that of `like` is kept.
 
     Raises
     ------
     InputError
-        if edges are missing or contradict one another, or leave the lens open, or if no camera sees the known one so.
+        if edges are missing or contradict one another, or leave the lens or a free principal point open, or if no camera sees
+        the known one so.
     """
     precision = checks.number("precision", precision, least=1e-9)
     named = [axis for axis, *_ in edges]
@@ -115,18 +126,21 @@ def from_edges(
     enough = [axis for axis in _AXES if named.count(axis) >= 2]
     if len(enough) < 2:
         raise InputError("too few edges: draw two or more along each of two axes")
+    if is_principal_point_free and len(enough) < 3:
+        raise InputError("too few edges for a free principal point: draw two or more along each of the three axes, or keep it")
     used = [edge for edge in edges if edge[0] in enough]
     axes = np.array([_AXES.index(axis) for axis, *_ in used])
     ends = checks.array("edges", [[start, end] for _, start, end in used])
     if (np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) < 1.0).any():
         raise InputError("an edge is shorter than a pixel: draw it along more of the line")
-    solution, is_mirrored = solve_edges(ends - np.array(like.principal_point), axes, _half(like), _known_distance(distance))
+    from_middle = ends - np.array(like.principal_point)
+    known_distance = _known_distance(distance)
+    solution, is_mirrored = solve_edges(from_middle, axes, _half(like), known_distance, is_principal_point_free)
     if is_mirrored:
         raise InputError("the edges' directions are those of a mirrored picture: draw each towards where its axis points")
     eye = np.array(like.eye) if known is None else _eye_of(known, edges, solution, like)
-    solution = Solution(solution.rotation, eye, solution.distance, solution.residuals, solution.covariance)
-    spare = len(used) - (4 if distance is None else 3)
-    return _match(solution, like, precision, math.dist(like.eye, like.look_at), spare, None)
+    spare = len(used) - (4 if distance is None else 3) - (2 if is_principal_point_free else 0)
+    return _match(replace(solution, eye=eye), like, precision, math.dist(like.eye, like.look_at), spare, None)
 
 
 def _known_distance(distance: float | None) -> float | None:
@@ -143,7 +157,7 @@ def _eye_of(known: KnownEdge, edges: Sequence[tuple[str, ArrayLike, ArrayLike]],
     if length <= 0:
         raise InputError(f"the known edge has a length of {length:g}: give one above 0")
     axis, *ends = edges[known.edge]
-    pixels = checks.array("edges", ends) - np.array(like.principal_point)
+    pixels = checks.array("edges", ends) - np.array(like.principal_point) - solution.principal_point
     rays = np.column_stack([pixels, [-solution.distance] * 2]) @ solution.rotation
     # end · second ray − start · first ray is the edge, the shares of the rays by least squares.
     along = length * np.eye(3)[_AXES.index(axis)]
@@ -214,18 +228,28 @@ def from_rectangle(
 
 
 def solve_edges(
-    ends: Array, axes: NDArray[np.int_], half: float, known_distance: float | None = None
+    ends: Array,
+    axes: NDArray[np.int_],
+    half: float,
+    known_distance: float | None = None,
+    is_principal_point_free: bool = False,
 ) -> tuple[Solution, NDArray[np.bool_]]:
     """The cameras of edges, and whether those that were drawn are of a mirrored picture.
 
     ends : (..., n, 2, 2): edge, end, pixels from the principal point. axes : (n,) which of the world's axes each runs along.
     half : of the picture's larger side, pixels. known_distance : d in pixels where the lens is known.
+    is_principal_point_free : it is asked as well, of edges along all three axes; `ends` count from where it may be.
     """
     present = np.unique(axes)
     scaled = np.concatenate([ends / half, np.ones((*ends.shape[:-1], 1))], axis=-1)
     normals = np.cross(scaled[..., 0, :], scaled[..., 1, :])
     normals /= np.linalg.norm(normals[..., :2], axis=-1, keepdims=True)
     vanishing = np.stack([np.linalg.svd(normals[..., axes == axis, :])[2][..., -1, :] for axis in present], axis=-2)
+    center = np.zeros((*vanishing.shape[:-2], 2))
+    if is_principal_point_free:
+        center = _orthocenter(vanishing)
+        scaled[..., :2] -= center[..., None, None, :]
+        vanishing[..., :2] -= center[..., None, :] * vanishing[..., 2:]
     above = below = 0.0
     for i, j in combinations(range(len(present)), 2):
         across = (vanishing[..., i, :2] * vanishing[..., j, :2]).sum(axis=-1)
@@ -247,12 +271,18 @@ def solve_edges(
     rotation = _nearest_rotation(np.einsum("...ki,kj->...ij", seen, np.eye(3)[present]))
     directions = np.eye(3)[axes]
 
-    def measured(rotation: Array, _eye: Array, distance: Array) -> tuple[Array, Array]:
-        return _edge_residuals(ends, directions, rotation, distance)
+    free = 2 if is_principal_point_free else 0
+    units = np.array([1.0] * 4 + [half] * free)
 
-    eye = np.zeros((*distance.shape, 3))
+    def measured(rotation: Array, center: Array, distance: Array) -> tuple[Array, Array]:
+        shift = center if free else np.zeros((*distance.shape, 2))
+        residual, slopes = _edge_residuals(ends, directions, rotation, distance, shift)
+        return residual, slopes[..., : len(units)] * units
+
     start = distance * half if known_distance is None else np.full_like(distance, known_distance)
-    return _refined(measured, rotation, eye, start, 4, is_lens_known=known_distance is not None), is_mirrored
+    rotation, refined, *rest = _refined(measured, rotation, half * center[..., :free], start, half, known_distance is not None)
+    principal_point = refined if free else np.zeros((*distance.shape, 2))
+    return Solution(rotation, np.zeros((*distance.shape, 3)), principal_point, *rest), is_mirrored
 
 
 def solve_points(points: Array, pixels: Array, half: float, is_flat: bool, known_distance: float | None = None) -> Solution:
@@ -274,7 +304,8 @@ def solve_points(points: Array, pixels: Array, half: float, is_flat: bool, known
     def measured(rotation: Array, eye: Array, distance: Array) -> tuple[Array, Array]:
         return _point_residuals(points, pixels, rotation, eye, distance, scale[..., 0, 0])
 
-    return _refined(measured, rotation, eye, start, 7, scale[..., 0, 0], known_distance is not None)
+    rotation, eye, *rest = _refined(measured, rotation, eye, start, scale[..., 0, 0], known_distance is not None)
+    return Solution(rotation, eye, np.zeros((*distance.shape, 2)), *rest)
 
 
 _AXES = "XYZ"
@@ -308,20 +339,38 @@ def _cross_matrix(vector: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], axis=-2)
 
 
-def _edge_residuals(ends: Array, directions: Array, rotation: Array, distance: Array) -> tuple[Array, Array]:
-    """(..., n) by how far each edge misses its vanishing point, counted at its ends, and what changes that: (..., n, 4).
+def _orthocenter(vanishing: Array) -> Array:
+    """(..., 2) of the triangle of three vanishing points, (..., 3, 3) homogeneous; 0 where that lies outside the picture.
+
+    Two of them, (x, y) and (x′, y′), are seen at a right angle from the eye: x x′ + y y′ − p · (x + x′, y + y′) + p² + d² = 0.
+    Of all three these equations are linear in p and p² + d².
+    """
+    x, y, w = np.moveaxis(vanishing, -1, 0)
+    i, j = np.array(list(combinations(range(3), 2))).T
+    first, second = np.s_[..., i], np.s_[..., j]
+    sums = (x[first] * w[second] + x[second] * w[first], y[first] * w[second] + y[second] * w[first], -w[first] * w[second])
+    products = x[first] * x[second] + y[first] * y[second]
+    center = np.einsum("...ij,...j->...i", np.linalg.pinv(np.stack(sums, axis=-1)), products)[..., :2]
+    return np.where((np.abs(center) <= 1.0).all(axis=-1, keepdims=True), center, 0.0)
+
+
+def _edge_residuals(
+    ends: Array, directions: Array, rotation: Array, distance: Array, principal_point: Array
+) -> tuple[Array, Array]:
+    """(..., n) by how far each edge misses its vanishing point, counted at its ends, and what changes that: (..., n, 6).
 
     The sum of squares of both ends' distances from the line through the vanishing point that suits them best is, but for terms
     of higher order, the square of det(start, end, vanishing point) / √(|W start − V|² + |W end − V|²).
     """
     axis = np.einsum("...ij,nj->...ni", rotation, directions)
-    d = distance[..., None, None]
-    # Columns: the vanishing point (V, W) itself, then its change with the turn about u, v, w and with log d.
-    turned = -_cross_matrix(axis)
-    lens = np.concatenate([axis[..., :2] * d, np.zeros_like(axis[..., :1])], axis=-1)
-    to_picture = np.stack([np.broadcast_to(d, axis[..., :1].shape)] * 2 + [-np.ones_like(axis[..., :1])], axis=-2)
-    point = axis * to_picture[..., 0]
-    changes = np.concatenate([turned * to_picture, lens[..., None]], axis=-1)
+    none, (x, y) = np.zeros_like(distance), np.moveaxis(principal_point, -1, 0)
+    rows = (distance, none, -x), (none, distance, -y), (none, none, none - 1.0)
+    to_picture = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)[..., None, :, :]
+    # Columns: the vanishing point (V, W) itself, then its change with the turn about u, v, w, log d and the principal point.
+    point = (to_picture @ axis[..., None])[..., 0]
+    lens = np.concatenate([axis[..., :2] * distance[..., None, None], np.zeros_like(axis[..., :1])], axis=-1)[..., None]
+    moved = point[..., 2:, None] * np.eye(3)[:, :2]
+    changes = np.concatenate([to_picture @ -_cross_matrix(axis), lens, moved], axis=-1)
     start, end = ends[..., 0, :], ends[..., 1, :]
     normal = np.stack(
         [start[..., 1] - end[..., 1], end[..., 0] - start[..., 0], start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]],
@@ -363,17 +412,21 @@ def _point_residuals(
 def _refined(
     measured: Callable[[Array, Array, Array], tuple[Array, Array]],
     rotation: Array,
-    eye: Array,
+    others: Array,
     distance: Array,
-    unknowns: int,
-    scale: Array | float = 1.0,
-    is_lens_known: bool = False,
-) -> Solution:
-    """The least squares near a start. scale : of the eye's parameters, world units. is_lens_known : the start's is right."""
+    scale: Array | float,
+    is_lens_known: bool,
+) -> tuple[Array, Array, Array, Array, Array]:
+    """The least squares near a start: rotation, others, distance, residuals and covariance, as of a `Solution`.
+
+    others : (..., k) what is asked beside turn and lens: the eye, the principal point, or nothing. scale : the unit in which
+    `measured` counts these. is_lens_known : the start's is right.
+    """
+    unknowns = 4 + others.shape[-1]
     scale = np.broadcast_to(scale, distance.shape)
     asked = [parameter for parameter in range(unknowns) if parameter != 3 or not is_lens_known]
     damping = np.full(distance.shape, 1e-4)
-    residual, jacobian = measured(rotation, eye, distance)
+    residual, jacobian = measured(rotation, others, distance)
     cost = (residual**2).sum(axis=-1)
     for _ in range(_STEPS):
         slopes = jacobian[..., asked]
@@ -386,16 +439,17 @@ def _refined(
         step[..., 3] = np.clip(step[..., 3], -1.0, 1.0)
         tried_rotation = _turned(rotation, step[..., :3])
         tried_distance = distance * np.exp(step[..., 3])
-        tried_eye = eye + scale[..., None] * step[..., 4:] if unknowns > 4 else eye
+        tried_others = others + scale[..., None] * step[..., 4:]
         with np.errstate(all="ignore"):
-            tried_residual, tried_jacobian = measured(tried_rotation, tried_eye, tried_distance)
+            tried_residual, tried_jacobian = measured(tried_rotation, tried_others, tried_distance)
             tried = (tried_residual**2).sum(axis=-1)
         better = np.isfinite(tried_jacobian).all(axis=(-1, -2)) & (tried <= cost)
 
         def chosen(new: Array, old: Array, better: NDArray[np.bool_] = better) -> Array:
             return np.where(better.reshape(better.shape + (1,) * (old.ndim - better.ndim)), new, old)
 
-        rotation, eye, distance = chosen(tried_rotation, rotation), chosen(tried_eye, eye), chosen(tried_distance, distance)
+        rotation, others = chosen(tried_rotation, rotation), chosen(tried_others, others)
+        distance = chosen(tried_distance, distance)
         residual, jacobian, cost = chosen(tried_residual, residual), chosen(tried_jacobian, jacobian), chosen(tried, cost)
         damping = np.where(better, np.maximum(damping / 10.0, 1e-15), np.minimum(damping * 10.0, 1e12))
         if (np.abs(step).max(axis=-1) < _CONVERGED).all():
@@ -409,10 +463,9 @@ def _refined(
     variances = np.where(values[..., :1] > _OPEN, 1.0 / np.maximum(values, _OPEN), 1e300)
     covariance = np.zeros((*distance.shape, unknowns, unknowns))  # of a known lens
     covariance[..., np.array(asked)[:, None], asked] = np.einsum("...pk,...k,...qk->...pq", vectors, variances, vectors) / both
-    if unknowns > 4:
-        units = np.concatenate([np.ones((*distance.shape, 4)), np.repeat(scale[..., None], 3, axis=-1)], axis=-1)
-        covariance = covariance * units[..., :, None] * units[..., None, :]
-    return Solution(_nearest_rotation(rotation), eye, distance, residual, covariance)
+    units = np.concatenate([np.ones((*distance.shape, 4)), np.repeat(scale[..., None], unknowns - 4, axis=-1)], axis=-1)
+    covariance = covariance * units[..., :, None] * units[..., None, :]
+    return _nearest_rotation(rotation), others, distance, residual, covariance
 
 
 def _solved(matrix: Array, vector: Array) -> Array:
@@ -480,7 +533,11 @@ def _match(solution: Solution, like: Pinhole, precision: float, reach: float, sp
     """One camera's answer. reach : from the eye to the look-at point. spare : residuals beyond the unknowns."""
     covariance = solution.covariance * precision**2
     errors = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    distance = float(solution.distance)
+    distance, is_center_free = float(solution.distance), depth is None and len(errors) > 4
+    if is_center_free and not math.hypot(*errors[4:]) < _LARGEST_SHIFT * _half(like):
+        raise InputError(
+            "the principal point can't be told from these: draw longer edges along all three axes, which converge, or keep it"
+        )
     if not (np.isfinite(errors).all() and errors[3] < _LARGEST_ERROR and _is_before(depth)):
         raise InputError(
             "the lens can't be told from these: draw longer edges, or choose a view that is not head-on, so that lines converge"
@@ -493,7 +550,7 @@ def _match(solution: Solution, like: Pinhole, precision: float, reach: float, sp
         distance,
         like.width,
         like.height,
-        like.principal_point,
+        tuple((np.array(like.principal_point) + solution.principal_point).tolist()),
     )
     corner = math.hypot(like.width, like.height) / 2
     pixels = {
@@ -501,13 +558,16 @@ def _match(solution: Solution, like: Pinhole, precision: float, reach: float, sp
         "up": float(errors[2]) * corner,
         "distance": float(errors[3]) * corner,
     }
+    if is_center_free:
+        pixels["principal_point"] = math.hypot(*errors[4:])
     if depth is not None:
         across = rotation[:2] @ covariance[4:, 4:] @ rotation[:2].T
         pixels["eye"] = distance / depth * math.sqrt(max(float(np.trace(across)), 0.0))
     factor = math.exp(errors[3])
     left = math.sqrt(float((solution.residuals**2).sum()) / spare) if spare > 0 else 0.0
     eye_error = tuple(errors[4:].tolist()) if depth is not None else None
-    return Match(pinhole, precision, left, (distance / factor, distance * factor), eye_error, pixels)
+    center_error = tuple(errors[4:].tolist()) if is_center_free else None
+    return Match(pinhole, precision, left, (distance / factor, distance * factor), eye_error, center_error, pixels)
 
 
 def _is_before(depth: float | None) -> bool:

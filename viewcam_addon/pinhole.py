@@ -458,10 +458,10 @@ def _is_moderate(e: tuple, l: tuple) -> bool | Array:
 def _orthonormal(apart: Pair, across: Pair) -> tuple[tuple, tuple, tuple]:
     """(u, v, w) from e − l and up × (e − l); v is their product, and not w × u, which would carry the rounding of both."""
     upward = exact.cross_of_perpendicular(*apart, *across)
-    return _normalised(across[0]), _normalised(upward), _normalised(apart[0])
+    return _normalized(across[0]), _normalized(upward), _normalized(apart[0])
 
 
-def _normalised(vector: tuple) -> tuple:
+def _normalized(vector: tuple) -> tuple:
     size = exact.length(vector)
     return tuple(component / size for component in vector)
 

@@ -88,7 +88,7 @@ def steps(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike, within: float) -> t
         as pinhole.basis does.
     """
     u, v, w = basis(eye, look_at, up)
-    pole = _normalised(np.broadcast_to(np.asarray(up, dtype=np.float64), w.shape))
+    pole = _normalized(np.broadcast_to(np.asarray(up, dtype=np.float64), w.shape))
     carried = _rotated(u[:-1], w[:-1], w[1:])
     turns = np.arctan2(_dot(carried, v[1:]), _dot(carried, u[1:]))
     # Up may move as well: then the view's own start is where it would stand had it moved along with up.
@@ -127,7 +127,7 @@ def _passes_near(start: Array, end: Array, pole: Array, within: float) -> NDArra
     return (np.minimum.reduce(angles) <= within) | half_turn
 
 
-def _normalised(vectors: Array) -> Array:
+def _normalized(vectors: Array) -> Array:
     scaled = vectors / np.abs(vectors).max(axis=-1, keepdims=True)
     return scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
 

@@ -141,7 +141,7 @@ def _wound(angle: float, near: float) -> float:
     return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))
 
 
-def neighbours(numbers: Sequence[float]) -> Iterator[tuple[float, ...]]:
+def neighbors(numbers: Sequence[float]) -> Iterator[tuple[float, ...]]:
     """The n numbers rounded to float32, then all 3ⁿ − 1 that differ from these by a step of float32 in some of them."""
     rounded = np.array(numbers, dtype=np.float32)
     yield tuple(rounded.tolist())

@@ -57,7 +57,7 @@ def read(name: str, path: Path | None, text: str, size: str, values: str) -> dic
     Returns
     -------
     dict
-        y_up; metres_per_unit; documentation of the root layer; values (of all prims, texts); left_out (what is not read, as it
+        y_up; meters_per_unit; documentation of the root layer; values (of all prims, texts); left_out (what is not read, as it
         stands in the file); cameras: each a name and an error, or samples: each with the time, seconds (None if there is one
         alone), size, matrix (16, for row vectors) and the attributes of the lens by their names.
 
@@ -137,7 +137,7 @@ def _read(request: dict[str, Any]) -> dict[str, Any]:
     stage = Usd.Stage.Open(root)
     result: dict[str, Any] = {
         "y_up": UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y,
-        "metres_per_unit": UsdGeom.GetStageMetersPerUnit(stage),
+        "meters_per_unit": UsdGeom.GetStageMetersPerUnit(stage),
         "documentation": _text(lambda: root.documentation),
         "cameras": [],
         "values": [],

@@ -30,7 +30,7 @@ class Fault:
 
 def room() -> Document:
     """Balls and a tent on a floor before a wall, an area lamp and a sun."""
-    grey = {"diffuse": [0.6, 0.6, 0.6]}
+    gray = {"diffuse": [0.6, 0.6, 0.6]}
     return {
         "format": "virtual-pinhole-scene",
         "version": 1,
@@ -54,12 +54,12 @@ def room() -> Document:
             },
         },
         "objects": [
-            {"name": "floor", "geometry": "floor", "object_index": 1, "materials": ["grey"]},
+            {"name": "floor", "geometry": "floor", "object_index": 1, "materials": ["gray"]},
             {"name": "wall", "geometry": "wall", "object_index": 2, "materials": ["red"]},
             {"name": "ball", "geometry": "ball", "object_index": 3, "materials": ["blue"], "location": [-1.2, 0, 1]},
-            {"name": "tent", "geometry": "tent", "object_index": 4, "materials": ["grey"], "location": [1.5, -0.5, 0]},
+            {"name": "tent", "geometry": "tent", "object_index": 4, "materials": ["gray"], "location": [1.5, -0.5, 0]},
         ],
-        "materials": {"grey": grey, "red": {"diffuse": [0.7, 0.3, 0.2]}, "blue": {"diffuse": [0.2, 0.4, 0.8]}},
+        "materials": {"gray": gray, "red": {"diffuse": [0.7, 0.3, 0.2]}, "blue": {"diffuse": [0.2, 0.4, 0.8]}},
         "lamps": [
             {"type": "area", "name": "panel", "location": [0, -1, 5], "size": [2, 2], "power": [300, 300, 300]},
             {"type": "sun", "name": "sun", "towards": [1, -1, 1.5], "irradiance": [1, 1, 0.9], "angle": 0.1},
@@ -143,9 +143,9 @@ def _encoded(linear: NDArray) -> NDArray:
     return np.maximum(linear, 0) ** np.float32(1 / 2.2)
 
 
-def _blurred(colour: NDArray) -> NDArray:
-    around = np.pad(colour, ((1, 1), (1, 1), (0, 0)), mode="edge")
-    height, width = colour.shape[:2]
+def _blurred(color: NDArray) -> NDArray:
+    around = np.pad(color, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    height, width = color.shape[:2]
     return sum(around[i : i + height, j : j + width] for i in range(3) for j in range(3)) / np.float32(9)
 
 
@@ -196,9 +196,9 @@ FAULTS = (
     Fault("picture", "exposed by 0.5 % more", _put("film", {"exposure": 1.005})),
     Fault("picture", "a tile lost", of_picture=_tile(lambda tile: 0 * tile)),
     Fault("picture", "a tile 5 % brighter", of_picture=_tile(lambda tile: np.float32(1.05) * tile)),
-    Fault("picture", "colour management twice", of_picture=_light(_encoded)),
-    Fault("picture", "clamped at 0.8", of_picture=_light(lambda colour: np.minimum(colour, np.float32(0.8)))),
-    Fault("picture", "red and blue exchanged", of_picture=_light(lambda colour: colour[..., ::-1].copy())),
+    Fault("picture", "color management twice", of_picture=_light(_encoded)),
+    Fault("picture", "clamped at 0.8", of_picture=_light(lambda color: np.minimum(color, np.float32(0.8)))),
+    Fault("picture", "red and blue exchanged", of_picture=_light(lambda color: color[..., ::-1].copy())),
     Fault("picture", "blurred over 3 × 3 pixels", of_picture=_light(_blurred)),
     Fault("picture", "a pixel that is no number", of_picture=_pixel(np.nan)),
     Fault("picture", "a black pixel", of_picture=_pixel(0.0)),

@@ -77,9 +77,9 @@ def z_test(reference: Array, test: Array, variance: Array, samples: int) -> floa
 RIVALS = {"FLIP": flip, "idiff": idiff, "SSIM": ssim, "z-test": z_test}
 
 
-def _screen(colour: Array) -> Array:
+def _screen(color: Array) -> Array:
     """sRGB in 256 steps; what is no number is black, as a file of 8 bits has it."""
-    return np.round(255 * pictures.on_screen(colour, 0.9)) / 255
+    return np.round(255 * pictures.on_screen(color, 0.9)) / 255
 
 
 def without_the_tracers_own(picture: Image) -> Image:

@@ -93,11 +93,11 @@ def _edge(scene: bpy.types.Scene) -> None:
 
 
 def _shadow(scene: bpy.types.Scene, walls: bool = False) -> None:
-    grey = _material("ShaderNodeBsdfDiffuse")
-    _board(scene, (20.0, 20.0), (0.0, 0.0, 0.0), grey)
-    _board(scene, (1.2, 1.2), (0.2, 0.0, 0.8), grey)
+    gray = _material("ShaderNodeBsdfDiffuse")
+    _board(scene, (20.0, 20.0), (0.0, 0.0, 0.0), gray)
+    _board(scene, (1.2, 1.2), (0.2, 0.0, 0.8), gray)
     if walls:
-        _board(scene, (20.0, 20.0), (0.0, 2.5, 0.0), grey).rotation_euler = (1.5707963, 0.0, 0.0)
+        _board(scene, (20.0, 20.0), (0.0, 2.5, 0.0), gray).rotation_euler = (1.5707963, 0.0, 0.0)
     lamp = bpy.data.lights.new("Lamp", "AREA")
     lamp.energy, lamp.size = 150.0, 1.0
     placed = bpy.data.objects.new("Lamp", lamp)

@@ -69,7 +69,7 @@ def charts(quick: bool) -> tuple[Chart]:
             "geometry",
             f"Level geometry, {size[0]} × {size[1]}, three Suzannes: the picture, and the whole job",
             f"seconds: median, least and most of {rounds}",
-            "pixels, median distance of positions from pixel centres",
+            "pixels, median distance of positions from pixel centers",
             tuple(curves),
             f"Read {'; '.join(claim.summary() for claim in claims)}.{' Quick: not judged.' if quick else ''}",
             tie=0.0,
@@ -88,7 +88,7 @@ def _beside_cycles(size: tuple[int, int], rounds: int) -> tuple[dict[Figure, con
         start = functools.partial(start_contestant, processes)
         sides = {CYCLES: start(prepare_cycles, "three suzannes", "geometry", size, scene, threads)}
         sides[OURS] = start(tracer.prepare, scene, "geometry", threads)
-        error = functools.partial(distance_from_centres, scene_file.read(scene).camera)
+        error = functools.partial(distance_from_centers, scene_file.read(scene).camera)
         effort = Effort(rounds, enough=0, longest=float("inf"))
         tracks = {figure: contest.measure(sides, METHODS, figure.key, error, effort, path) for figure in _WANTED}
     claims = []
@@ -114,7 +114,7 @@ def _share(level: str, scene_name: str, size: tuple[int, int], rounds: int) -> C
     return Claim(f"share of bare Embree's ray rate at {level}", median, _LEAST_SHARE[level])
 
 
-def distance_from_centres(camera: Pinhole, path: Path) -> float:
+def distance_from_centers(camera: Pinhole, path: Path) -> float:
     """Pixels: the median over all that is hit."""
     picture = image.read(path, only=("Position", "Depth"))
     rows, columns = np.nonzero(picture["Depth"][..., 0] < BACKGROUND_DEPTH)

@@ -116,7 +116,7 @@ def write(scene: Scene, folder: Path) -> None:
         for place, matrix in enumerate(placed.matrices):
             file = folder / f"{number}.{place}.ply"
             _mesh(mitsuba, geometry, placed.name, matrix).write_ply(str(file))
-            document["objects"].append({"file": file.name, "smooth": smooth, "colour": material.surface["color"].rgb})
+            document["objects"].append({"file": file.name, "smooth": smooth, "color": material.surface["color"].rgb})
     for lamp in scene.lamps:
         if not isinstance(lamp, Sun) or lamp.angle:
             raise InputError(f"light {lamp.name!r} is no sun without size: race Mitsuba on another scene")

@@ -34,12 +34,12 @@ def load(folder: Path) -> Any:
         "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
     }
     for number, placed in enumerate(document["objects"]):
-        colour = {"type": "diffuse", "reflectance": {"type": "rgb", "value": placed["colour"]}}
+        color = {"type": "diffuse", "reflectance": {"type": "rgb", "value": placed["color"]}}
         scene[f"object {number}"] = {
             "type": "ply",
             "filename": str(folder / placed["file"]),
             "face_normals": not placed["smooth"],
-            "bsdf": {"type": "twosided", "nested": colour},
+            "bsdf": {"type": "twosided", "nested": color},
         }
     for number, sun in enumerate(document["suns"]):
         irradiance = {"type": "rgb", "value": sun["irradiance"]}

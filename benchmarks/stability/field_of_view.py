@@ -122,5 +122,5 @@ def _cycles_distance(scene: bpy.types.Scene, camera: bpy.types.Object) -> float:
         position = read_elsewhere(Path(folder, "wall.exr")).passes["Position"].astype(np.float64)
     scene.render.resolution_x = scene.render.resolution_y = SIZE
     bpy.data.objects.remove(wall)
-    from_centre = np.arange(PIXELS) + 0.5 - PIXELS / 2
-    return SIZE / PIXELS * float(np.mean(from_centre / (position[..., 0] / -position[..., 2])))
+    from_center = np.arange(PIXELS) + 0.5 - PIXELS / 2
+    return SIZE / PIXELS * float(np.mean(from_center / (position[..., 0] / -position[..., 2])))

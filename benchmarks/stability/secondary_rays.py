@@ -329,11 +329,11 @@ def _of_spheres(distance: float, rays: int) -> dict[str, float]:
     return counts
 
 
-def _meets_its_sphere(centres: Array, starts: Array, directions: Array) -> NDArray[np.bool_]:
+def _meets_its_sphere(centers: Array, starts: Array, directions: Array) -> NDArray[np.bool_]:
     """True where rays meet unit spheres, each its own: (n, 3)."""
     met = np.empty(len(starts), bool)
-    for ray, (centre, start, direction) in enumerate(zip(centres, starts, directions, strict=True)):
-        alone = _core_of(Spheres(centre[None], np.ones(1), np.zeros(1, np.int32)))
+    for ray, (center, start, direction) in enumerate(zip(centers, starts, directions, strict=True)):
+        alone = _core_of(Spheres(center[None], np.ones(1), np.zeros(1, np.int32)))
         met[ray] = _met(alone, start[None], direction[None])[0]
     return met
 

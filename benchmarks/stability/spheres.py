@@ -66,7 +66,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
         Chart(
             "spheres-distance",
             "Small spheres far away: depth",
-            "distance of the centre / radius",
+            "distance of the center / radius",
             depth,
             distance,
             "Read where a curve leaves the floor. The textbook's discriminant loses the square of the distance, that of the "
@@ -76,7 +76,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
         Chart(
             "spheres-distance-decisions",
             "Small spheres far away: hit or miss",
-            "distance of the centre / radius",
+            "distance of the center / radius",
             share,
             decisions,
             "Rays aimed evenly at the disc and a tenth of its radius beyond. Ours errs for one ray in two thousand from 1e13 "
@@ -142,7 +142,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "distance of eye and sphere from the origin / radius",
             depth,
             far,
-            "The others subtract the eye from a centre that was rounded in world space. Ours takes the eye into the object's "
+            "The others subtract the eye from a center that was rounded in world space. Ours takes the eye into the object's "
             "space as a pair of float64: its depth does not know where the origin is.",
             tie=SLANTED_TIE,
         ),
@@ -150,19 +150,19 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
 
 
 def _far_away(distance: float, rays: int, random: np.random.Generator) -> Shots:
-    centers = _centres(distance, rays, random)
+    centers = _centers(distance, rays, random)
     offset = 1.1 * np.sqrt(random.uniform(0, 1, rays))
     return _aimed(np.eye(4), centers, np.ones(rays), offset, random)
 
 
 def _grazed(gap: float, rays: int, random: np.random.Generator) -> Shots:
-    centers = _centres(10 ** random.uniform(0.5, 1.5, rays), rays, random)
+    centers = _centers(10 ** random.uniform(0.5, 1.5, rays), rays, random)
     return _aimed(np.eye(4), centers, np.ones(rays), 1 + gap * random.choice([-1, 1], rays), random)
 
 
 def _from_nearby(gap: float, rays: int, random: np.random.Generator) -> Shots:
     """Eyes near a surface, each at the origin before its own sphere, looking anywhere before them."""
-    centers = _centres(1 + gap * random.choice([-1, 1], rays), rays, random, 1.4)
+    centers = _centers(1 + gap * random.choice([-1, 1], rays), rays, random, 1.4)
     across = random.normal(size=(2, rays))
     return Shots(np.eye(4), centers, np.ones(rays), np.zeros(3), *across)
 
@@ -188,7 +188,7 @@ def _far_from_origin(distance: float, rays: int, random: np.random.Generator) ->
     return Shots(matrix, centers, np.ones(rays), eye, -x / z, -y / z)
 
 
-def _centres(distance: float | Array, rays: int, random: np.random.Generator, spread: float = 0.5) -> Array:
+def _centers(distance: float | Array, rays: int, random: np.random.Generator, spread: float = 0.5) -> Array:
     """(3, n) points at these distances from the origin, in the directions of a picture."""
     directions = np.stack([*random.uniform(-spread, spread, (2, rays)), np.full(rays, -1.0)])
     return directions / np.linalg.norm(directions, axis=0) * distance

@@ -125,11 +125,11 @@ def _hits_of_fans(size: float, fans: int, random: np.random.Generator) -> Iterat
     side = int(np.clip(0.4 / size, 1, 16))  # fans stand in a square, apart from one another
     groups = [_Fans(size, side, random) for _ in range(min(60, -(-fans // side**2)))]
     for name, test in _FORMULAS.items():
-        yield name, np.concatenate([group.hits(lambda *given, test=test: np.isfinite(test(*given))) for group in groups])
+        yield name, np.concatenate([group.hits(lambda *rays, test=test: np.isfinite(test(*rays))) for group in groups])
     for name, robust in (("Embree", False), ("Embree, robust", True)):
-        yield name, np.concatenate([group.first_hits(lambda *given, r=robust: _embree_depth(*given, r)) for group in groups])
+        yield name, np.concatenate([group.first_hits(lambda *rays, r=robust: _embree_depth(*rays, r)) for group in groups])
     for name, packets in (("ours", True), ("ours, one by one", False)):
-        counts = np.concatenate([group.first_hits(lambda *given, p=packets: _core_depth(*given, p)) for group in groups])
+        counts = np.concatenate([group.first_hits(lambda *rays, p=packets: _core_depth(*rays, p)) for group in groups])
         values = np.concatenate([np.isfinite(_core_depth(group.corners, group.x, group.y, packets)) for group in groups])
         yield name, np.where(values, np.maximum(counts, 1), 0)
 
@@ -146,13 +146,13 @@ class _Fans:
     def __init__(self, size: float, side: int, random: np.random.Generator) -> None:
         count, n = side**2, self._TRIANGLES
         place = (np.stack(np.divmod(np.arange(count), side), axis=-1) + 0.5) / side * 2 - 1
-        centre = place + random.uniform(-0.1, 0.1, (count, 2)) / side
+        center = place + random.uniform(-0.1, 0.1, (count, 2)) / side
         depth = np.exp(random.uniform(-0.7, 0.7, count))
         angle = 2 * np.pi * (np.arange(n) + random.uniform(-0.3, 0.3, (count, n))) / n
         reach = size * random.uniform(0.5, 1, (count, n))
-        rim = centre[:, None] + reach[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        rim = center[:, None] + reach[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         rim_depth = depth[:, None] * (1 + 0.5 * size * random.uniform(-1, 1, (count, n)))
-        middle = np.concatenate([centre, np.ones((count, 1))], axis=1) * depth[:, None]
+        middle = np.concatenate([center, np.ones((count, 1))], axis=1) * depth[:, None]
         ring = np.concatenate([rim, np.ones((count, n, 1))], axis=2) * rim_depth[..., None]
         corners = np.stack([np.repeat(middle[:, None], n, axis=1), ring, np.roll(ring, -1, axis=1)]).reshape(3, -1, 3)
         start = random.integers(0, 3, corners.shape[1])  # which corner a triangle names first

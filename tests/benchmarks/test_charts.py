@@ -109,14 +109,17 @@ def test_a_chart_is_drawn_from_its_figures_as_it_was_drawn_when_it_was_measured(
 
 
 def test_what_is_measured_anew_stands_beside_the_figures_of_all_others():
-    def told(charts, *behind):
+    def document(charts, *behind):
         return {"behind": list(behind), "charts": {name: {"title": title, "run": run} for name, title, run in charts}}
 
-    earlier = told([("s-a", "A", 1), ("s-b", "A box", 1)], "A: slow", "A box: slow")
-    assert charts.beside(earlier, told([("s-a", "A", 2)])) == (1, told([("s-a", "A", 2), ("s-b", "A box", 1)], "A box: slow"))
-    assert charts.beside(earlier, told([("s-a", "A", 2), ("s-b", "A box", 2)]))[0] == 0
-    again = told([("s-b", "A box", 2)], "A box: slower")
-    assert charts.beside(earlier, again) == (1, told([("s-a", "A", 1), ("s-b", "A box", 2)], "A: slow", "A box: slower"))
+    earlier = document([("s-a", "A", 1), ("s-b", "A box", 1)], "A: slow", "A box: slow")
+    assert charts.beside(earlier, document([("s-a", "A", 2)])) == (
+        1,
+        document([("s-a", "A", 2), ("s-b", "A box", 1)], "A box: slow"),
+    )
+    assert charts.beside(earlier, document([("s-a", "A", 2), ("s-b", "A box", 2)]))[0] == 0
+    again = document([("s-b", "A box", 2)], "A box: slower")
+    assert charts.beside(earlier, again) == (1, document([("s-a", "A", 1), ("s-b", "A box", 2)], "A: slow", "A box: slower"))
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"charts": {"a": {"title": "A"}}}', '{"behind": []}'])
@@ -133,26 +136,26 @@ def test_a_chart_brings_its_paper_along_and_turns_dark_where_the_reader_prefers_
     text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
     dark = text.partition("prefers-color-scheme: dark")[2].partition("</style>")[0]
     drawn = text.partition("</style>")[0].partition("<style")[0] + text.partition("</style>")[2]
-    for colour in charts._IN_THE_DARK:
-        assert f'[style*="fill: {colour}"]' in dark and f'[style*="stroke: {colour}"]' in dark
-    for colour in (charts._INK, charts._BACKGROUND, charts._FAINT, charts._GRID, charts._OURS):
-        assert f"fill: {colour}" in drawn or f"stroke: {colour}" in drawn, f"nothing is {colour}: the rule for it does nothing"
+    for color in charts._IN_THE_DARK:
+        assert f'[style*="fill: {color}"]' in dark and f'[style*="stroke: {color}"]' in dark
+    for color in (charts._INK, charts._BACKGROUND, charts._FAINT, charts._GRID, charts._OURS):
+        assert f"fill: {color}" in drawn or f"stroke: {color}" in drawn, f"nothing is {color}: the rule for it does nothing"
 
 
-def test_every_colour_of_a_chart_can_be_read_on_a_light_and_on_a_dark_page():
+def test_every_color_of_a_chart_can_be_read_on_a_light_and_on_a_dark_page():
     """3 to 1, which WCAG 2.1 asks of what graphics are made of; of the grid nobody asks it."""
 
-    def luminance(colour):
-        shares = np.array(matplotlib.colors.to_rgb(colour))
+    def luminance(color):
+        shares = np.array(matplotlib.colors.to_rgb(color))
         return np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4) @ (0.2126, 0.7152, 0.0722)
 
-    def contrast(*colours):
-        dark, light = sorted(map(luminance, colours))
+    def contrast(*colors):
+        dark, light = sorted(map(luminance, colors))
         return (light + 0.05) / (dark + 0.05)
 
-    for colour in (charts._INK, charts._FAINT, charts._OURS, *charts._COLOURS):
-        at_night = contrast(charts._IN_THE_DARK[colour], charts._IN_THE_DARK[charts._BACKGROUND])
-        assert contrast(colour, charts._BACKGROUND) >= 3 <= at_night, f"{colour} can't be read"
+    for color in (charts._INK, charts._FAINT, charts._OURS, *charts._COLORS):
+        at_night = contrast(charts._IN_THE_DARK[color], charts._IN_THE_DARK[charts._BACKGROUND])
+        assert contrast(color, charts._BACKGROUND) >= 3 <= at_night, f"{color} can't be read"
 
 
 def test_how_far_measurements_spread_is_drawn(tmp_path):

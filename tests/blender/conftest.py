@@ -288,13 +288,13 @@ def add_lamp(fresh_blender, scene):
 def set_world(fresh_blender, scene):
     """set_world(color, strength) → a new world of a Background node, which is the scene's."""
 
-    def make(colour=(1, 1, 1), strength=1.0):
+    def make(color=(1, 1, 1), strength=1.0):
         world = fresh_blender.data.worlds.new("World")
         if not world.node_tree:
             world.use_nodes = True
         scene.world = world
         background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-        background.inputs["Color"].default_value = (*colour, 1)
+        background.inputs["Color"].default_value = (*color, 1)
         background.inputs["Strength"].default_value = strength
         return world
 

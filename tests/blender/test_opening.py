@@ -18,7 +18,7 @@ from viewcam_addon import child_process
 from viewcam_addon.blender import dataset_cameras, opening, versions
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
-from viewcam_addon.errors import InputError, NotModelledError
+from viewcam_addon.errors import InputError, NotModeledError
 from viewcam_addon.jobs.job import Job
 
 pytestmark = pytest.mark.slow
@@ -336,7 +336,7 @@ def test_what_is_off_is_told(fresh_blender, tmp_path):
         first, *_ = command(blend, tmp_path / "out", False)  # Blender 4.5 and 5.2 have a second to say
         assert "Freestyle draws no lines in view layer 'ViewLayer'" in first and "--trust" in first, name
         assert command(blend, tmp_path / "out", True) == [], name
-    with pytest.raises(NotModelledError, match="Freestyle"):
+    with pytest.raises(NotModeledError, match="Freestyle"):
         jobs.export(Job(blend=blend, strict=True))
 
 

@@ -167,8 +167,8 @@ def seconds_each(action, count=100, rounds=3):
 
 
 # Calibrated: point, moved, target on a busy machine with any Blender from 4.2 to 5.2, where Blender's own move takes 0.04 ms (a
-# point 51 with 4.2 beside another suite); keyed twice the 32 of Blender 5.0, where it takes 0.011 ms (a frame change does more of
-# Blender's own than a move does).
+# point 51 with 4.2 beside another suite); keyed twice the 32 of Blender 5.0, where it takes 0.011 ms (a frame change does more
+# of Blender's own than a move does).
 LARGEST_MULTIPLES = {"point": 70, "moved": 70, "target": 62, "keyed": 64}
 
 

@@ -64,7 +64,7 @@ def test_under_a_target_the_eye_moves_and_the_view_keeps_the_target(posed_camera
     assert (column, row) == pytest.approx((960, 540), abs=1e-3)
 
 
-def test_a_cancelled_move_gives_every_bit_back(posed_camera, scene):
+def test_a_canceled_move_gives_every_bit_back(posed_camera, scene):
     group = posed_camera.virtual_pinhole
     group.eye = (7.1, -6, 5)
     group.exact = "[7.1000000001, -6, 5, 0, 0, 1, 0, 0, 1, 1500]"  # more digits than Blender's
@@ -79,7 +79,7 @@ def test_a_cancelled_move_gives_every_bit_back(posed_camera, scene):
     assert cameras.stated(posed_camera, scene) == pinhole
 
 
-def test_a_turn_that_is_cancelled_after_a_move_that_was_not_gives_every_bit_back(posed_camera, scene):
+def test_a_turn_that_is_canceled_after_a_move_that_was_not_gives_every_bit_back(posed_camera, scene):
     """Blender updates what a move has ended with once more. Many moves, and one of many steps."""
     posed_camera.rotation_euler = (1.1, 0.2, 0.7)
     update()

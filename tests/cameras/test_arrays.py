@@ -61,7 +61,7 @@ CODES = {
 
 @pytest.mark.parametrize("name", CODES)
 def test_a_camera_in_the_code_of_any_language_is_that_camera(name):
-    assert cameras.recognised(CODES[name]) == "arrays"
+    assert cameras.recognized(CODES[name]) == "arrays"
     the_same(cameras.read(CODES[name], options=CORNER), known)
 
 

@@ -181,4 +181,4 @@ def test_a_scene_of_three_js_editor_has_its_windows_camera_and_its_own():
 
 def test_a_stray_sign_before_pbrts_first_statement_hides_nothing_of_it():
     text = '-Scale -1 1 1\nLookAt 7 -6 4  0 0 1  0 0 1\nCamera "perspective" "float fov" 40\n'
-    assert cameras.recognised(text) == "pbrt" and not read(text).pinhole.mirrored
+    assert cameras.recognized(text) == "pbrt" and not read(text).pinhole.mirrored

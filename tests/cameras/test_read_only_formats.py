@@ -1,6 +1,7 @@
 """Formats that are only read: files made here by each format's own rule, from the camera's axes alone, are the same camera."""
 
 import json
+import math
 import re
 import struct
 
@@ -72,6 +73,51 @@ def test_fspy_counts_in_halves_of_the_longer_side(tmp_path, name):
     (tmp_path / "house.fspy").write_bytes(b"fspy" + struct.pack("<III", 1, len(state), len(picture)) + state + picture)
     read = the_same(cameras.read(tmp_path / "house.fspy"), known)
     assert read.picture == picture and read.name == "house" and "feet" in read.notes[0]
+
+
+FSPY_EXPORTED = {  # by fSpy, of a photograph that somebody published with it
+    "principalPoint": {"x": 0, "y": 0},
+    "cameraTransform": {
+        "rows": [
+            [-0.9734138207025481, 0.04196681158657723, -0.22517619854355045, -0.6959172306086093],
+            [0.0965054651828195, -0.8164170790874036, -0.5693415918095569, -4.4653045032151235],
+            [-0.2077311456068041, -0.5759357079567556, 0.7906616415668815, 9.234054171727681],
+            [0, 0, 0, 1],
+        ]
+    },
+    "horizontalFieldOfView": 1.3678550657796624,
+    "verticalFieldOfView": 1.097495385241209,
+    "vanishingPoints": [
+        {"x": 0.3222986638911469, "y": 0.8935747627994785},
+        {"x": -5.303011682125709, "y": 0.22862885996889182},
+        {"x": 0.20793450169726774, "y": -1.7590846093077017},
+    ],
+    "vanishingPointAxes": ["zNegative", "xPositive", "yNegative"],
+    "relativeFocalLength": 1.2267259679457512,
+    "imageWidth": 4032,
+    "imageHeight": 3024,
+}
+
+
+@pytest.mark.parametrize("left_out", ["horizontalFieldOfView", "relativeFocalLength"])
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_what_fspy_exports_sees_its_axes_at_its_vanishing_points(left_out, wrapped):
+    exported = {key: value for key, value in FSPY_EXPORTED.items() if key != left_out}
+    (camera,) = cameras.read(json.dumps({"cameraParameters": exported} if wrapped else exported))
+    assert camera.size_stated
+    signs = {"zNegative": (0, 0, -1), "xPositive": (1, 0, 0), "yNegative": (0, -1, 0)}
+    for point, axis in zip(exported["vanishingPoints"], exported["vanishingPointAxes"], strict=True):
+        direction = np.array(signs[axis], float)
+        toward = direction * np.sign(direction @ np.subtract(camera.pinhole.look_at, camera.pinhole.eye))
+        column, row, _ = camera.pinhole.project((camera.pinhole.eye + 1e12 * toward)[None])
+        there = 2016 + 2016 * point["x"], 1512 + 2016 * point["y"]  # in halves of the longer side
+        assert math.hypot(column[0] - there[0], row[0] - there[1]) < 1e-3 * math.hypot(*there)
+
+
+def test_fspys_principal_point_of_a_portrait_counts_in_halves_of_its_height():
+    exported = FSPY_EXPORTED | {"imageWidth": 3024, "imageHeight": 4032, "principalPoint": {"x": 0.25, "y": -0.5}}
+    (camera,) = cameras.read(json.dumps(exported))
+    assert camera.pinhole.principal_point == (1512 + 504, 2016 - 1008)
 
 
 def metashape(known, lens="", label="left.jpg"):
@@ -444,7 +490,7 @@ def test_gaussian_splattings_principal_point_counts_where_it_is_said():
 
 
 def nerfstudio_path(*known, fov=None):
-    """As get_path_from_json takes it: the focal length is height / 2 / tan(fov / 2)."""
+    """A path as get_path_from_json takes it: the focal length is height / 2 / tan(fov / 2)."""
     path = [
         {
             "camera_to_world": [*each.opengl.ravel().tolist(), 0, 0, 0, 1],
@@ -489,6 +535,176 @@ def test_a_path_flies_at_its_frames_a_second_and_other_cameras_are_refused():
         cameras.write(pair, "nerfstudio_path")
 
 
+def instant_ngp(known, scale=0.33, offset=0.5):
+    """The other way than it is read: nerf_matrix_to_ngp of instant-ngp's nerf_loader.h, quaternions by scipy."""
+    matrix = known.opengl @ np.diag([1.0, -1, -1, 1])
+    matrix[:, 3] = known.e * scale + offset
+    matrix = matrix[[1, 2, 0]]
+    quaternion = pytest.importorskip("scipy.spatial.transform").Rotation.from_matrix(matrix[:, :3]).as_quat()
+    fov = np.degrees(2 * np.arctan(0.5 * known.height / known.f_y))
+    rest = {"slice": 0.0, "scale": 1.5, "aperture_size": 0.0}
+    return {"R": quaternion.tolist(), "T": matrix[:, 3].tolist(), "fov": fov, **rest}
+
+
+@pytest.mark.parametrize("name", CENTERED)
+def test_instant_ngps_path_is_taken_out_of_its_unit_cube(tmp_path, name):
+    known = Known(name)
+    options = Options(size=(known.width, known.height))
+    unit = (1 + known.f_y / known.height) * 2.0**-48  # of a telephoto's angle less is kept
+    read = the_same(cameras.read(json.dumps({"path": [instant_ngp(known)], "time": 0.0}), options=options), known, unit)
+    assert any("unit cube" in note for note in read.notes)
+    offset = np.array([0.1, 0.2, -0.3])
+    (tmp_path / "base_cam.json").write_text(json.dumps({"path": [instant_ngp(known, 2.5, offset)], "time": 0.0}))
+    (tmp_path / "transforms.json").write_text(json.dumps({"scale": 2.5, "offset": offset.tolist(), "frames": []}))
+    read = the_same(cameras.read(tmp_path / "base_cam.json", options=options), known, unit)
+    assert not any("unit cube" in note for note in read.notes)
+    (tmp_path / "transforms.json").write_text(json.dumps({"from_mitsuba": True, "frames": []}))
+    with pytest.raises(InputError, match="from_mitsuba"):
+        cameras.read(tmp_path / "base_cam.json", options=options)
+
+
+def test_instant_ngps_keyframes_are_read_in_order_and_what_else_moves_the_picture_is_told():
+    known, size = Known("plain"), Options(size=(640, 360))
+    path = [instant_ngp(known) | {"T": [0.5 + 0.33 * i, 0.5, 0.5]} for i in range(3)]
+    read = cameras.read(json.dumps({"path": path}), options=size)
+    assert [camera.name for camera in read] == ["00000", "00001", "00002"]
+    assert [camera.pinhole.eye for camera in read] == [pytest.approx((0, i, 0), abs=1e-15) for i in range(3)]
+    assert any("spline" in note for note in read[0].notes)
+    straight = cameras.read(json.dumps({"path": path, "spline_order": 1}), options=size)
+    assert not any("spline" in note for note in straight[0].notes)
+    path[1]["dof"] = 0.02
+    assert any("aperture" in note for note in cameras.read(json.dumps({"path": path}), options=size)[0].notes)
+    scaled = json.dumps({"path": [path[0] | {"R": [3 * part for part in path[0]["R"]]}]})  # as instant-ngp normalizes it
+    assert cameras.read(scaled, options=size)[0].pinhole == read[0].pinhole
+    for wrong, sentence in ({"R": [0, 0, 0, 0]}, "length 0"), ({"fov": 180}, "fov"), ({"T": [1, 2]}, "should have 3"):
+        with pytest.raises(InputError, match=sentence):
+            cameras.read(json.dumps({"path": [path[0] | wrong]}), options=size)
+
+
+def kubric(*known, **metadata):
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    quaternions = [np.roll(rotation.from_matrix(each.opengl[:, :3]).as_quat(), 1).tolist() for each in known]
+    camera = {"positions": [each.e.tolist() for each in known], "quaternions": quaternions, "sensor_width": 32.0}
+    camera["focal_length"] = known[0].f_x / known[0].width * 32
+    metadata_of_views = {"resolution": [known[0].width, known[0].height], "frame_rate": 12, **metadata}
+    return {"camera": camera, "metadata": metadata_of_views, "instances": []}
+
+
+@pytest.mark.parametrize("name", CENTERED)
+def test_kubrics_sensor_is_as_wide_as_the_picture_also_of_a_portrait(name):
+    read = the_same(cameras.read(json.dumps(kubric(Known(name)))), Known(name))
+    assert (read.name, read.image, read.time) == ("00000", "rgba_00000.png", 0)
+
+
+KUBRIC_PUBLISHED = {  # of examples/lts, whose R and image_positions say it twice more
+    "camera": {
+        "field_of_view": 0.6911111611634243,
+        "focal_length": 50.0,
+        "positions": [[7.0, 0.0, 2.0]],
+        "quaternions": [[0.5645177364349365, 0.42581653594970703, 0.42581653594970703, 0.5645177364349365]],
+        "sensor_width": 36.0,
+    },
+    "metadata": {"frame_rate": 24, "num_frames": 1, "resolution": [512, 512]},
+}
+SEEN_BY_KUBRIC = [  # positions, image_positions
+    ([0.5, -1.0, 0.19651499390602112], [0.2940971851348877, 0.48937681317329407]),
+    ([-1.5, -1.5, 0.3433150053024292], [0.2585403323173523, 0.3805278241634369]),
+    ([0.0, 2.5, 0.46478700637817383], [0.9854609370231628, 0.41321828961372375]),
+]
+
+
+def test_kubric_sees_its_objects_where_it_says_it_does(tmp_path):
+    (tmp_path / "metadata.json").write_text(json.dumps(KUBRIC_PUBLISHED))
+    for path in (tmp_path, tmp_path / "metadata.json"):
+        (camera,) = cameras.read(path)
+        column, row, _ = camera.pinhole.project(np.array([place for place, _ in SEEN_BY_KUBRIC]))
+        there = 512 * np.array([seen for _, seen in SEEN_BY_KUBRIC])
+        error = np.abs(np.column_stack([column, 512 - row]) - there).max()
+        assert error < 512 * 2.0**-20, f"{error} pixels"  # its numbers are float32's
+
+
+def test_a_camera_of_kubric_flies_and_what_contradicts_itself_is_refused():
+    path = kubric(Known("plain"), Known("portrait"), Known("rolled"))
+    assert [camera.time for camera in cameras.read(json.dumps(path))] == [0, 1 / 12, 2 / 12]
+    path["camera"]["quaternions"].pop()
+    with pytest.raises(InputError, match="one length"):
+        cameras.read(json.dumps(path))
+    with pytest.raises(InputError, match="--size"):
+        cameras.read(json.dumps(kubric(Known("plain"), resolution=None)))
+
+
+def nvisii(known, transposed=True, **more):
+    view = np.vstack([np.column_stack([known.opengl[:, :3].T, -known.opengl[:, :3].T @ known.e]), [0, 0, 0, 1]])
+    data = {
+        "camera_view_matrix": (view.T if transposed else view).tolist(),
+        "intrinsics": {"fx": known.f_x, "fy": known.f_y, "cx": known.c_x, "cy": known.c_y},
+        "width": known.width,
+        "height": known.height,
+    }
+    return {"camera_data": data | more, "objects": []}
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_nvisii_lists_its_matrix_column_after_column(tmp_path, name):
+    known = Known(name)
+    written = (True, False) if known.e.any() else (True,)  # without a translation nothing tells that it is transposed
+    for transposed in written:
+        (tmp_path / f"{transposed:05d}.json").write_text(json.dumps(nvisii(known, transposed)))
+        read = the_same(cameras.read(tmp_path / f"{transposed:05d}.json"), known)
+        assert read.image == f"{transposed:05d}.png" and any("NVISII" in note for note in read.notes)
+    assert len(cameras.read(tmp_path)) == len(written)
+
+
+DOPE_PUBLISHED = {  # data_generation/nvisii_data_gen/output/output_example/00000.json of Deep_Object_Pose
+    "camera_data": {
+        "camera_look_at": {"at": [1.0, 0.0, 0.0], "eye": [0.0, 0.0, 0.0], "up": [0.0, 0.0, 1.0]},
+        "camera_view_matrix": [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]],
+        "height": 500,
+        "intrinsics": {"cx": 250.0, "cy": 250.0, "fx": 603.5535278320312, "fy": 603.5535278320312},
+        "width": 500,
+    },
+    "objects": [{"location": [-0.5842792987823486, -0.3898838460445404, 1.4419153928756714]}],
+}
+DOPE_OBJECT = [1.4419153928756714, 0.5842792987823486, 0.3898838460445404]  # location_worldframe of the same
+
+
+@pytest.mark.parametrize("told_by", ["camera_look_at", "objects", "pose"])
+def test_dopes_camera_looks_along_its_z_and_its_file_tells(told_by):
+    document = json.loads(json.dumps(DOPE_PUBLISHED))
+    if told_by != "camera_look_at":
+        del document["camera_data"]["camera_look_at"]
+    if told_by == "pose":
+        del document["objects"]
+    (camera,) = cameras.read(json.dumps(document), options=Options(pose="w2c_opencv" if told_by == "pose" else None))
+    assert camera.notes == () and camera.pinhole.axes() == ((0, -1, 0), (0, 0, 1), (-1, 0, 0))  # at +x, upright
+    column, row, depth = camera.pinhole.project(np.array([DOPE_OBJECT]))
+    x, y, z = DOPE_PUBLISHED["objects"][0]["location"]
+    f = document["camera_data"]["intrinsics"]["fx"]
+    assert (column[0], 500 - row[0], depth[0]) == pytest.approx((250 + f * x / z, 250 + f * y / z, z), rel=1e-12)
+
+
+def infinigen(path, known, **other):
+    t = np.vstack([np.column_stack([known.opencv.T, known.e]), [0, 0, 0, 1]])
+    k = np.array([[known.f_x, 0, known.c_x], [0, known.f_y, known.c_y], [0, 0, 1]])
+    arrays = {"K": k, "T": t, "HW": np.array([known.height, known.width]), **other}
+    np.savez(path, **{name: array for name, array in arrays.items() if array is not None})
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_infinigen_has_camera_to_world_and_the_height_first(tmp_path, name):
+    known = Known(name)
+    for number in (1, 2):
+        infinigen(tmp_path / f"camview_0_0_{number:04d}_0.npz", known)
+    read = cameras.read(tmp_path)
+    assert [camera.name for camera in read] == ["camview_0_0_0001_0", "camview_0_0_0002_0"]
+    the_same(read[:1], known)
+    infinigen(tmp_path / "old.npz", known, HW=None)
+    the_same(cameras.read(tmp_path / "old.npz", options=Options(size=(known.width, known.height))), known)
+    infinigen(tmp_path / "odd.npz", known, HW=np.arange(3))
+    with pytest.raises(InputError, match="height and width"):
+        cameras.read(tmp_path / "odd.npz")
+
+
 def open3d(known):
     k = np.array([[known.f_x, 0, known.c_x - 0.5], [0, known.f_y, known.c_y - 0.5], [0, 0, 1]])
     extrinsic = np.vstack([np.column_stack([known.opencv, -known.opencv @ known.e]), [0, 0, 0, 1]])
@@ -497,7 +713,7 @@ def open3d(known):
 
 
 @pytest.mark.parametrize("name", UNMIRRORED)
-def test_open3d_has_column_after_column_and_counts_from_the_first_pixels_centre(name):
+def test_open3d_has_column_after_column_and_counts_from_the_first_pixels_center(name):
     known = Known(name)
     alone = cameras.read(json.dumps(open3d(known)))
     flight = cameras.read(json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": [open3d(known)] * 2}))
@@ -508,11 +724,11 @@ def test_open3d_has_column_after_column_and_counts_from_the_first_pixels_centre(
 def opensfm(known, **camera):
     rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_matrix(known.opencv).as_rotvec().tolist()
     longer = max(known.width, known.height)
-    said = {"projection_type": "brown", "width": known.width, "height": known.height}
-    said |= {"focal_x": known.f_x / longer, "focal_y": known.f_y / longer}
-    said |= {"c_x": (known.c_x - known.width / 2) / longer, "c_y": (known.c_y - known.height / 2) / longer}
+    entry = {"projection_type": "brown", "width": known.width, "height": known.height}
+    entry |= {"focal_x": known.f_x / longer, "focal_y": known.f_y / longer}
+    entry |= {"c_x": (known.c_x - known.width / 2) / longer, "c_y": (known.c_y - known.height / 2) / longer}
     shot = {"rotation": rotation, "translation": (-known.opencv @ known.e).tolist(), "camera": "c"}
-    return [{"cameras": {"c": said | camera}, "shots": {"a.jpg": shot}, "points": {}}]
+    return [{"cameras": {"c": entry | camera}, "shots": {"a.jpg": shot}, "points": {}}]
 
 
 @pytest.mark.parametrize("name", UNMIRRORED)
@@ -731,3 +947,323 @@ def test_metashapes_slave_camera_stands_on_its_master(tmp_path):
     assert np.abs(axes_of_master @ np.column_stack([u, -v, -w]) - turn).max() < 1e-12
     with pytest.raises(InputError, match="of a rig"):
         cameras.read(text.replace("<rotation>" + text_of(turn) + "</rotation><location>0.25 0.01 -0.02</location>", ""))
+
+
+RC_HEADS = (
+    "#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2",
+    "#name,x,y,alt,yaw,pitch,roll,f_35mm,px_norm,py_norm,k1",
+)
+
+
+def realitycapture_table(known, head, *lens):
+    """Heading, pitch and roll by scipy: the turn of a camera that looks down, about z, x and y."""
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_matrix(known.opengl[:, :3])
+    yaw, pitch, roll = rotation.as_euler("ZXY", degrees=True).tolist()
+    longer = max(known.width, known.height)
+    middle = [(known.c_x - known.width / 2) / longer, (known.c_y - known.height / 2) / longer]
+    numbers = [*known.e.tolist(), -yaw, pitch, roll, known.f_x * 36 / longer, *middle, *lens]
+    numbers += [0] * (head.count(",") - len(numbers))
+    return f"#cameras 1\n{head}\nleft.jpg,{','.join(map(repr, numbers))}\n"
+
+
+@pytest.mark.parametrize("head", RC_HEADS)
+@pytest.mark.parametrize("name", ONE_FOCAL)
+def test_realitycaptures_table_turns_a_camera_that_looks_down(name, head):
+    known = Known(name)
+    read = the_same(
+        cameras.read(realitycapture_table(known, head), options=Options(size=(known.width, known.height))), known, 2.0**-47
+    )
+    assert read.name == "left" and read.image == "left.jpg" and read.lens is None and not read.size_stated
+
+
+def test_realitycaptures_table_and_its_xmp_of_one_photograph_are_one_rotation():
+    """Both as the program wrote them: "Different rotation of cameras in XMP and CSV", forum of RealityCapture."""
+    table = f"{RC_HEADS[0]}\na.jpg,1,2,3,163.736597399311,83.4154313461628,174.386496244756,30{',0' * 8}\n"
+    xmp = (  # of the last number there were three digits
+        '<x xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#" xcr:FocalLength35mm="30"><xcr:Rotation>0.982594073038806 '
+        "0.185426733553445 -0.0112166890261935 -0.032113633044729 0.11008102707942 -0.993403685341366 -0.18296885582437 "
+        "0.976472781986697 0.114</xcr:Rotation><xcr:Position>1 2 3</xcr:Position></x>"
+    )
+    (of_table,), (of_xmp,) = (cameras.read(text, options=Options(size=(640, 480))) for text in (table, xmp))
+    assert np.abs(np.array(of_table.pinhole.axes()) - of_xmp.pinhole.axes()).max() < 2e-4  # of those three digits
+    row = [0.982594073038806, 0.185426733553445, -0.0112166890261935]
+    assert np.abs(np.array(of_table.pinhole.axes())[0] - row).max() < 3 * np.radians(5e-13) + 1e-15  # the digits of both
+
+
+def test_realitycaptures_table_for_opencv_has_r_and_t_and_pixels():
+    known = Known("shifted")
+    turn = ",".join(f"R{row}{column}" for row in range(3) for column in range(3))
+    inner = [known.f_x, known.c_x, known.c_y, -0.1, 0.02, 3e-3, -1e-3, 0, 0]
+    numbers = [*(-known.opencv @ known.e), *known.opencv.ravel(), *inner]
+    text = f"#name,tx,ty,tz,{turn},f_pix,px_pix,py_pix,k1,k2,t2,t1,k3,k4\na.jpg,{','.join(repr(float(x)) for x in numbers)}\n"
+    read = the_same(cameras.read(text, options=Options(size=(known.width, known.height))), known)
+    assert read.lens.radial == (-0.1, 0.02) and read.lens.tangential == (3e-3, -1e-3)  # OpenCV's p1 is t2
+
+
+def test_realitycaptures_table_without_a_focal_length_has_poses():
+    known = Known("plain")
+    rows = realitycapture_table(known, RC_HEADS[0]).split("\n")[2].split(",")[:7]
+    text = f"#name,x,y,z,heading,pitch,roll\n{','.join(rows)}\n"
+    the_same(cameras.read(text, options=Options(base=known.pinhole)), known, 2.0**-47)
+    with pytest.raises(InputError, match="how it sees"):
+        cameras.read(text)
+
+
+def test_a_single_term_of_realitycaptures_table_is_divisions_and_several_are_browns():
+    known = Known("plain")
+    options = Options(size=(known.width, known.height))
+    (division,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1), options=options)
+    (brown,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1, 0.02), options=options)
+    assert division.lens.projection == "division" and division.lens.parameters == (-0.1,)
+    assert brown.lens.projection == "pinhole" and brown.lens.radial == (-0.1, 0.02)
+    assert all(any("does not name the lens's model" in note for note in camera.notes) for camera in (division, brown))
+
+
+def test_degrees_of_longitude_in_realitycaptures_table_are_refused():
+    rows = "".join(f"{name}.jpg,{15.00012 + at},{50.1 + at},230.5,0,0,0,30\n" for name, at in (("a", 0), ("b", 1e-4)))
+    with pytest.raises(InputError, match="longitude and latitude"):
+        cameras.read(f"#name,x,y,alt,yaw,pitch,roll,f\n{rows}", options=Options(size=(640, 480)))
+    meters = f"#name,x,y,alt,yaw,pitch,roll,f\n{rows}".replace("15.0", "5015.0")
+    assert len(cameras.read(meters, options=Options(size=(64, 48)))) == 2
+
+
+def visualsfm(known, kind="NVM_V3", term=0.0):
+    x, y, z, w = known.quaternion()
+    pose = [w, -x, -y, -z, *known.e]  # of the way back
+    if kind == "NVM_V3_R9T":
+        pose = [*known.opencv.ravel(), *(-known.opencv @ known.e)]
+    calibration = f"FixedK {known.f_x!r} {known.c_x!r} {known.f_y!r} {known.c_y!r}"
+    camera = f'the"left.jpg {known.f_x!r} {text_of(pose)} {term!r} 0\n'
+    return f"{kind} {calibration}\n\n1\n{camera}\n2\n1 2 3 9 9 9 1 0 0 5 5\n1 2 3 9 9 9 0\n\n1\n{camera}\n0\n\n0\n"
+
+
+@pytest.mark.parametrize("kind", ["NVM_V3", "NVM_V3_R9T"])
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_visualsfm_has_the_eye_beside_its_quaternion(name, kind):
+    known = Known(name)
+    read = the_same(cameras.read(visualsfm(known, kind), options=Options(size=(known.width, known.height))), known, 2.0**-48)
+    assert (read.name, read.image) == ("the left", "the left.jpg") and any("more models" in note for note in read.notes)
+
+
+@pytest.mark.parametrize("term", [-0.2, 0.3])
+def test_visualsfms_term_is_of_the_radius_in_the_photograph(term):
+    known = Known("wide")
+    (camera,) = cameras.read(
+        visualsfm(known, term=term).replace("FixedK", "Free"), options=Options(size=(known.width, known.height))
+    )
+    random = np.random.default_rng(5)
+    seen = random.uniform(-0.7, 0.7, (1000, 2))
+    straight = seen * (1 + term * (seen * seen).sum(axis=1, keepdims=True))  # its rule, as PBA's cost has it
+    assert np.abs(camera.lens.undistort(seen) - straight).max() < 16 * 2.0**-53
+    assert np.abs(camera.lens.distort(straight) - seen).max() < 64 * 2.0**-53
+    if term < 0:  # turns back at 1 / √(3 · 0.2) = 1.29
+        assert np.isnan(camera.lens.undistort([[1.3, 0.0]])).all() and not np.isnan(camera.lens.undistort([[1.28, 0.0]])).any()
+    assert camera.pinhole.principal_point == (known.width / 2, known.height / 2)
+
+
+def mvsnet(known):
+    """E and K by MVSNet's README.md, with the depths that BlendedMVS adds."""
+    rows = [*np.column_stack([known.opencv, -known.opencv @ known.e]), [0, 0, 0, 1]]
+    k = [[known.f_x, 0, known.c_x], [0, known.f_y, known.c_y], [0, 0, 1]]
+    extrinsic, intrinsic = ("\n".join(map(text_of, each)) for each in (rows, k))
+    return f"extrinsic\n{extrinsic}\n\nintrinsic\n{intrinsic}\n\n425.0 2.5 192 935.0\n"
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_mvsnet_counts_from_the_corner(name):
+    known = Known(name)
+    the_same(cameras.read(mvsnet(known), options=Options(size=(known.width, known.height))), known)
+
+
+def png(width, height):
+    return b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + struct.pack(">II", width, height)
+
+
+def test_mvsnets_data_set_is_read_by_its_folder_with_its_pictures(tmp_path):
+    known = Known("shifted")
+    for name in ("cams", "blended_images"):
+        (tmp_path / name).mkdir()
+    for number in range(2):
+        (tmp_path / "cams" / f"{number:08d}_cam.txt").write_text(mvsnet(known))
+        (tmp_path / "blended_images" / f"{number:08d}.png").write_bytes(png(known.width, known.height))
+    (tmp_path / "cams" / "pair.txt").write_text("1\n0\n1 1 0.5\n")
+    for place in (tmp_path, tmp_path / "cams"):
+        read = cameras.read(place)
+        assert [(camera.name, camera.image) for camera in read] == [(f"0000000{i}", f"0000000{i}.png") for i in range(2)]
+        the_same(read[1:], known)
+    (tmp_path / "cams" / "00000001_cam.txt").write_text("extrinsic\n1 0 0 0\n")
+    with pytest.raises(InputError, match=r"00000001_cam\.txt"):
+        cameras.read(tmp_path)
+
+
+def test_middlebury_lists_k_r_and_t(tmp_path):
+    names = ("plain", "pixels_not_square")
+    lines = []
+    for name in names:
+        known = Known(name)
+        k = [known.f_x, 0, known.c_x - 0.5, 0, known.f_y, known.c_y - 0.5, 0, 0, 1]
+        lines.append(f"{name}.png {text_of(k)} {text_of(known.opencv)} {text_of(-known.opencv @ known.e)}")
+        (tmp_path / f"{name}.png").write_bytes(png(known.width, known.height))
+    (tmp_path / "temple_par.txt").write_text("\n".join(["2", *lines, ""]))
+    for camera, name in zip(cameras.read(tmp_path / "temple_par.txt"), names, strict=True):
+        assert the_same([camera], Known(name)).image == f"{name}.png" and camera.size_stated
+        assert any("half a pixel was added" in note for note in camera.notes)
+    (tmp_path / "temple_par.txt").write_text("\n".join(["3", *lines, "lost.png 1 2 3", ""]))
+    with pytest.raises(InputError, match=r"line 4 .* 21 numbers"):
+        cameras.read(tmp_path / "temple_par.txt")
+
+
+def test_the_right_camera_of_middleburys_pair_sees_a_point_further_left():
+    """A depth as scenes2014 has it: Z = baseline · f / (d + doffs). The numbers are Adirondack's."""
+    text = "cam0=[4161.221 0 1445.577; 0 4161.221 984.686; 0 0 1]\ncam1=[4161.221 0 1654.636; 0 4161.221 984.686; 0 0 1]\n"
+    left, right = cameras.read(text + "doffs=209.059\nbaseline=176.252\nwidth=2880\nheight=1988\nndisp=280\n")
+    assert (left.pinhole.width, left.pinhole.height) == (2880, 1988) and (left.name, right.image) == ("cam0", "im1.png")
+    point = np.array([[120.0, -80.0, 2500.0]])
+    seen = [camera.pinhole.project(point) for camera in (left, right)]
+    disparity = seen[0][0] - seen[1][0]
+    assert 176.252 * 4161.221 / (disparity[0] + 209.059) == pytest.approx(2500, rel=1e-12)
+    assert seen[0][0][0] == pytest.approx(4161.221 * 120 / 2500 + 1445.577 + 0.5, rel=1e-14)
+    assert 1988 - seen[0][1][0] == pytest.approx(4161.221 * -80 / 2500 + 984.686 + 0.5, rel=1e-13)
+
+
+def projection(known, half=0.5):
+    k = [[known.f_x, 0, known.c_x - half], [0, known.f_y, known.c_y - half], [0, 0, 1]]
+    return k @ np.column_stack([known.opencv, -known.opencv @ known.e])
+
+
+@pytest.mark.parametrize("scale", [1.0, -2.5e-3])
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_neus_has_one_matrix_for_k_and_the_pose(tmp_path, name, scale):
+    known = Known(name)
+    (tmp_path / "image").mkdir()
+    (tmp_path / "image" / "0042.png").write_bytes(png(known.width, known.height))
+    world = np.vstack([scale * projection(known), [0, 0, 0, 1]])
+    sphere = np.diag([3.0, 3, 3, 1])
+    sphere[:3, 3] = 7, 8, 9
+    np.savez(tmp_path / "cameras_sphere.npz", world_mat_0=world, scale_mat_0=sphere, world_mat_inv_0=np.linalg.inv(world))
+    for place in (tmp_path, tmp_path / "cameras_sphere.npz"):
+        read = the_same(cameras.read(place), known, 2.0**-45)
+        assert (read.name, read.image) == ("0042", "image/0042.png")
+        assert any("(7, 8, 9) with the radius 3" in note for note in read.notes)
+
+
+def test_neus_matrices_are_those_that_opencv_takes_apart(tmp_path):
+    cv2 = pytest.importorskip("cv2")
+    world = np.array(  # of DTU's scan 114, as its data set has it: float32
+        [
+            [-646.67957, -2440.9016, 1633.1099, -517707.4],
+            [677.9055, 1317.4757, 2549.6375, -1194084.2],
+            [-0.902711, 0.167153, 0.396449, 407.8815],
+            [0, 0, 0, 1],
+        ],
+        dtype=np.float32,
+    )
+    np.savez(tmp_path / "cameras.npz", world_mat_0=world)
+    (camera,) = cameras.read(tmp_path / "cameras.npz", options=Options(size=(1600, 1200)))
+    k, turn, center, *_ = cv2.decomposeProjectionMatrix(world[:3].astype(float))
+    k = k / k[2, 2]
+    u, v, w = camera.pinhole.axes()
+    assert np.abs(np.array([u, -np.array(v), -np.array(w)]) - turn).max() < 1e-6  # float32 has seven digits
+    assert camera.pinhole.eye == pytest.approx((center[:3] / center[3]).ravel(), rel=1e-9)
+    assert camera.pinhole.distance == pytest.approx((k[0, 0], k[1, 1]), rel=1e-6)
+    assert camera.pinhole.principal_point == pytest.approx((k[0, 2] + 0.5, 1200 - k[1, 2] - 0.5), abs=1e-3)
+
+
+KITTI = """P0: 7.188560e+02 0.0 6.071928e+02 0.0 0.0 7.188560e+02 1.852157e+02 0.0 0.0 0.0 1.0 0.0
+P1: 7.188560e+02 0.0 6.071928e+02 -3.861448e+02 0.0 7.188560e+02 1.852157e+02 0.0 0.0 0.0 1.0 0.0
+P2: 7.188560e+02 0.0 6.071928e+02 4.538225e+01 0.0 7.188560e+02 1.852157e+02 -1.130887e-01 0.0 0.0 1.0 3.779761e-03
+Tr: 4.2e-04 -9.9e-01 -8.0e-03 -1.1e-02 -7.2e-03 8.0e-03 -9.9e-01 -5.4e-02 9.9e-01 4.8e-04 -7.2e-03 -2.9e-01
+"""
+
+
+def test_kittis_cameras_stand_side_by_side(tmp_path):
+    (tmp_path / "image_1").mkdir()
+    (tmp_path / "image_1" / "000000.png").write_bytes(png(1241, 376))
+    (tmp_path / "calib.txt").write_text(KITTI)
+    with pytest.raises(InputError, match=r"P0 .* how many pixels"):
+        cameras.read(tmp_path / "calib.txt")
+    read = cameras.read(tmp_path / "calib.txt", options=Options(size=(1241, 376)))
+    assert [(camera.name, camera.size_stated) for camera in read] == [("P0", False), ("P1", True), ("P2", False)]
+    assert read[1].pinhole.eye == pytest.approx((3.861448e02 / 7.188560e02, 0, 0), abs=1e-12)
+    points = np.random.default_rng(3).uniform([-5, -2, 4], [5, 2, 40], (50, 3))
+    for camera, line in zip(read, KITTI.split("\n"), strict=False):
+        p = np.array(line.split()[1:], float).reshape(3, 4)
+        column, row, depth = p @ np.c_[points, np.ones(50)].T
+        ours = camera.pinhole.project(points)
+        assert (
+            np.abs(ours[0] - (column / depth + 0.5)).max() < 1e-9 and np.abs(376 - ours[1] - (row / depth + 0.5)).max() < 1e-9
+        )
+    (raw,) = cameras.read("S_rect_02: 1.242e+03 3.75e+02\n" + KITTI.split("\n")[2].replace("P2", "P_rect_02") + "\n")
+    assert (raw.name, raw.pinhole.width, raw.pinhole.height) == ("P_rect_02", 1242, 375)
+    with pytest.raises(InputError, match="widths"):
+        cameras.read("P0: 1 0 0 0 0 1 0 0 0 0 1 0\n", options=Options(size=(1242, 375)))
+
+
+def test_pmvs_counts_from_the_corner_and_dtu_from_the_first_pixels_center(tmp_path):
+    known = Known("shifted_and_not_square")
+    options = Options(size=(known.width, known.height))
+    the_same(cameras.read("CONTOUR\n" + "\n".join(map(text_of, projection(known, 0))) + "\n", options=options), known, 2.0**-48)
+    for number in range(2):
+        (tmp_path / f"pos_{number:03d}.txt").write_text("\n".join(map(text_of, projection(known))))
+    read = cameras.read(tmp_path, options=options)
+    assert [camera.name for camera in read] == ["pos_000", "pos_001"]
+    the_same(read[1:], known, 2.0**-48)
+    with pytest.raises(InputError, match="--pose"):  # a pose, in which K is missing
+        cameras.read("1 0 0 5\n0 1 0 6\n0 0 1 7\n", options=options)
+
+
+def test_bops_camera_json_is_k_alone():
+    """The numbers are those of LM's camera.json."""
+    sensor = {"cx": 325.2611, "cy": 242.04899, "depth_scale": 1.0, "fx": 572.4114, "fy": 573.57043, "height": 480, "width": 640}
+    (camera,) = cameras.read(json.dumps(sensor))
+    column, row, _ = camera.pinhole.project(np.array([[0.1, -0.2, 1.5]]))
+    assert column[0] == pytest.approx(572.4114 / 15 + 325.2611 + 0.5, rel=1e-14)
+    assert 480 - row[0] == pytest.approx(-573.57043 * 2 / 15 + 242.04899 + 0.5, rel=1e-13)
+    assert any("no world" in note for note in camera.notes)
+
+
+def pose_text(known):
+    return "\n".join(map(text_of, [*np.column_stack([known.opencv.T, known.e]), [0, 0, 0, 1]])) + "\n"
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_redwoods_log_has_five_lines_a_pose_and_replicas_trajectory_one(name):
+    known = Known(name)
+    plane = ViewPlane(known.pinhole.distance, known.pinhole.principal_point, known.width, known.height)
+    line = pose_text(known).replace("\n", " ")
+    for text in (f"0 0 1\n{pose_text(known)}1 1 2\n{pose_text(known)}", f"{line}\n{line}\n"):
+        first, second = cameras.read(text, options=Options(view_plane=plane))
+        the_same([first], known)
+        the_same([second], known)
+        assert second.time == pytest.approx(1 / 30) and any("whose poses" in note for note in first.notes)
+
+
+def test_scannets_folder_has_its_intrinsics_and_pictures(tmp_path):
+    known = Known("shifted")
+    for name in ("pose", "color", "intrinsic"):
+        (tmp_path / name).mkdir()
+    k = [[known.f_x, 0, known.c_x - 0.5, 0], [0, known.f_y, known.c_y - 0.5, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    (tmp_path / "intrinsic" / "intrinsic_color.txt").write_text("\n".join(map(text_of, k)))
+    (tmp_path / "color" / "0.jpg").write_bytes(png(known.width, known.height))
+    for number in (0, 2, 10):
+        (tmp_path / "pose" / f"{number}.txt").write_text(pose_text(known))
+    (tmp_path / "pose" / "3.txt").write_text("-inf -inf -inf -inf\n" * 4)
+    for place in (tmp_path, tmp_path / "pose"):
+        read = cameras.read(place)
+        assert [(camera.name, camera.image) for camera in read] == [(f"{i}", f"{i}.jpg") for i in (0, 2, 10)]
+        assert the_same(read[2:], known).size_stated and any(
+            "1 pictures that were not placed" in note for note in read[0].notes
+        )
+    the_same(cameras.read(tmp_path / "pose" / "2.txt", options=Options(size=(known.width, known.height))), known)
+
+
+def test_seven_scenes_frames_go_to_the_world_and_a_pose_of_nobody_knows_is_asked_for(tmp_path):
+    known = Known("plain")
+    (tmp_path / "frame-000001.pose.txt").write_text(pose_text(known))
+    options = Options(base=known.pinhole)
+    assert the_same(cameras.read(tmp_path, options=options), known).name == "frame-000001"
+    with pytest.raises(InputError, match="--pose"):
+        cameras.read(pose_text(known), options=options)
+    the_same(cameras.read(pose_text(known), options=Options(base=known.pinhole, pose="c2w_opencv")), known)
+    with pytest.raises(InputError, match="how it sees"):
+        cameras.read(tmp_path)

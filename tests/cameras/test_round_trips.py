@@ -34,11 +34,13 @@ NO_MIRROR = (
     "vtk",
     "textbook",
     "nerfstudio_path",
+    "instant_ngp",
+    "gaussian_splatting",
 )
-NO_SHIFT = ("gltf", "textbook", "nerfstudio_path")
-SQUARE = ("mitsuba", "vtk", "textbook", "nerfstudio_path")
+NO_SHIFT = ("gltf", "textbook", "nerfstudio_path", "instant_ngp", "gaussian_splatting")
+SQUARE = ("mitsuba", "vtk", "textbook", "nerfstudio_path", "instant_ngp")
 NO_POSE = ("ros",)
-ANGLES = ("gltf", "nerfstudio_path")
+ANGLES = ("gltf", "nerfstudio_path", "instant_ngp")
 """Formats that say the distance by an angle, so that a wide or narrow one keeps fewer digits."""
 WRITTEN = [form for form in cameras.writable() if form not in ("unity", "unreal")]
 SEVERAL = ("sidecar", "transforms", "colmap", "colmap_binary", "bop", "gltf", "usd", "three_js", "mitsuba")
@@ -181,7 +183,7 @@ OTHERS = {
 @pytest.mark.parametrize("other", OTHERS)
 @pytest.mark.parametrize("form", [form for form in WRITTEN if form not in ("sidecar", "text", *NO_POSE)])
 def test_values_that_are_not_those_of_the_numbers_beside_them_do_not_count(tmp_path, form, other):
-    """As where somebody edits the file in another program, which knows the format's own numbers alone."""
+    """Somebody may edit the file in another program, which knows the format's own numbers alone."""
     path = tmp_path / f"a{suffix}" if (suffix := cameras.FORMATS[form].SUFFIX) else tmp_path
     options = Options(size=(640, 360))
     wrong = json.dumps(own.document(dataclasses.replace(CAMERAS["plain"], **OTHERS[other])))
@@ -268,7 +270,7 @@ def test_several_are_written_in_their_order_and_none_is_chosen_silently(tmp_path
 
 NUMBERED = ("bop",)
 """Formats that have no place for a camera's name."""
-OF_PICTURES = ("sidecar", "transforms", "gltf", "mitsuba")
+OF_PICTURES = ("sidecar", "transforms", "gltf", "mitsuba", "gaussian_splatting")
 """Formats whose cameras are called as their pictures are, or by an identifier."""
 names = st.sampled_from(["left", "right", "Kamera 1", "größer", "a{b}", "x.y", "it's", "\u3042", '"quoted"', "# / , ;"])
 
@@ -282,23 +284,23 @@ def test_several_cameras_are_read_as_they_were_written_to_the_bit_and_by_name(tm
     if cameras.FORMATS[form].SUFFIX == "" or form in (*FILES, *OF_PICTURES):
         called = [name for name in called if not set(name) & set('/"#{ ')]
         assume(len(called) > 1)
-    given_ = [Camera(name, fitting(data.draw(pinholes()), form)) for name in called]
+    written = [Camera(name, fitting(data.draw(pinholes()), form)) for name in called]
     if form in NUMBERED:  # whose pictures say their size
-        given_ = [replace(camera, pinhole=replace(camera.pinhole, width=640, height=360)) for camera in given_]
-    if form == "nerfstudio_path":  # which has one size for all
+        written = [replace(camera, pinhole=replace(camera.pinhole, width=640, height=360)) for camera in written]
+    if form in ("nerfstudio_path", "instant_ngp"):  # which have one size for all
         sizes = {"width": 640, "height": 360, "principal_point": None}
-        given_ = [replace(camera, pinhole=replace(camera.pinhole, **sizes)) for camera in given_]
+        written = [replace(camera, pinhole=replace(camera.pinhole, **sizes)) for camera in written]
     options = Options(
         size=(640, 360), axes=data.draw(st.sampled_from([*cameras.AXES])), scale=data.draw(st.sampled_from([1.0, 0.5]))
     )
     path = tmp_path_factory.mktemp("a")
     path = path if form in ("sidecar", "colmap", "colmap_binary", *FILES) else path / f"all{cameras.FORMATS[form].SUFFIX}"
-    cameras.save(given_, path, form, options)
+    cameras.save(written, path, form, options)
     back = {camera.name: camera for camera in cameras.read(path, options=options)}
     if form in NUMBERED:
         back = dict(zip(called, back.values(), strict=True))
     assert back.keys() == {*called}
-    for camera in given_:
+    for camera in written:
         if form in NO_POSE:
             assert cameras.write([back[camera.name]], form) == cameras.write([camera], form)
         else:
@@ -306,9 +308,9 @@ def test_several_cameras_are_read_as_they_were_written_to_the_bit_and_by_name(tm
 
 
 def test_of_several_codes_one_that_is_changed_counts_as_it_stands(tmp_path):
-    given_ = [Camera(name, CAMERAS["plain"]) for name in ("a", "b")]
+    written = [Camera(name, CAMERAS["plain"]) for name in ("a", "b")]
     for form, eye, other in (("look_at", "gluLookAt(7,", "gluLookAt(8,"), ("vtk", "SetPosition(7,", "SetPosition(8,")):
-        text = other.join(cameras.write(given_, form).rsplit(eye, 1))
+        text = other.join(cameras.write(written, form).rsplit(eye, 1))
         first, second = cameras.read(text)
         assert first.pinhole == CAMERAS["plain"] and second.pinhole.eye == (8, -6, 4)
         with pytest.raises(InputError, match="2 cameras and one is wanted"):

@@ -101,7 +101,7 @@ BOOK = """
 
 
 def test_the_first_pixels_ray_is_the_one_that_the_ray_tracer_challenge_prints():
-    assert cameras.recognised(BOOK) == "ray_tracer_challenge"
+    assert cameras.recognized(BOOK) == "ray_tracer_challenge"
     (camera,) = cameras.read(BOOK)
     pinhole = camera.pinhole
     assert pinhole.mirrored and any("left-handed" in note for note in camera.notes)

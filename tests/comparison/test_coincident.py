@@ -19,14 +19,14 @@ from viewcam_addon.tracer.scene.shader_nodes import node
 
 CAMERA = Pinhole((0.5, -6.0, 3.0), (0.0, 0.0, 0.4), (0.0, 0.0, 1.0), 70.0, 64, 48)
 SAMPLES_OF_A_PICTURE = 64
-COLOURS = {"Floor": (0.6, 0.6, 0.6), "Carpet": (0.8, 0.2, 0.1), "Wall": (0.3, 0.5, 0.7), "Side": (0.5, 0.5, 0.5)}
+COLORS = {"Floor": (0.6, 0.6, 0.6), "Carpet": (0.8, 0.2, 0.1), "Wall": (0.3, 0.5, 0.7), "Side": (0.5, 0.5, 0.5)}
 
 
 def quad(*corners):
     return Mesh(np.array(corners, float), np.array([(0, 1, 2), (0, 2, 3)], np.int32), np.zeros(2, np.int32))
 
 
-def a_scene(lift=0.0, only=None, colours=COLOURS, energy=2.0):
+def a_scene(lift=0.0, only=None, colors=COLORS, energy=2.0):
     """A floor with a carpet in its plane, a wall beside that, in a plane of its own, and another far off."""
     slope = 0.07
     floor = quad((-3, -3, -3 * slope), (3, -3, 3 * slope), (3, 3, 3 * slope), (-3, 3, -3 * slope))
@@ -39,7 +39,7 @@ def a_scene(lift=0.0, only=None, colours=COLOURS, energy=2.0):
         CAMERA,
         geometries,
         tuple(Object(name, name, np.eye(4), i, materials=(name,)) for i, name in enumerate(kept_names, start=1)),
-        materials={name: Material(surface=node("diffuse", color=color)) for name, color in colours.items()},
+        materials={name: Material(surface=node("diffuse", color=color)) for name, color in colors.items()},
         lamps=(Sun("sun", towards=(0.2, -0.6, 1.0), irradiance=(energy,) * 3, angle=0.3),),
         film=Film("BOX"),
         bounces=Bounces(total=3, diffuse=3),
@@ -122,7 +122,7 @@ def test_nothing_is_taken_out_where_no_two_surfaces_are_in_one_place(honest):
 
 @pytest.fixture(scope="module")
 def chosen_nearly_everywhere(reference, coincident):
-    """The same, but that all light of the columns from the third on is a renderer's choice."""
+    """Surfaces in one place, with all light of the columns from the third on a renderer's choice."""
     passes = {name: values.copy() for name, values in coincident.light.passes.items()}
     passes["Combined"][:, 2:, :3] = reference["Combined"][:, 2:, :3] + 1e-3
     return replace(coincident, light=Image(passes))
@@ -131,19 +131,19 @@ def chosen_nearly_everywhere(reference, coincident):
 def test_where_nearly_all_is_taken_out_there_is_no_answer_and_the_rest_may_still_differ(
     reference, honest, chosen_nearly_everywhere
 ):
-    found = radiance.compare(reference, honest, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
-    assert found.is_empty and not found.passed
-    assert found.sentence.startswith("Nothing to compare: 9"), found.sentence
-    assert all(words in found.sentence for words in ("'Carpet' and 'Floor'", "move one of two", "level geometry"))
+    comparison = radiance.compare(reference, honest, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
+    assert comparison.is_empty and not comparison.passed
+    assert comparison.sentence.startswith("Nothing to compare: 9"), comparison.sentence
+    assert all(words in comparison.sentence for words in ("'Carpet' and 'Floor'", "move one of two", "level geometry"))
     dark = [replace(image, passes={**image.passes, "Combined": 0.5 * image["Combined"]}) for image in honest]
-    found = radiance.compare(reference, dark, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
-    assert not found.is_empty and found.sentence.startswith("Different here"), found.sentence
+    comparison = radiance.compare(reference, dark, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
+    assert not comparison.is_empty and comparison.sentence.startswith("Different here"), comparison.sentence
 
 
 FAULTS = {
     "a lamp 2 % too bright": {"energy": 2.04},
-    "another wall": {"colours": {**COLOURS, "Wall": (0.3, 0.5, 0.74)}},
-    "a floor that is 3 % darker": {"colours": {**COLOURS, "Floor": (0.582, 0.582, 0.582)}},
+    "another wall": {"colors": {**COLORS, "Wall": (0.3, 0.5, 0.74)}},
+    "a floor that is 3 % darker": {"colors": {**COLORS, "Floor": (0.582, 0.582, 0.582)}},
 }
 
 

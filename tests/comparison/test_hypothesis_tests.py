@@ -52,7 +52,7 @@ def batched(rng, samples):
     return mean, TRUTH**2 / samples * rng.chisquare(15, TRUTH.shape) / 15
 
 
-def grey(rng, samples):
+def gray(rng, samples):
     """`even`, but all channels have the same noise."""
     mean = rng.gamma(samples, 1.0 / samples, (HEIGHT, WIDTH, 1)) * TRUTH
     return mean, TRUTH**2 / samples * rng.chisquare(samples - 1, (HEIGHT, WIDTH, 1)) / (samples - 1)
@@ -92,7 +92,7 @@ def sides_of(kind, rng, samples, each, seeds, claimed=1.0):
 
 
 def run(sides, samples, seeds):
-    """As radiance.compare asks, which takes the reference's variance to be that of batches."""
+    """The tests, run as by radiance.compare, which takes the reference's variance to be that of batches."""
     return hypothesis_tests.run(sides, NO_ROUNDING, (min(samples, VARIANCE_BATCHES) - 1, max(seeds - 1, 1)), LEVEL)
 
 
@@ -101,7 +101,7 @@ def run(sides, samples, seeds):
     [
         pytest.param(even, 256, 32, 8, 1.0, id="variances are right"),
         pytest.param(batched, 256, 32, 8, 1.0, id="the reference's variance is that of 16 batches"),
-        pytest.param(grey, 256, 32, 8, 1.0, id="channels share their noise"),
+        pytest.param(gray, 256, 32, 8, 1.0, id="channels share their noise"),
         pytest.param(even, 256, 32, 8, 4.0, id="the reference's variance is told four times too large"),
         pytest.param(even, 256, 128, 2, 1.0, id="two seeds only"),
         pytest.param(even, 256, 256, 1, 1.0, id="one picture, whose noise nobody knows"),
@@ -147,7 +147,7 @@ def test_a_bias_of_the_whole_picture_is_found_as_the_formula_says(share, least, 
     some 3.7 standard errors: half the bias lies 1.8 of them below it, 1.6 times the bias 2.2 above."""
     rng, trials, actual = np.random.default_rng(4), 200, 0
     for _ in range(trials):
-        sides = sides_of(grey, rng, 256, 32, 8)
+        sides = sides_of(gray, rng, 256, 32, 8)
         sides = replace(sides, **{name: getattr(sides, name)[..., :1] for name in ("reference", "test", "variance", "spread")})
         bias = share * visible_bias(sides, run(sides, 256, 8)[-1].limit)
         actual += not run(replace(sides, test=sides.test * (1.0 + bias)), 256, 8)[-1].ok
@@ -169,7 +169,7 @@ def test_a_wrong_tile_is_found_and_named(size):
     """A pixel that is half as bright again, or a tile by ten and by three per cent: beyond the limits of 9, 6 and 5 errors of
     √2/16 of the light, of 1/8 and of 1/32 of that."""
     factor = {1: 2.5, 8: 1.12, 32: 1.03}[size]
-    sides = sides_of(grey, np.random.default_rng(6), 256, 32, 8)
+    sides = sides_of(gray, np.random.default_rng(6), 256, 32, 8)
     where = (slice(0, max(size, 1)), slice(0, max(size, 1)))
     test = sides.test.copy()
     test[where] *= factor
@@ -205,9 +205,9 @@ def test_what_is_softer_or_sharper_is_told_along_contours_where_no_tile_tells_it
 def test_a_pixels_own_noise_is_not_in_its_weight():
     """Else what is noise alone would look softer than its reference: by a standard error for each of √960 pixels, near 30."""
     rng = np.random.default_rng(10)
-    result = [run(sides_of(grey, rng, 256, 32, 8), 256, 8)[3].errors[0, 0, 0] for _ in range(100)]
+    result = [run(sides_of(gray, rng, 256, 32, 8), 256, 8)[3].errors[0, 0, 0] for _ in range(100)]
     assert abs(np.mean(result)) < 0.4 and 0.5 < np.std(result) < 1.2  # of 100 draws the mean is off by 0.1, times four
-    sides = sides_of(grey, rng, 256, 32, 8)
+    sides = sides_of(gray, rng, 256, 32, 8)
     assert run(replace(sides, shared=sides.variance), 256, 8)[3].is_open, "neighbors that share noise have no such weights"
 
 
@@ -247,7 +247,7 @@ def test_a_shift_of_the_picture_is_no_excuse_for_a_bias_of_noisy_light():
     """Noise looks like slopes, of a tenth a pixel; a shift by 1e-3 px times them would allow a bias, were they not summed."""
     shift = np.full((HEIGHT, WIDTH), 1e-3)
     allowed = replace(NO_ROUNDING, moved=0.1 * shift, shift=shift)
-    sides = sides_of(grey, np.random.default_rng(9), 256, 32, 8)
+    sides = sides_of(gray, np.random.default_rng(9), 256, 32, 8)
     right, wrong = (
         hypothesis_tests.run(replace(sides, test=factor * sides.test), allowed, (255, 7), LEVEL) for factor in (1.0, 1.02)
     )

@@ -12,7 +12,7 @@ from viewcam_addon.image import Image
 pytestmark = pytest.mark.slow
 
 SUN = np.array([0.4, -0.5, 0.75]) / np.linalg.norm([0.4, -0.5, 0.75])
-COLOURS = np.array([(0.0, 0.0, 0.0), (0.6, 0.6, 0.5), (0.8, 0.3, 0.2), (0.2, 0.6, 0.7), (0.5, 0.4, 0.8)])
+COLORS = np.array([(0.0, 0.0, 0.0), (0.6, 0.6, 0.5), (0.8, 0.3, 0.2), (0.2, 0.6, 0.7), (0.5, 0.4, 0.8)])
 
 
 def light(scene, px=0.5, py=0.5, albedo=1.0):
@@ -25,10 +25,10 @@ def light(scene, px=0.5, py=0.5, albedo=1.0):
         to_center = np.array(center) + scene.offset - position
         along = to_center @ SUN
         cosine[(along > 1e-6) & ((to_center**2).sum(axis=-1) - along**2 < radius**2 * (1 - 1e-9))] = 0.0
-    colour = albedo * COLOURS[index[..., 0].astype(int)]
+    color = albedo * COLORS[index[..., 0].astype(int)]
     direct = 3.0 / np.pi * cosine[..., None] * (index > 0)
-    combined = np.concatenate([colour * direct, np.ones((height, width, 1))], axis=-1)
-    channels = {"Combined": combined, "Diffuse Direct": direct * np.ones(3), "Diffuse Color": colour}
+    combined = np.concatenate([color * direct, np.ones((height, width, 1))], axis=-1)
+    channels = {"Combined": combined, "Diffuse Direct": direct * np.ones(3), "Diffuse Color": color}
     return {name: values.astype(np.float32) for name, values in channels.items()} | {
         name: passes[name] for name in ("Depth", "Object Index")
     }
@@ -47,8 +47,8 @@ def rendered(scene, roundings=0.35, seed=0):
     dx, dy = roundings * shift * rng.normal(size=(2, *shift.shape))
     passes = light(scene, px=0.5 + dx, py=0.5 + dy)
     for name in ("Combined", "Diffuse Direct"):
-        colour = passes[name][..., :3]
-        colour *= (1 + 2.0**-24 * rng.normal(0, 3, colour.shape)).astype(np.float32)
+        color = passes[name][..., :3]
+        color *= (1 + 2.0**-24 * rng.normal(0, 3, color.shape)).astype(np.float32)
     return Image(passes, scene.pinhole, {"cycles.ViewLayer.samples": "1"}, "rendered.exr")
 
 

@@ -43,16 +43,16 @@ def test_a_png_holds_the_picture(height, width, channels, seed):
     assert (decoded(pictures.png(picture))[0] == picture).all()
 
 
-def test_levels_become_a_palette_whose_first_colour_is_see_through():
+def test_levels_become_a_palette_whose_first_color_is_see_through():
     levels = np.arange(pictures.LEVELS + 1, dtype=np.uint8).reshape(1, -1)
     pixels, chunks = decoded(pictures.png(levels))
     assert (pixels[..., 0] == levels).all()
     assert chunks[b"tRNS"] == b"\0"
-    assert chunks[b"PLTE"][3:] == pictures.colour_scale().tobytes()
+    assert chunks[b"PLTE"][3:] == pictures.color_scale().tobytes()
 
 
-def test_the_colour_scale_gets_lighter_in_even_steps():
-    linear = (pictures.colour_scale() / 255.0) ** 2.2 @ [0.2126, 0.7152, 0.0722]
+def test_the_color_scale_gets_lighter_in_even_steps():
+    linear = (pictures.color_scale() / 255.0) ** 2.2 @ [0.2126, 0.7152, 0.0722]
     lightness = np.cbrt(linear)
     steps = np.diff(lightness)
     assert (steps > 0).all(), "a larger error must never look darker"
@@ -144,12 +144,12 @@ def drawn(monkeypatch, tmp_path):
         words = difference.write(comparison, tmp_path / "difference.png")
         assert (tmp_path / "difference.png").read_bytes().startswith(b"\x89PNG")
         assert words["image"] == str(tmp_path / "difference.png")
-        return written[0].astype(int), words["colours"]
+        return written[0].astype(int), words["colors"]
 
     return draw
 
 
-def test_an_error_is_lighter_than_none_and_what_was_not_compared_is_grey(drawn, paper_scene):
+def test_an_error_is_lighter_than_none_and_what_was_not_compared_is_gray(drawn, paper_scene):
     reference = paper_scene.picture()
     test = paper_scene.rendered()
     test.passes["Position"] = test["Position"].copy()
@@ -183,8 +183,8 @@ def test_two_pictures_without_a_common_pixel_are_drawn_too(drawn, paper_scene):
 
 
 def test_light_is_orange_where_the_test_is_brighter_and_blue_where_it_is_darker(drawn):
-    def picture(colour):
-        passes = {"Combined": np.concatenate([colour, np.ones((48, 64, 1))], axis=-1), "Depth": np.full((48, 64, 1), 8.0)}
+    def picture(color):
+        passes = {"Combined": np.concatenate([color, np.ones((48, 64, 1))], axis=-1), "Depth": np.full((48, 64, 1), 8.0)}
         return Image({name: values.astype(np.float32) for name, values in passes.items()}, PINHOLE, {"samples": "1"}, "a.exr")
 
     truth = np.full((48, 64, 3), 0.5)

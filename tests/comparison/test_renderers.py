@@ -103,7 +103,7 @@ def test_the_scene_is_not_asked_for_where_it_is_given(paper_scene):
 
 @given(values=st.lists(st.floats(-60000, 60000, width=32), min_size=3, max_size=3), index=st.integers(0, 32767))
 def test_halves_add_up_to_what_was_written(values, index):
-    """As the shader parts them: the nearest whole steps first, each part kept as half a float."""
+    """The shader parts them so: the nearest whole steps first, each part kept as half a float."""
     written = {"Position": np.array(values), "Normal": np.array(values) / 60000, "Object Index": np.full(3, float(index))}
     passes = {"Combined": np.ones((1, 1, 4), np.float32)}
     for name, rest in written.items():
@@ -120,15 +120,15 @@ def test_halves_add_up_to_what_was_written(values, index):
 
 
 @given(index=st.integers(0, 32767))
-def test_a_colour_holds_an_index_and_half_a_float_of_it_does(index):
+def test_a_color_holds_an_index_and_half_a_float_of_it_does(index):
     digits = [index // renderers.DIGITS**place % renderers.DIGITS / renderers.DIGITS for place in range(3)]
     # Workbench's pictures are halves, now and then the next lower one.
-    colour = np.nextafter(np.array([*digits, 1.0], np.float16), np.float16(0)).astype(np.float32).reshape(1, 1, 4)
-    picture = Image({"Combined": colour, "Depth": np.full((1, 1, 1), 5.0, np.float32)})
+    color = np.nextafter(np.array([*digits, 1.0], np.float16), np.float16(0)).astype(np.float32).reshape(1, 1, 4)
+    picture = Image({"Combined": color, "Depth": np.full((1, 1, 1), 5.0, np.float32)})
     assert renderers._decoded(picture, "WORKBENCH")["Object Index"] == index
 
 
-def test_an_edge_that_a_rasteriser_moves_is_explained_and_no_farther_one(paper_scene):
+def test_an_edge_that_a_rasterizer_moves_is_explained_and_no_farther_one(paper_scene):
     edges = renderers.RENDERERS["EEVEE"].edges
 
     def shifted(off):

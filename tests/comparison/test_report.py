@@ -147,8 +147,8 @@ def test_many_mismatches_are_painted_and_not_drawn(paper_scene, tmp_path):
 
 def test_combined_is_shown_where_the_renderer_made_one(compared, tmp_path):
     comparison, reference, test = compared
-    colours = np.random.default_rng(0).random((*test["Depth"].shape[:2], 4), dtype=np.float32)
-    rendered = replace(test, passes={**test.passes, "Combined": colours})
+    colors = np.random.default_rng(0).random((*test["Depth"].shape[:2], 4), dtype=np.float32)
+    rendered = replace(test, passes={**test.passes, "Combined": colors})
     assert "As rendered" in written(tmp_path, comparison, reference, rendered)[1].text
 
 

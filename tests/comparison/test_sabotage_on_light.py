@@ -16,7 +16,7 @@ from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Area, Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, Material, Picture, sum_of
+from viewcam_addon.tracer.scene.materials import Color, Material, Picture, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 pytestmark = pytest.mark.slow
@@ -43,8 +43,8 @@ def ball(center, radius, rings=16):
     return Mesh(points * radius + center, triangles, np.zeros(len(triangles), np.int32), normals)
 
 
-def lambert(*colour):
-    return sum_of(diffuse=Colour(colour))
+def lambert(*color):
+    return sum_of(diffuse=Color(color))
 
 
 def build():
@@ -103,9 +103,9 @@ def test_the_right_picture_is_the_same_within_noise(reference, level, samples):
     assert comparison.sentence.startswith(f"The same within noise at {samples} samples: ")
 
 
-def recoloured(scene, name, factor):
-    colour = tuple(factor * value for value in scene.materials[name].surface["color"].rgb)
-    return replace(scene, materials={**scene.materials, name: lambert(*colour)})
+def recolored(scene, name, factor):
+    color = tuple(factor * value for value in scene.materials[name].surface["color"].rgb)
+    return replace(scene, materials={**scene.materials, name: lambert(*color)})
 
 
 def with_normals(scene, change):
@@ -121,8 +121,8 @@ def shifted(scene, x, y):
 
 # fault → (level, samples, what it makes of the scene). The samples are those that this picture of 3,072 pixels needs.
 SCENE_FAULTS = {
-    "albedo of the floor off by 1 %": ("direct", 64, lambda s: recoloured(s, "floor", 1.01)),
-    "albedo of the ball off by 1 %": ("direct", 256, lambda s: recoloured(s, "ball", 0.99)),
+    "albedo of the floor off by 1 %": ("direct", 64, lambda s: recolored(s, "floor", 1.01)),
+    "albedo of the ball off by 1 %": ("direct", 256, lambda s: recolored(s, "ball", 0.99)),
     "the sun dropped": ("direct", 64, lambda s: replace(s, lamps=s.lamps[1:])),
     "the area lamp dropped": ("direct", 64, lambda s: replace(s, lamps=s.lamps[:1])),
     "the world dropped": ("direct", 64, lambda s: replace(s, world=World())),
@@ -148,7 +148,7 @@ def with_a_bulb(strength=3.0, tint=1.0):
     """A ball of some nine pixels before the walls that shines, and gives next to no light to them."""
     scene = build()
     count, bulb = len(scene.objects), Object("bulb", "bulb", np.eye(4), 9, materials=("bulb",))
-    glow = sum_of(emission=Colour((strength, strength, tint * strength)))
+    glow = sum_of(emission=Color((strength, strength, tint * strength)))
     return replace(
         scene,
         geometries={**scene.geometries, "bulb": ball((1.9, -0.4, 1.2), 0.17)},

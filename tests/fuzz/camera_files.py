@@ -36,6 +36,12 @@ def _npz() -> bytes:
     return packed.getvalue()
 
 
+def _neus(matrix: np.ndarray) -> bytes:
+    packed = io.BytesIO()
+    np.savez(packed, world_mat_0=np.vstack([matrix, [0, 0, 0, 1]]), scale_mat_0=np.diag([2.0, 2, 2, 1]))
+    return packed.getvalue()
+
+
 def _npy() -> bytes:
     saved = io.BytesIO()
     pose = np.column_stack([[[0, 1, 0], [-1, 0, 0], [0, 0, 1]], [1, 2, 3], [360, 640, 600]])  # down, right, back, eye, size
@@ -103,6 +109,12 @@ def _lenses() -> dict[str, str]:
     }
 
 
+def _camview(known: published.Known) -> bytes:
+    file = io.BytesIO()
+    published.infinigen(file, known)
+    return file.getvalue()
+
+
 def _ros() -> str:
     return published.ros("flow", (1280, 800), (2, 2), (320, 200, 640, 480))
 
@@ -156,7 +168,23 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "realitycapture": {"a.xmp": documents.texts()[-1]},
         "meshroom": {"a.sfm": mixed.meshroom()},
         "openmvg": {"a.json": mixed.openmvg()},
+        "realitycapture_table": {"a.csv": published.realitycapture_table(known, published.RC_HEADS[0], -0.1, 0.02)},
+        "visualsfm": {"a.nvm": published.visualsfm(known, term=-0.1)},
         "bundler": {"a.out": f"# Bundle file v0.3\n2 0\n600 0 0\n{POSE}600 -0.2 0.1\n{POSE}", "list.txt": "a.jpg\nb.jpg\n"},
+        "mvsnet": {".": "", "cams/00000000_cam.txt": published.mvsnet(known)},
+        "middlebury": {"a_par.txt": f"1\na.png {'9 0 4 0 9 3 0 0 1'} 1 0 0 0 1 0 0 0 1 1 2 3\n"},
+        "middlebury_pair": {"calib.txt": "cam0=[400 0 32; 0 400 24; 0 0 1]\ncam1=[400 0 36; 0 400 24; 0 0 1]\nbaseline=176\n"},
+        "neus": {"cameras_sphere.npz": _neus(published.projection(known))},
+        "kitti_calibration": {"calib.txt": published.KITTI},
+        "pmvs": {"a.txt": "CONTOUR\n" + "\n".join(map(published.text_of, published.projection(known)))},
+        "pose_files": {
+            ".": "",
+            "intrinsic/intrinsic_color.txt": "500 0 32 0\n0 500 24 0\n0 0 1 0\n0 0 0 1\n",
+            **{f"pose/{number}.txt": published.pose_text(known) for number in range(2)},
+        },
+        "redwood": {"a.log": f"0 0 1\n{published.pose_text(known)}" * 2},
+        "replica": {"traj.txt": f"{published.pose_text(known).replace(chr(10), ' ')}\n" * 2},
+        "bop_sensor": {"camera.json": json.dumps(dict(fx=572, fy=573, cx=325, cy=242, width=640, height=480, depth_scale=1))},
         "llff": {"poses_bounds.npy": _npy()},
         "polycam": {"a.json": json.dumps(phone)},
         "scanner": {"a.json": json.dumps(scanner)},
@@ -167,6 +195,14 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
             "dataparser_transforms.json": json.dumps({"transform": np.eye(4)[:3].tolist(), "scale": 0.5}),
         },
         "open3d": {"a.json": json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": [published.open3d(known)]})},
+        "instant_ngp": {
+            "a.json": json.dumps({"path": [published.instant_ngp(known)] * 3, "time": 0.0}),
+            "transforms.json": json.dumps({"scale": 0.5, "offset": [0.5, 0.4, 0.3], "frames": []}),
+        },
+        "kubric": {"metadata.json": json.dumps(published.kubric(known, known))},
+        "nvisii": {"a.json": json.dumps(published.nvisii(known))},
+        "infinigen": {"a.npz": _camview(known)},
+        "fspy_exported": {"a.json": json.dumps(published.FSPY_EXPORTED)},
         "opensfm": {"reconstruction.json": json.dumps(published.opensfm(known, k1=-0.1, k2=0.02))},
         "tum": {"a.txt": "".join(f"{i} 1 2 3 0 0 0 1\n" for i in range(5))},
         "kitti": {"a.txt": "1 0 0 1 0 1 0 2 0 0 1 3\n" * 3},

@@ -54,7 +54,7 @@ SCENE = {
             "triangles": [[0, 1, 2]],
             "corner_normals": [[[0, -1, 0], [0, -1, 0], [0, -1, 0]]],
             "corner_uvs": [[[0, 0], [1, 0], [0, 1]]],
-            "corner_colours": [[[1, 0, 0], [0, 1, 0], [0, 0, 1]]],
+            "corner_colors": [[[1, 0, 0], [0, 1, 0], [0, 0, 1]]],
             "materials": [1],
         },
     },
@@ -513,6 +513,9 @@ CAMERAS = (
     *("tum", "kitti", "euroc", "chan", "three_js", "mitsuba", "mitsuba_dictionary", "pov_ray", "pbrt", "matrices", "look_at"),
     *("vtk", "textbook", "looks", "looks_gl", "looks_vtk", "text", "text_of_people", "colmap_lenses", "opencv_fisheye"),
     *("transforms_lenses", "nerfstudio_path", "open3d", "opensfm"),
+    *("instant_ngp", "kubric", "nvisii", "infinigen", "fspy_exported"),
+    *("realitycapture_table", "visualsfm", "mvsnet", "middlebury", "middlebury_pair", "neus", "kitti_calibration", "pmvs"),
+    *("bop_sensor", "pose_files", "redwood", "replica"),
 )
 """The kinds of camera_files.py, which makes them only when it is asked."""
 

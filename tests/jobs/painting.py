@@ -33,12 +33,12 @@ class Painter:
     """A Renderer (jobs/one.py) that draws nothing.
 
     pause : seconds between the pieces of a file. broken : error by the name of the shot that meets it. unlike : names of shots
-    whose check fails. unlabelled : error by the name of the shot whose labels meet it.
+    whose check fails. unlabeled : error by the name of the shot whose labels meet it.
     """
 
-    def __init__(self, seed=0, pause=0.0, broken=None, unlike=(), unlabelled=None):
+    def __init__(self, seed=0, pause=0.0, broken=None, unlike=(), unlabeled=None):
         self.seed, self.pause, self.broken, self.unlike = seed, pause, broken or {}, unlike
-        self.painted, self.labelled, self.unlabelled = [], [], unlabelled or {}
+        self.painted, self.labeled, self.unlabeled = [], [], unlabeled or {}
 
     def render(self, shot, image, preview):
         if image:
@@ -55,9 +55,9 @@ class Painter:
         return {"rendered": {"width": 4, "height": 3}, "warnings": [], "versions": {"painter": "1"}}
 
     def label(self, shot, picture, kinds, depth_steps):
-        self.labelled.append((shot.name, tuple(kinds)))
-        if shot.name in self.unlabelled:
-            raise self.unlabelled[shot.name]
+        self.labeled.append((shot.name, tuple(kinds)))
+        if shot.name in self.unlabeled:
+            raise self.unlabeled[shot.name]
         names = [f"{shot.name}.{kind}.png" for kind in kinds] + [f"{shot.name}.labels.json"]
         for name in names:
             picture.with_name(name).write_text(json.dumps([name, self.seed, depth_steps]))

@@ -47,24 +47,24 @@ def test_labels_come_to_a_picture_that_is_there_without_another_render(tmp_path,
     painting.paint(tmp_path / "one by one", 3, labels=("masks",), picture=False)
     painting.paint(tmp_path / "one by one", 3, resume=True)
     assert painting.paint(tmp_path / "one by one", 3, painter=painter, labels=("depth",), resume=True).counts["done"] == 3
-    assert not painter.painted and len(painter.labelled) == 3
+    assert not painter.painted and len(painter.labeled) == 3
     assert painting.contents(tmp_path / "one by one") == painting.contents(tmp_path / "both")
 
 
 def test_a_batch_with_labels_is_resumed_like_one_without(tmp_path, painting):
     error = {"shot_001": InputError("the disk is lame: buy one")}
-    summary = painting.paint(tmp_path, 3, painter=painting.Painter(unlabelled=error), labels=("depth",))
+    summary = painting.paint(tmp_path, 3, painter=painting.Painter(unlabeled=error), labels=("depth",))
     assert summary.counts["failed"] == 1 and not list(tmp_path.glob("*shot_001*")), "a shot without its labels is none"
     painter = painting.Painter()
     assert painting.paint(tmp_path, 3, painter=painter, labels=("depth",), resume=True).counts["done"] == 3
-    assert painter.painted == ["shot_001"] and painter.labelled == [("shot_001", ("depth",))]
+    assert painter.painted == ["shot_001"] and painter.labeled == [("shot_001", ("depth",))]
 
 
 def test_labels_that_fail_leave_all_as_it_was(folder, painting):
     render_one(SHOT, folder, painting.Painter(seed=1), "older", DEPTH)
     before = painting.contents(folder.path)
     with pytest.raises(InputError, match="no room"):
-        failing = painting.Painter(unlabelled={"left": InputError("no room: make some")})
+        failing = painting.Painter(unlabeled={"left": InputError("no room: make some")})
         render_one(SHOT, folder, failing, "newer", DEPTH)
     assert painting.contents(folder.path) == before
 

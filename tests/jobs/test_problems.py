@@ -219,7 +219,7 @@ def test_what_is_wrong_with_the_header_is_told_once_and_not_in_each_row(tmp_path
     values = {"name": "a{}", "camera": "Camera", "frame": "1", "eye": "1 2 3", "eye_x": "1", "eye_z": "3", "look_at": "0 0 1"}
     values |= {"up": "0 0 1", "d": "5"}
     rows = [",".join(values.get(column, "") for column in header.split(",")).replace("{}", str(i)) for i in range(3)]
-    if "up_x" in header or "colour" in header:
+    if "up_x" in header or "color" in header:
         rows = [row.replace("0 0 1", "") for row in rows]
     assert list(problems_in(tmp_path, "list.csv", "\n".join([header, *rows]))) == sentence
 

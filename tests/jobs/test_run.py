@@ -15,7 +15,7 @@ from viewcam_addon.jobs import run
 from viewcam_addon.jobs.folder import Folder, Outputs
 
 FULL = FullDiskError("a.exr can't be written (No space left on device): choose another folder or free some space")
-UNCHECKED = {"checked": 0, "checks_failed": 0, "not_all_modelled": 0}
+UNCHECKED = {"checked": 0, "checks_failed": 0, "not_all_modeled": 0}
 
 
 def test_a_batch_leaves_its_shots_a_summary_and_a_contact_sheet(tmp_path, painting):
@@ -140,7 +140,7 @@ def test_where_the_disk_is_full_a_summary_that_does_not_fit_either_is_no_second_
 
 @pytest.mark.parametrize("fits", range(14))
 def test_the_disk_may_be_full_at_any_file(tmp_path, painting, monkeypatch, fits):
-    """Of the 14 files that a batch of four shots waits for the disk with, so many still fit."""
+    """A batch of four shots waits for the disk with 14 files, of which so many still fit."""
     written = []
 
     def fsync(descriptor):

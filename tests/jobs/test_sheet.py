@@ -56,8 +56,8 @@ def test_pictures_that_were_not_checked_have_no_tick_on_the_page(tmp_path, paint
     assert 'class="same"' in heads["checked"] and 'aria-hidden="true"><path' in heads["checked"]
 
 
-def test_a_picture_of_which_not_all_is_modelled_makes_the_page_amber(tmp_path):
-    counts = {"shots": 2, "done": 2, "failed": 0, "left": 0, "checked": 2, "checks_failed": 0, "not_all_modelled": 1}
+def test_a_picture_of_which_not_all_is_modeled_makes_the_page_amber(tmp_path):
+    counts = {"shots": 2, "done": 2, "failed": 0, "left": 0, "checked": 2, "checks_failed": 0, "not_all_modeled": 1}
     sheet.write(tmp_path / "sheet.html", [], counts)
     text = (tmp_path / "sheet.html").read_text()
     assert 'class="same_but"' in text and "1 the same but for objects that are not modeled" in text
@@ -133,16 +133,16 @@ def test_each_shot_says_what_it_is_of_by_which_lens_and_at_what_angle():
 def test_each_picture_has_its_verdict_or_says_that_it_was_not_checked():
     record = {"image": "a.exr", "rendered": {"width": 4, "height": 3}, "warnings": []}
 
-    def said(check):
+    def text_of(check):
         return Page(sheet.picture(Result("a", {**record, **({"check": check} if check else {})}))).text
 
-    assert "not checked" in said(None)
+    assert "not checked" in text_of(None)
     passed = {"passed": True, "verdict": "The same picture.", "figures": {"position": {"p50": 1e-5, "max": 0.000304}}}
-    assert "identical to 0.0003 px" in said(passed) and "not checked" not in said(passed)
-    assert "identical" in said({**passed, "figures": {"position": {}}})
-    assert "differs Another picture." in said({"passed": False, "verdict": "Another picture."})
-    but = {**passed, "answer": "same_but", "not_modelled": {"count": 2, "names": ["Hair", "Fog"], "share": 0.25}}
-    assert "identical to 0.0003 px, but for 2 objects that are not modeled" in said(but)
+    assert "identical to 0.0003 px" in text_of(passed) and "not checked" not in text_of(passed)
+    assert "identical" in text_of({**passed, "figures": {"position": {}}})
+    assert "differs Another picture." in text_of({"passed": False, "verdict": "Another picture."})
+    but = {**passed, "answer": "same_but", "not_modeled": {"count": 2, "names": ["Hair", "Fog"], "share": 0.25}}
+    assert "identical to 0.0003 px, but for 2 objects that are not modeled" in text_of(but)
     assert "class=but" in sheet.picture(Result("a", {**record, "check": but}))
     without_picture = {key: value for key, value in record.items() if key != "image"}
     assert "not checked" not in Page(sheet.picture(Result("a", without_picture))).text, "labels alone are no picture"

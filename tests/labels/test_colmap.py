@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import viewcam_addon as vp
+from viewcam_addon.cameras import Camera
 from viewcam_addon.cli import main
 from viewcam_addon.errors import InputError
 from viewcam_addon.labels import colmap, files
@@ -23,7 +24,7 @@ EYES = [(1.0, -7, 3), (2.2, -6.5, 3.4), (-1.5, -6.5, 2.6), (1.5, 8, 3.5)]  # the
 SLACK = 100 * 2.0**-24
 
 
-def labelled(folder, scenes, kinds=("depth", "masks")):
+def labeled(folder, scenes, kinds=("depth", "masks")):
     for i, scene in enumerate(scenes):
         files.write(folder / f"{i}.exr", vp.label(scene, kinds))
     return folder
@@ -33,7 +34,7 @@ def labelled(folder, scenes, kinds=("depth", "masks")):
 def written(tmp_path_factory):
     """Four pictures of a room that stands still, and their model."""
     scenes = [room(replace(CAMERA, eye=eye)) for eye in EYES]
-    shots = labelled(tmp_path_factory.mktemp("colmap") / "shots", scenes)
+    shots = labeled(tmp_path_factory.mktemp("colmap") / "shots", scenes)
     assert main(["labels", str(shots), str(shots.parent / "model"), "--to", "colmap", "--points", "600"]) == 0
     return SimpleNamespace(scenes=scenes, shots=shots, model=shots.parent / "model")
 
@@ -119,10 +120,10 @@ def test_what_moves_from_picture_to_picture_has_no_track_from_one_to_the_other(t
     """The first two pictures have the cubes here, the others there: where they were, the floor is seen now."""
     there = np.array([moved(1.6, 0.5, 0.4, 0.3, 0.4), moved(0.3, 2, 0.8, 0.1, 0.8)])
     scenes = [room(replace(CAMERA, eye=eye), cubes=there if i > 1 else None) for i, eye in enumerate(EYES)]
-    shots = labelled(tmp_path / "shots", scenes)
+    shots = labeled(tmp_path / "shots", scenes)
     colmap.write(shots, tmp_path / "model")
-    _, colours, visible = points_of(tmp_path / "model")
-    ids = colours @ [1, 256, 65536]
+    _, colors, visible = points_of(tmp_path / "model")
+    ids = colors @ [1, 256, 65536]
     labels = vp.label(scenes[0], ("masks",)).instances
     still, moving = (next(each["id"] for each in labels if (each["name"], each["number"]) == ("Cube", i)) for i in range(2))
     crosses = visible[:, :2].any(axis=1) & visible[:, 2:].any(axis=1)
@@ -132,7 +133,7 @@ def test_what_moves_from_picture_to_picture_has_no_track_from_one_to_the_other(t
 
 def test_points_lie_evenly_over_what_is_shown():
     state = np.zeros((48, 64), int)
-    actual = colmap._sampled(0, CAMERA, np.full((48, 64), 5.0), state, np.zeros((48, 64, 3), np.uint8), 192)
+    actual = colmap._sampled(0, Camera("shot", CAMERA), np.full((48, 64), 5.0), state, np.zeros((48, 64, 3), np.uint8), 192)
     column, row, _ = CAMERA.project(actual.positions)
     counts = np.histogram2d(row, column, bins=(6, 8), range=((0, 48), (0, 64)))[0]
     assert counts.sum() == 192 and counts.min() > 0
@@ -167,14 +168,14 @@ def test_points_come_into_the_model_of_cameras_alone_that_a_batch_has_written_an
 
 def test_tracks_may_be_shortened_and_lead_over_all_pictures_still():
     rng = np.random.default_rng(1)
-    shown = [(np.flatnonzero(rng.random(500) < 0.7), None) for _ in range(20)]
-    shown = [(which, np.stack([which, which + 0.5], axis=-1)) for which, _ in shown]
-    short = colmap._shortened(shown, 4)
-    before, after = (np.bincount(np.concatenate([which for which, _ in each]), minlength=500) for each in (shown, short))
+    observations = [(np.flatnonzero(rng.random(500) < 0.7), None) for _ in range(20)]
+    observations = [(which, np.stack([which, which + 0.5], axis=-1)) for which, _ in observations]
+    short = colmap._shortened(observations, 4)
+    before, after = (np.bincount(np.concatenate([which for which, _ in each]), minlength=500) for each in (observations, short))
     assert (after == np.minimum(before, 4)).all()
     assert all(
         set(which) <= set(all_of) and (places[:, 0] == which).all()
-        for (which, places), (all_of, _) in zip(short, shown, strict=True)
+        for (which, places), (all_of, _) in zip(short, observations, strict=True)
     )
     counts = [len(which) for which, _ in short]
     assert min(counts) > 0.7 * np.mean(counts), "no picture goes without"
@@ -183,7 +184,7 @@ def test_tracks_may_be_shortened_and_lead_over_all_pictures_still():
 @pytest.mark.parametrize("form", ["colmap", "bop", "kitti"])
 def test_overwrite_replaces_what_was_written_so_and_nothing_else(tmp_path, capfd, form):
     scenes = [room(replace(CAMERA, eye=eye)) for eye in EYES[:2]]
-    shots, out = labelled(tmp_path / "shots", scenes, ("depth", "masks", "amodal")), tmp_path / "out"
+    shots, out = labeled(tmp_path / "shots", scenes, ("depth", "masks", "amodal")), tmp_path / "out"
     words = ["labels", str(shots), str(out), "--to", form]
     assert main(words) == 0 and main(words) == 2
     before = {path.relative_to(out): path.read_bytes() for path in out.rglob("*") if path.is_file()}
@@ -198,7 +199,7 @@ def test_overwrite_replaces_what_was_written_so_and_nothing_else(tmp_path, capfd
 
 
 def test_a_picture_beside_its_labels_is_the_one_that_is_named(tmp_path):
-    shots = labelled(tmp_path / "shots", [room()])
+    shots = labeled(tmp_path / "shots", [room()])
     (shots / "0.png").write_bytes(encoded(np.zeros((48, 64, 3), np.uint8)))
     assert colmap.write(shots, tmp_path / "model") == {"images": 1, "points": 0, "observations": 0}
     assert " 1 0.png\n" in (tmp_path / "model" / "images.txt").read_text()

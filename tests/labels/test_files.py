@@ -215,7 +215,7 @@ def test_run_lengths_as_a_text_are_those_of_pycocotools(counts, begins_with_a_se
     assert masks.compressed(segmentation) == {"size": [sum(counts), 1], "counts": expected}
 
 
-def test_segments_are_those_of_the_colours_of_the_pictures(pictures, tmp_path):
+def test_segments_are_those_of_the_colors_of_the_pictures(pictures, tmp_path):
     cv2 = pytest.importorskip("cv2")
     _, folder = pictures
     assert run(folder, tmp_path / "panoptic.json", "--to", "panoptic") == 0
@@ -226,8 +226,8 @@ def test_segments_are_those_of_the_colours_of_the_pictures(pictures, tmp_path):
         numbers, areas = np.unique(blue_green_red @ [256**2, 256, 1], return_counts=True)
         segments = {each["id"]: each["area"] for each in annotation["segments_info"]}
         assert segments == {n: area for n, area in zip(numbers.tolist(), areas.tolist(), strict=True) if n}
-    colours = [tuple(each["color"]) for each in record["categories"]]
-    assert len(set(colours)) == len(colours) and all(each["isthing"] == 1 for each in record["categories"])
+    colors = [tuple(each["color"]) for each in record["categories"]]
+    assert len(set(colors)) == len(colors) and all(each["isthing"] == 1 for each in record["categories"])
 
 
 @pytest.mark.parametrize("kind", ["coco", "panoptic"])

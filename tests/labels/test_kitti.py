@@ -25,7 +25,7 @@ def written(tmp_path_factory):
     return labels, folder / "kitti"
 
 
-def test_opencv_reads_depth_in_256ths_of_a_metre_and_none_where_nothing_is(written):
+def test_opencv_reads_depth_in_256ths_of_a_meter_and_none_where_nothing_is(written):
     cv2 = pytest.importorskip("cv2")
     labels, folder = written
     for name, each in labels.items():

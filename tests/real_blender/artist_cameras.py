@@ -168,8 +168,8 @@ def draw_on_light_and_dark():
     values().eye, values().look_at, values().up = (4, -6, 3.5), (0.5, 0.5, 0.5), (0, 0, 1)
     region_3d.view_location, region_3d.view_distance = (1.5, -2, 1.5), 16
     shading.background_type = "VIEWPORT"
-    for name, grey in (("light", 0.9), ("middle", 0.2), ("dark", 0.0)):
-        shading.background_color = (grey,) * 3
+    for name, gray in (("light", 0.9), ("middle", 0.2), ("dark", 0.0)):
+        shading.background_color = (gray,) * 3
         yield from picture(f"diagram_on_{name}", VIEWPORT)
     shading.background_type = "THEME"
     _, sidebar = region(*SIDEBAR)

@@ -5,10 +5,8 @@ import math
 import bpy
 import numpy as np
 from artist_hands import FOLDER, picture, room
-from bpy_extras.object_utils import world_to_camera_view
-from mathutils import Vector
-from panel_in_a_window import NOWHERE, move, press, region, window
-from tour_hands import push_undo, settle, undo
+from panel_in_a_window import NOWHERE, press, region, window
+from tour_hands import match_photo, push_undo, seen, settle, undo
 
 LENS = 42.0
 BOX = (1.5, 1.0, 0.75)  # half its sides
@@ -23,7 +21,7 @@ EDGES = (
 )
 
 
-_made = []  # camera, its matrix while the photo was taken, the ends of the edges as it shows them, and what it is now
+_photo = []  # camera, its matrix while the photo was taken, the edges as it shows them, and what it is now
 
 
 def make_a_photo():
@@ -43,8 +41,7 @@ def make_a_photo():
         bpy.ops.render.render(write_still=True)
     yield
     matrix = np.array(camera.matrix_world)
-    places = [[np.multiply(end, BOX) for end in edge[1:]] for edge in EDGES]
-    seen = [[world_to_camera_view(scene, camera, Vector(end))[:2] for end in pair] for pair in places]
+    edges = seen(camera, [(axis, *(np.multiply(end, BOX) for end in ends)) for axis, *ends in EDGES])
     camera.rotation_euler, camera.data.lens = (math.radians(70), 0, math.radians(25)), 85.0
     background = camera.data.background_images.new()
     background.image = bpy.data.images.load(scene.render.filepath)
@@ -55,62 +52,33 @@ def make_a_photo():
     region("VIEW_3D", "WINDOW")[0].spaces.active.region_3d.view_perspective = "CAMERA"
     yield from settle()
     push_undo("before")
-    _made[:] = matrix, seen, room("interface.kept").state(camera)
-
-
-def _draw_the_edges():
-    """Steps: Match Photo is begun, and each edge dragged along."""
-    area, part = region("VIEW_3D", "WINDOW")
-    matching = room("interface.photo_matching")
-    move(*NOWHERE)
-    yield
-    with bpy.context.temp_override(window=window(), area=area, region=part):
-        bpy.ops.viewcam.match_photo("INVOKE_DEFAULT")
-    yield from settle()
-    assert matching._drawn is not None and matching._drawn.frame is not None
-    left, bottom, right, top = matching._drawn.frame
-    for (axis, *_), ends in zip(EDGES, _made[1], strict=True):
-        (x0, y0), (x1, y1) = [(part.x + left + u * (right - left), part.y + bottom + v * (top - bottom)) for u, v in ends]
-        press(axis, *NOWHERE)
-        yield
-        move(x0, y0)
-        yield
-        window().event_simulate(type="LEFTMOUSE", value="PRESS", x=int(x0), y=int(y0))
-        yield
-        for share in (0.5, 1.0):
-            move(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
-            yield
-        window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(x1), y=int(y1))
-        yield
-    yield from settle()
-    assert len(matching._drawn.drawing.along) == len(EDGES), matching._drawn.drawing.along
-    return matching
+    _photo[:] = matrix, edges, room("interface.kept").state(camera)
 
 
 def _is_as_before():
-    return room("interface.kept").state(bpy.data.objects["Camera"]) == _made[2]
+    return room("interface.kept").state(bpy.data.objects["Camera"]) == _photo[2]
 
 
 def escape_from_a_match():
     yield from make_a_photo()
-    matching = yield from _draw_the_edges()
+    yield from match_photo(_photo[1])
     yield from picture("photo_match")
     press("ESC", *NOWHERE)
     yield
     yield
-    assert matching._drawn is None and _is_as_before(), "Escape leaves something"
+    assert room("interface.photo_matching")._drawn is None and _is_as_before(), "Escape leaves something"
 
 
 def match_a_photo():
     """The lens and the view come back within three of the errors that are told; one step of undo."""
-    matching = yield from _draw_the_edges()
-    result = matching._drawn.result
-    assert result is not None, matching._drawn.sentence
+    matching, _ = yield from match_photo(_photo[1])
+    result = matching.result
+    assert result is not None, matching.sentence
     press("RET", *NOWHERE)
     yield
     yield
     bpy.context.view_layer.update()
-    camera, matrix = bpy.data.objects["Camera"], _made[0]
+    camera, matrix = bpy.data.objects["Camera"], _photo[0]
     low, high = result.distance_between
     off = np.degrees(np.arccos(np.clip((np.array(camera.matrix_world)[:3, 2] @ matrix[:3, 2]), -1, 1)))
     print(f"{camera.data.lens:.2f} mm of {LENS:g}, {off:.3f}° off, d from {low:.1f} to {high:.1f} px", flush=True)

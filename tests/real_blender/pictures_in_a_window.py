@@ -12,17 +12,17 @@ import tempfile
 from pathlib import Path
 
 import bpy
-from bpy_extras.object_utils import world_to_camera_view
-from mathutils import Vector
 
 sys.path.append(str(Path(__file__).parent))
-from panel_in_a_window import NOWHERE, move, press, region, start, window
-from tour_hands import VIEWPORT, call, hide_the_sidebar, photograph, settle
+from panel_in_a_window import NOWHERE, press, region, start, window
+from tour_hands import SIDEBAR, VIEWPORT, call, hide_the_sidebar, match_photo, photograph, seen, settle, until
 from tour_step import room
 
 FOLDER, PHOTO = map(Path, sys.argv[sys.argv.index("--") + 1 :])
 STUDIO = Path(__file__).resolve().parent.parent.parent / "sample_scenes" / "studio.blend"
 LISTED = 222  # pixels of the file browser's list
+SAMPLES, PATIENCE = 64, 100_000  # of light, and steps until it is there
+EDGE, LEGEND = 8, 70  # pixels around the pictures of a proof, and below them
 # (axis, start, end) of edges of the room, world space.
 EDGES = (
     ("X", (-0.1, 0.8, 0.78), (1.3, 0.8, 0.78)),
@@ -48,7 +48,7 @@ def photo_match():
     values.enabled = True
     values.eye, values.look_at, values.up, values.distance = (-1.7, -1.9, 1.75), (0.75, 1.3, 0.95), (0, 0, 1), 800
     bpy.context.view_layer.update()
-    seen = [[world_to_camera_view(scene, camera, Vector(end))[:2] for end in edge[1:]] for edge in EDGES]
+    edges = seen(camera, EDGES)
     values.look_at, values.distance = (0.0, 0.0, 1.5), 1100
     background = camera.data.background_images.new()
     background.image, background.alpha = photo, 1.0
@@ -59,27 +59,10 @@ def photo_match():
     yield from settle()
     call(bpy.ops.view3d.view_center_camera)
     yield from settle()
-    matching = room("interface.photo_matching")
-    call(bpy.ops.viewcam.match_photo)
-    yield from settle()
-    left, bottom, right, top = matching._drawn.frame
-    for (axis, *_), ends in zip(EDGES, seen, strict=True):
-        (x0, y0), (x1, y1) = [(part.x + left + u * (right - left), part.y + bottom + v * (top - bottom)) for u, v in ends]
-        press(axis, *NOWHERE)
-        yield
-        move(x0, y0)
-        yield
-        window().event_simulate(type="LEFTMOUSE", value="PRESS", x=int(x0), y=int(y0))
-        yield
-        for share in (0.5, 1.0):
-            move(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
-            yield
-        window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(x1), y=int(y1))
-        yield
-    yield from settle()
-    assert matching._drawn.result, matching._drawn.sentence
+    matching, mouse = yield from match_photo(edges)
+    assert matching.result, matching.sentence
     _, part = region(*VIEWPORT)
-    photograph((part.x, part.y, part.width, part.height), FOLDER / "photo-match.png", 60, (x1, y1))
+    photograph((part.x, part.y, part.width, part.height), FOLDER / "photo-match.png", 60, mouse)
     press("ESC", *NOWHERE)
     yield from settle()
 
@@ -127,12 +110,96 @@ def preferences():
     yield from settle()
 
 
+def open_the_studio():
+    """Steps to the sample scene, through its camera, in the layout as it is."""
+    bpy.ops.wm.open_mainfile(filepath=str(STUDIO), load_ui=False)
+    yield
+    scene, (view, _) = bpy.context.scene, region(*VIEWPORT)
+    window().view_layer.objects.active = scene.camera
+    view.spaces.active.region_3d.view_perspective = "CAMERA"
+    view.spaces.active.overlay.show_overlays = False
+    yield from settle()
+    call(bpy.ops.view3d.view_center_camera)
+    yield from settle()
+
+
+def reference_over_eevee():
+    """Swipe in Viewport."""
+    yield from open_the_studio()
+    view, part = region(*VIEWPORT)
+    scene, shading = bpy.context.scene, view.spaces.active.shading
+    scene.render.engine = bpy.types.RenderSettings.bl_rna.properties["engine"].default
+    scene.virtual_pinhole_reference.samples = SAMPLES
+    shading.type = "RENDERED"
+    yield from settle()
+    call(bpy.ops.viewcam.swipe_reference)
+    swipe = room("interface.swipe")
+    yield from until(lambda: swipe._running.live.samples == SAMPLES, "the light", PATIENCE)
+    yield from settle()
+    mouse = part.x + swipe._running.line(), part.y + part.height / 2
+    photograph((part.x, part.y, part.width, part.height), FOLDER / "artists" / "swipe.png", 60, mouse)
+    call(bpy.ops.viewcam.swipe_reference)
+    shading.type = "SOLID"
+    yield from settle()
+
+
+def reference_in_the_viewport():
+    """Rendered shading by the engine, beside its settings."""
+    yield from open_the_studio()
+    view, _ = region(*VIEWPORT)
+    scene = bpy.context.scene
+    scene.render.engine, scene.virtual_pinhole_reference.samples = "VIEWCAM", SAMPLES
+    properties, _ = region("PROPERTIES", "WINDOW")
+    properties.spaces.active.context = "RENDER"
+    view.spaces.active.shading.type = "RENDERED"
+    live = room("rendering.live_view").LiveView
+    yield from until(lambda: any(each.samples == SAMPLES for each in live._all), "the light", PATIENCE)
+    yield from settle()
+    right, bottom = properties.x + properties.width, view.y
+    photograph((view.x, bottom, right - view.x, view.height), FOLDER / "engine.png", 60)
+    view.spaces.active.shading.type = "SOLID"
+    yield from settle()
+
+
+def proof():
+    """The panel with its green tick, and what Show brings beside it."""
+    yield from open_the_studio()
+    camera = bpy.context.scene.camera
+    camera.virtual_pinhole.enabled = True
+    yield from hide_the_sidebar(hidden=False)
+    _, sidebar = region(*SIDEBAR)
+    sidebar.active_panel_category = "Pinhole"
+    yield from settle()
+    background = room("interface.proof").background
+    call(bpy.ops.viewcam.compare_with_cycles, camera=camera.name)
+    yield from until(lambda: background.latest, "the verdict", PATIENCE)
+    assert background.latest.answer == "same", background.latest.verdict
+    view, _ = region(*VIEWPORT)
+    with bpy.context.temp_override(window=window(), area=view, region=view.regions[-1]):
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=1 - sidebar.width / view.width)
+    yield from settle()
+    left, right = sorted((area for area in window().screen.areas if area.type == "VIEW_3D"), key=lambda area: area.x)
+    left.type = "IMAGE_EDITOR"
+    yield from settle()
+    call(bpy.ops.viewcam.show_difference)
+    for _ in range(60):  # its size comes a moment later
+        yield
+    photograph((left.x, left.y, right.x + right.width - left.x, left.height), FOLDER / "artists" / "proof.png", 75)
+    part = next(part for part in left.regions if part.type == "WINDOW")
+    (x0, y0), (x1, y1) = (part.view2d.view_to_region(at, at, clip=False) for at in (0, 1))
+    whole = part.x + x0 - EDGE, part.y + y0 - LEGEND, x1 - x0 + 2 * EDGE, y1 - y0 + LEGEND + EDGE
+    photograph(whole, FOLDER / "proof-pictures.png")
+
+
 def steps():
     yield
     bpy.context.preferences.system.viewport_aa = "OFF"  # drawn in software
     yield from photo_match()
     yield from preferences()
     yield from export()
+    yield from reference_over_eevee()
+    yield from reference_in_the_viewport()
+    yield from proof()
     print("done: the pictures", flush=True)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 from panel_in_a_window import press, region, window
-from tour_hands import SIDEBAR, call, push, unfold
+from tour_hands import call, push, unfold
 from tour_step import Step, camera, is_at_its_values, room, values
 
 FILE = Path(tempfile.gettempdir(), f"shots_{os.getpid()}", "monkey.json")
@@ -16,8 +16,6 @@ FILE = Path(tempfile.gettempdir(), f"shots_{os.getpid()}", "monkey.json")
 class CompareWithCycles(Step):
     """Both renders in the background, the verdict in the panel; Show brings both pictures into an image editor."""
 
-    picture = "proof.png"
-    shows = "window"
     edits = 0
 
     def prepare(self):
@@ -52,25 +50,9 @@ class CompareWithCycles(Step):
         assert outcome is not None and outcome.answer == "same", f"the verdict is {outcome and outcome.verdict}"
         is_at_its_values()
 
-    def pose_for_the_picture(self):
-        """The verdict stands at the end of the panel."""
-        for _ in range(10):
-            yield from scroll(bpy.ops.view2d.scroll_down)
-
-    def after_the_picture(self):
-        for _ in range(10):
-            yield from scroll(bpy.ops.view2d.scroll_up)
-
     def tidy(self):
         if not bpy.app.background:
             region("IMAGE_EDITOR", "WINDOW")[0].type = "PROPERTIES"
-
-
-def scroll(operator):
-    area, part = region(*SIDEBAR)
-    with bpy.context.temp_override(window=window(), area=area, region=part):
-        operator(deltay=100)
-    yield
 
 
 class Export(Step):

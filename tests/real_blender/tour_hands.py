@@ -10,6 +10,7 @@ import subprocess
 
 import bpy
 import tour_step
+from bpy_extras.object_utils import world_to_camera_view
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Euler, Vector
 from panel_in_a_window import NOWHERE, click, move, open_the_panels, press, region, window
@@ -28,7 +29,7 @@ _DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT
 # The corners of a mouse pointer, pixels right of and below its tip.
 _ARROW = ((0, 0), (0, 17), (4, 13), (7, 19), (10, 18), (7, 12), (12, 12))
 
-_found = {}
+_places = {}
 
 
 def begin(show=open_the_panels):
@@ -78,7 +79,7 @@ def find(button, where=SIDEBAR):
 
 
 def seek(button, where):
-    """As `find`, or None if there is no such button."""
+    """Steps that end with where the button stands, as of `find`, or None if there is no such button."""
     if place := _remembered(button, where):
         for _ in range(_PATIENCE):  # the button that the mouse comes from may want to be left first
             if (yield from look(*place, where)).startswith(button):
@@ -127,7 +128,7 @@ def _top(where):
 
 
 def _map(where):
-    return _found.setdefault(where, {})
+    return _places.setdefault(where, {})
 
 
 def _remembered(button, where):
@@ -163,7 +164,7 @@ def unfold(button, where=SIDEBAR):
             if _remembered(button, where):
                 return
             yield from click(x, y)
-            _found[where] = dict(known)
+            _places[where] = dict(known)
             y -= _ROW / 2
         y -= _ROW / 2
     raise AssertionError(f"no sub-panel has {button}, beside {sorted(_map(where))}")
@@ -244,6 +245,43 @@ def drag(start, by, **modifiers):
     window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(x + by[0]), y=int(y + by[1]), **modifiers)
     yield
     yield
+
+
+def seen(camera_object, edges):
+    """Edges (axis, start, end) of the world as a camera sees them now: shares of the picture, from its lower left corner."""
+    scene = bpy.context.scene
+    return [(axis, *(world_to_camera_view(scene, camera_object, Vector(end))[:2] for end in ends)) for axis, *ends in edges]
+
+
+def match_photo(edges):
+    """Steps that begin Match Photo in camera view, and drag along edges of the picture, as `seen` gives them.
+
+    They end with the operator, which goes on, and where the mouse is.
+    """
+    move(*NOWHERE)
+    yield
+    call(bpy.ops.viewcam.match_photo)
+    yield from settle()
+    matching = tour_step.room("interface.photo_matching")._drawn
+    assert matching is not None and matching.frame is not None, "Match Photo has not begun"
+    _, part = region(*VIEWPORT)
+    left, bottom, right, top = matching.frame
+    for axis, *ends in edges:
+        (x0, y0), (x1, y1) = [(part.x + left + u * (right - left), part.y + bottom + v * (top - bottom)) for u, v in ends]
+        press(axis, *NOWHERE)
+        yield
+        move(x0, y0)
+        yield
+        window().event_simulate(type="LEFTMOUSE", value="PRESS", x=int(x0), y=int(y0))
+        yield
+        for share in (0.5, 1.0):
+            move(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
+            yield
+        window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(x1), y=int(y1))
+        yield
+    yield from settle()
+    assert len(matching.drawing.along) == len(edges), matching.drawing.along
+    return matching, (x1, y1)
 
 
 def call(operator, where=VIEWPORT, **properties):

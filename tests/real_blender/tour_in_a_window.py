@@ -71,20 +71,17 @@ def take_the_picture(step, path):
     yield from step.pose_for_the_picture()
     move(*MOUSE_AWAY)
     yield from draw_finely()
-    part, share = _shown(step.shows)
+    part, share = _area_and_share(step.shows)
     photograph(part, path, share)
     yield from step.after_the_picture()
 
 
-def _shown(name):
+def _area_and_share(name):
     """(left, bottom, width, height) of what a picture shows, and in how many percent of its size."""
     if name == "sidebar":
         _, sidebar = region("VIEW_3D", "UI")
         bottom = max(sidebar.y, lowest_button() - BELOW_BUTTONS)
         return (sidebar.x, bottom, sidebar.width, sidebar.y + sidebar.height - bottom), 100
-    if name == "window":
-        empty = 0.29 * window().height  # below the panel
-        return (0, empty, window().width, window().height - empty), 60
     if name == "camera view":
         area, part = region(*VIEWPORT)
         matrix, data = tour_step.camera().matrix_world, tour_step.camera().data

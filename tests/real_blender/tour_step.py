@@ -18,8 +18,8 @@ UPPER_PART = (0.0, 0.35, 1.0, 1.0)
 class Step:
     """One thing that an artist does.
 
-    picture : file in docs/images/artists, taken when the step is done. shows : "sidebar", "area" (the largest), "window",
-        "camera view", or where in the largest area, as shares of it: left, bottom, right and top.
+    picture : file in docs/images/artists, taken when the step is done. shows : "sidebar", "area" (the largest), "camera
+        view", or where in the largest area, as shares of it: left, bottom, right and top.
     with_before : the picture shows on its left what was there before.
     edits : how many undo steps it makes; each is undone and redone. needs_a_window : there is nothing to it without one.
     """
@@ -140,7 +140,7 @@ def make_the_scene():
     select("Camera")
 
 
-def _mesh(add, name, colour, **where):
+def _mesh(add, name, color, **where):
     add(**where)
     block = bpy.context.object
     block.name = name
@@ -149,11 +149,11 @@ def _mesh(add, name, colour, **where):
     material = bpy.data.materials.new(name)
     if not material.node_tree:  # new materials have one from 5.0 on
         material.use_nodes = True
-    material.diffuse_color = (*colour, 1)
+    material.diffuse_color = (*color, 1)
     tree = material.node_tree
     tree.nodes.clear()
     diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
-    diffuse.inputs["Color"].default_value = (*colour, 1)
+    diffuse.inputs["Color"].default_value = (*color, 1)
     tree.links.new(diffuse.outputs["BSDF"], output.inputs["Surface"])
     block.data.materials.append(material)
 

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from panel_in_a_window import region, window
 from tour_hands import VIEWPORT, drag, hide_the_sidebar, on_screen
-from tour_step import UPPER_PART, Step, is_at_its_values, room, select, values
+from tour_step import Step, is_at_its_values, room, select, values
 
 
 class _WithoutTheSidebar(Step):
@@ -81,11 +81,11 @@ class DragUp(Step):
         values().up = (0, 0, 1)
 
 
-class ShowTheDiagramElsewhere(Step):
+class ShowTheDiagramElsewhere(_WithoutTheSidebar):
     """The view plane is drawn close to the look-at point."""
 
     picture = "diagram.png"
-    shows = UPPER_PART
+    shows, with_before = (0.0, 0.42, 0.78, 0.95), True
 
     def by_hand(self):
         values().plane_at = 0.8

@@ -8,14 +8,14 @@ import numpy as np
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import native
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
-from viewcam_addon.tracer.scene.colours import WHITE, Colour
+from viewcam_addon.tracer.scene.colors import WHITE, Color
 from viewcam_addon.tracer.scene.film import FILTERS, Film
 from viewcam_addon.tracer.scene.lamps import Lamp
 from viewcam_addon.tracer.scene.materials import Material, Picture
 from viewcam_addon.tracer.scene.shader_nodes import Closure, Node, node
 
 FILM, SCATTERING = 2, 8
-"""How many dimensions the film has, and each scattering."""
+"""The number of dimensions of the film, and of each scattering."""
 
 FUNCTIONS = ("sin of turns", "cos of turns", "asin", "acos", "atan2", "pow", "fresnel")
 
@@ -125,7 +125,7 @@ def evaluated(value_node: Node, images=None, uv=(0.0, 0.0), incoming=(0.0, 0.0, 
 
 def looked_up(picture: Picture, uv, closest: bool):
     """(3, n): the linear colors of an image at (2, n) UV."""
-    image_node = node("image", image=Colour(WHITE, "shown"), interpolation="closest" if closest else "linear")
+    image_node = node("image", image=Color(WHITE, "shown"), interpolation="closest" if closest else "linear")
     return evaluated(image_node, {"shown": picture}, uv)[0]
 
 

@@ -25,19 +25,19 @@ def found_depths(placed, spheres, x, y, eye=(0.0, 0.0, 0.0)):
     return core.closest(core.rays(np.asarray(eye, float)[None], directions))[0]
 
 
-def quadric_root(matrix, centre, radius, x, y):
+def quadric_root(matrix, center, radius, x, y):
     """The nearest depth > 0 at which the ray meets the ellipsoid, its discriminant over its square, in 60 digits, or None."""
     with mpmath.workdps(60):
         linear = mpmath.matrix(matrix[:3, :3].tolist())
-        moved = linear * mpmath.matrix(centre.tolist()) + mpmath.matrix(matrix[:3, 3].tolist())
+        moved = linear * mpmath.matrix(center.tolist()) + mpmath.matrix(matrix[:3, 3].tolist())
         inverse = linear**-1
         ray = inverse * mpmath.matrix([mpmath.mpf(x), mpmath.mpf(y), -1]) / mpmath.mpf(radius)
-        centre = inverse * moved / mpmath.mpf(radius)
-        a, half = sum(d * d for d in ray), sum(d * f for d, f in zip(ray, centre, strict=True))
-        discriminant = half * half - a * (sum(f * f for f in centre) - 1)
+        center = inverse * moved / mpmath.mpf(radius)
+        a, half = sum(d * d for d in ray), sum(d * f for d, f in zip(ray, center, strict=True))
+        discriminant = half * half - a * (sum(f * f for f in center) - 1)
         if discriminant < 0 or half <= 0:
-            return None, float(discriminant / a), centre
-        return float((half - mpmath.sqrt(discriminant)) / a), float(discriminant / a), centre
+            return None, float(discriminant / a), center
+        return float((half - mpmath.sqrt(discriminant)) / a), float(discriminant / a), center
 
 
 @settings(max_examples=80)
@@ -46,16 +46,16 @@ def test_the_near_root_agrees_with_the_quadric_in_sixty_digits(make_spheres, ran
     rng = np.random.default_rng(seed)
     matrix = random_matrix(rng)
     matrix[2, 3] -= 6.0 * 10**log_distance
-    centre, radius = rng.uniform(-1, 1, 3), rng.uniform(0.1, 1)
-    middle = matrix[:3, :3] @ centre + matrix[:3, 3]
+    center, radius = rng.uniform(-1, 1, 3), rng.uniform(0.1, 1)
+    middle = matrix[:3, :3] @ center + matrix[:3, 3]
     aim = middle + matrix[:3, :3] @ rng.normal(size=3) * radius * 0.6
     x, y = aim[:2] / -aim[2]
-    depth = found_depths(Object("object", "spheres", matrix), make_spheres([centre], radius), np.array([x]), np.array([y]))[0]
-    exact, discriminant, unit_centre = quadric_root(matrix, centre, radius, x, y)
+    depth = found_depths(Object("object", "spheres", matrix), make_spheres([center], radius), np.array([x]), np.array([y]))[0]
+    exact, discriminant, unit_center = quadric_root(matrix, center, radius, x, y)
 
     # In the space of the unit sphere, the center stands at |f| and is rounded by some 2⁻⁵³ |f| times the matrix's condition; so
     # is the foot of the perpendicular, and the discriminant 1 − l² by twice that.
-    size = float(mpmath.norm(unit_centre))
+    size = float(mpmath.norm(unit_center))
     rounding = 32 * FLOAT64 * size * np.linalg.cond(matrix[:3, :3])
     if abs(discriminant) <= 2 * rounding:
         return  # the ray grazes the outline closer than float64 can tell

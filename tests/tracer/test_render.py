@@ -16,7 +16,7 @@ from viewcam_addon.tracer.render import PASSES, Keeper, Tracer, render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Point, Sun
-from viewcam_addon.tracer.scene.materials import Colour, sum_of
+from viewcam_addon.tracer.scene.materials import Color, sum_of
 from viewcam_addon.tracer.scene.sameness import same, same_things
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -44,7 +44,7 @@ def test_pictures_are_the_same_bit_for_bit_for_any_number_of_threads_and_any_til
 
 @settings(max_examples=5)
 @given(seed=SEEDS)
-def test_single_samples_at_pixel_centres_are_the_picture(random_scene, seed):
+def test_single_samples_at_pixel_centers_are_the_picture(random_scene, seed):
     scene = random_scene(seed)
     tracer = Tracer(scene)
     rows, columns = np.mgrid[: scene.camera.height, : scene.camera.width]
@@ -57,7 +57,7 @@ def test_single_samples_at_pixel_centres_are_the_picture(random_scene, seed):
 
 @settings(max_examples=10)
 @given(seed=SEEDS)
-def test_positions_appear_at_their_pixels_centre_and_at_their_depth(random_scene, seed):
+def test_positions_appear_at_their_pixels_center_and_at_their_depth(random_scene, seed):
     scene = random_scene(seed)
     camera, passes = scene.camera, render(scene)
     hit = passes["Depth"][..., 0] < image.BACKGROUND_DEPTH
@@ -104,7 +104,7 @@ def test_a_cropped_picture_is_a_part_of_the_whole(random_scene):
 
 @settings(max_examples=5)
 @given(seed=SEEDS)
-def test_a_scene_a_million_metres_off_the_origin_shows_the_same_picture(random_scene, seed):
+def test_a_scene_a_million_meters_off_the_origin_shows_the_same_picture(random_scene, seed):
     scene = random_scene(seed)
     # A power of two, and eye, look-at and matrices that stay exact beside it: multiples of 2⁻²⁴.
     far = 2.0**20
@@ -183,7 +183,7 @@ def test_memory_beside_the_passes_does_not_grow_with_the_picture(ball, make_scen
 # --- What is seen first: the ends of the clip range, nothing, eyes in spheres, and many spheres, against answers on paper
 
 
-def found(scene):
+def objects_seen(scene):
     """(height, width) of a picture: the index of the object seen, 0 where there is none."""
     return Tracer(scene, 2).render()["Object Index"][..., 0].astype(int)
 
@@ -197,7 +197,7 @@ def first_of(scene, x, y):
     return np.where(objects == 0, primitives, -1), depth, directions
 
 
-def centres(scene):
+def centers(scene):
     rows, columns = np.mgrid[: scene.camera.height, : scene.camera.width]
     return scene.camera.view_plane(columns.ravel() + 0.5, rows.ravel() + 0.5)
 
@@ -218,7 +218,7 @@ def test_what_lies_before_the_clip_range_is_looked_through_and_what_lies_behind_
         ((4, 5), 3),
         ((0, 0.9), 0),
     ):
-        rendered = found(make_scene(camera, *things, clip=clip))[2, 2]
+        rendered = objects_seen(make_scene(camera, *things, clip=clip))[2, 2]
         assert rendered == seen, f"clip {clip}: object {rendered} instead of {seen}"
 
 
@@ -237,14 +237,14 @@ def test_scenes_and_meshes_that_are_empty_or_degenerate_show_nothing(make_scene,
         ((make_spheres([[0, 0, 0]], 1.0), flat),),  # a sphere that its matrix flattens
     ):
         scene = make_scene(camera, *things)
-        assert not found(scene).any(), f"{things}: {np.unique(found(scene))}"
+        assert not objects_seen(scene).any(), f"{things}: {np.unique(objects_seen(scene))}"
 
 
 def test_an_eye_inside_a_sphere_sees_through_it_and_one_just_outside_sees_it(make_scene, make_spheres):
     camera = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 10, 1, 1)
     around, beyond = [0, 0, -0.5], [0, 0, -4]
     for radius, seen in ((0.5 + 1e-12, 2), (0.5 - 1e-12, 1)):
-        rendered = found(make_scene(camera, make_spheres([around], radius), make_spheres([beyond], 1.0)))[0, 0]
+        rendered = objects_seen(make_scene(camera, make_spheres([around], radius), make_spheres([beyond], 1.0)))[0, 0]
         assert rendered == seen, f"radius {radius}: object {rendered}"
 
 
@@ -288,7 +288,7 @@ def test_spheres_that_touch_one_depth_overlap_or_coincide_are_all_found(make_sce
         "fifty spheres of one center, each larger by 1e-9": make_spheres(nested, 0.3 * (1 + 1e-9 * np.arange(50))),
     }.items():
         scene = make_scene(Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 100, 60, 60), spheres)
-        number, traced, directions = first_of(scene, *centres(scene))
+        number, traced, directions = first_of(scene, *centers(scene))
         depth = depths_by_testing_each(scene, spheres, directions)
         hits = np.isfinite(depth)
         assert hits.any() and np.array_equal(number >= 0, hits), name
@@ -301,7 +301,7 @@ def test_spheres_that_touch_one_depth_overlap_or_coincide_are_all_found(make_sce
 
 
 WIDTH, HEIGHT = 96, 64
-GREEN, RED = sum_of(diffuse=Colour((0.1, 0.8, 0.2))), sum_of(diffuse=Colour((0.9, 0.1, 0.1)))
+GREEN, RED = sum_of(diffuse=Color((0.1, 0.8, 0.2))), sum_of(diffuse=Color((0.9, 0.1, 0.1)))
 GROUND = np.array([[-300, -300, -1.2], [300, -300, -1.2], [300, 300, -1.2], [-300, 300, -1.2]], float)
 
 
@@ -389,7 +389,7 @@ CHANGES = {
     "a vertex by its last bit": lambda scene: one_mesh(scene, vertices=lambda v: put(v, 100, np.nextafter(v[100], 9))),
     "the order of triangles": lambda scene: one_mesh(scene, triangles=lambda t: t[::-1].copy()),
     "a triangle less": lambda scene: one_mesh(
-        scene, **dict.fromkeys(("triangles", "materials", "corner_normals", "corner_uvs"), lambda some: some[:-40].copy())
+        scene, **dict.fromkeys(("triangles", "materials", "corner_normals", "corner_uvs"), lambda array: array[:-40].copy())
     ),
     "corner normals": lambda scene: one_mesh(scene, corner_normals=lambda n: -n),
     "a UV map": lambda scene: one_mesh(scene, corner_uvs=lambda uv: uv * 2),

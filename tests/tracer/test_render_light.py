@@ -15,7 +15,7 @@ from viewcam_addon.tracer import native
 from viewcam_addon.tracer.render import Stopped, Tracer, render
 from viewcam_addon.tracer.scene.film import MOST_REFINED, Bounces, Film, refinement
 from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, Material, sum_of
+from viewcam_addon.tracer.scene.materials import Color, Material, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 PASSES = {*image.LIGHT_PASSES, "Depth", "Object Index"}
@@ -30,10 +30,10 @@ def lively(random_scene):
     def build(seed=SEED, width=96, height=54):
         scene = random_scene(seed, width, height)
         materials = {
-            "red": sum_of(diffuse=Colour((0.8, 0.1, 0.1))),
-            "shining": sum_of(diffuse=Colour((0.5,) * 3), emission=Colour((2.0, 3.0, 4.0))),
-            "mirror": sum_of(mirror=Colour((0.9,) * 3), diffuse=Colour((0.05,) * 3)),
-            "glass": sum_of(glass=Colour((1.0,) * 3)),
+            "red": sum_of(diffuse=Color((0.8, 0.1, 0.1))),
+            "shining": sum_of(diffuse=Color((0.5,) * 3), emission=Color((2.0, 3.0, 4.0))),
+            "mirror": sum_of(mirror=Color((0.9,) * 3), diffuse=Color((0.05,) * 3)),
+            "glass": sum_of(glass=Color((1.0,) * 3)),
             "": sum_of(),
         }
         objects = tuple(
@@ -127,14 +127,14 @@ LIT_BY = {
 def test_what_goes_in_vectors_has_the_bits_of_what_goes_path_by_path(random_scene, lamps, sky):
     """A second closure that is black adds nothing, but with it a surface is no longer taken for a matte one."""
     scene = random_scene(SEED, 40, 33)
-    red, blue = Colour((0.8, 0.1, 0.1)), Colour((0.1, 0.3, 0.9))
+    red, blue = Color((0.8, 0.1, 0.1)), Color((0.1, 0.3, 0.9))
     matte = {"red": sum_of(diffuse=red), "blue": sum_of(diffuse=blue)}
     objects = tuple(replace(placed, materials=("red", "blue")[i % 2 :][:1]) for i, placed in enumerate(scene.objects))
     scene = replace(scene, objects=objects, materials=matte, lamps=tuple(lamps), world=World((sky,) * 3), bounces=Bounces(6, 5))
-    black = node("diffuse", color=Colour((0.0, 0.0, 0.0)))
+    black = node("diffuse", color=Color((0.0, 0.0, 0.0)))
     one_by_one = {
-        name: Material(surface=node("add", first=node("diffuse", color=colour), second=black))
-        for name, colour in (("red", red), ("blue", blue))
+        name: Material(surface=node("add", first=node("diffuse", color=color), second=black))
+        for name, color in (("red", red), ("blue", blue))
     }
     for level, samples, error in (("direct", 3, None), ("path", 8, None), ("path", 32, 0.05)):
         in_vectors, in_turn = (
@@ -157,7 +157,7 @@ def test_seeds_give_other_noise_of_the_same_picture(lively):
     assert np.array_equal(first["Depth"], second["Depth"])
 
 
-def test_a_single_sample_is_at_the_pixels_centre_and_of_no_known_variance(lively):
+def test_a_single_sample_is_at_the_pixels_center_and_of_no_known_variance(lively):
     scene = replace(lively(), lamps=(), world=World((0, 0, 0)), film=Film(filter_width=9.0))
     passes, seen = render(scene, "direct", 1), render(scene)
     assert_same(passes, render(scene, "direct", 1, seed=5) | {name: passes[name] for name in ("Combined", "Diffuse Direct")})
@@ -173,7 +173,7 @@ def test_a_single_sample_is_at_the_pixels_centre_and_of_no_known_variance(lively
 
 def test_passes_add_up_to_the_picture(lively):
     scene = replace(lively(), film=Film(exposure=2.0))
-    without = sum_of(diffuse=Colour((0.3, 0.6, 0.9)))
+    without = sum_of(diffuse=Color((0.3, 0.6, 0.9)))
     scene = replace(scene, materials={**scene.materials, "mirror": without, "glass": without})
     passes = {name: values.astype(float) for name, values in render(scene, "path", 8).items()}
     lit = (passes["Diffuse Direct"] + passes["Diffuse Indirect"]) * passes["Diffuse Color"]
@@ -255,15 +255,15 @@ def test_a_watcher_is_shown_all_rows_in_the_thread_that_asked(lively, level):
 @pytest.mark.parametrize("samples", [1, 7, 40])
 def test_a_picture_that_refines_is_shown_whole_at_each_step_and_ends_with_the_bits_of_one_that_does_not(lively, samples):
     """A step is what a picture has that never gets more, but for what of it is known of its noise."""
-    scene, steps, shown = lively(SEED, 70, 40), refinement(samples, 70 * 40), []
+    scene, steps, tiles = lively(SEED, 70, 40), refinement(samples, 70 * 40), []
     audience = Audience()
-    audience.tile = lambda passes, rows: shown.append(
+    audience.tile = lambda passes, rows: tiles.append(
         (rows, {name: values[rows.start : rows.stop].copy() for name, values in passes.items()})
     )
     refined = render(scene, "path", samples, 7, threads=2, watcher=audience, steps=steps)
     assert_same(refined, render(scene, "path", samples, 7, threads=3))
-    each = len(shown) // len(steps)
-    for step, bands in zip(steps, (shown[i : i + each] for i in range(0, len(shown), each)), strict=True):
+    each = len(tiles) // len(steps)
+    for step, bands in zip(steps, (tiles[i : i + each] for i in range(0, len(tiles), each)), strict=True):
         assert sorted(row for rows, _ in bands for row in rows) == list(range(40))
         picture = np.concatenate([passes["Combined"] for _, passes in sorted(bands, key=lambda band: band[0].start)])
         assert np.isfinite(picture).all()
@@ -330,7 +330,7 @@ def test_a_level_or_a_number_of_samples_that_is_none_is_told(lively):
 
 
 def test_an_albedo_beyond_one_and_no_end_of_bounces_end_in_a_picture(ball, make_lit):
-    material = sum_of(diffuse=Colour((1e18,) * 3), emission=Colour((1e18,) * 3))
+    material = sum_of(diffuse=Color((1e18,) * 3), emission=Color((1e18,) * 3))
     camera = Pinhole((0, 0, 0), (1, 0, 0), (0, 0, 1), 10, 8, 6)
     passes = render(make_lit(camera, (ball(6), material), bounces=Bounces(1024, 1024, 1024, 1024)), "path", 2)
     assert np.isfinite(passes["Combined"]).all() and (passes["Combined"][..., :3] > 1e18).all()

@@ -113,10 +113,10 @@ def own_sensor(camera: bpy.types.Camera) -> tuple[float, float]:
 def length(value: float, scene: bpy.types.Scene, digits: int = 6) -> str:
     """A length in world units as the scene's units say it; a bare number without them, and where Blender would say zero."""
     units = scene.unit_settings
-    metres = value * units.scale_length
-    if units.system == "NONE" or not _SHORTEST_WORD <= abs(metres) < math.inf:
+    meters = value * units.scale_length
+    if units.system == "NONE" or not _SHORTEST_WORD <= abs(meters) < math.inf:
         return f"{value:.{digits}g}"
-    return bpy.utils.units.to_string(units.system, "LENGTH", metres, precision=digits)
+    return bpy.utils.units.to_string(units.system, "LENGTH", meters, precision=digits)
 
 
 def render_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:

@@ -61,7 +61,7 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
             _leave_sculpt_mode()
         lacking = tuple(_without_cache(overrides.set))
         if not trust:
-            off = (*lacking, *_told(*_disarmed(overrides.set), *_unrun()))
+            off = (*lacking, *_without_trust(*_disarmed(overrides.set), *_unrun()))
         elif any(_unrun()):
             raise InputError(
                 "Blender has opened the file without running what is in it: write --enable-autoexec before the file, or leave "
@@ -93,7 +93,7 @@ def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, 
         _check_files()
         off.extend(_without_cache(setattr))
         if not trust:
-            off.extend(_told(*_disarmed(setattr)))
+            off.extend(_without_trust(*_disarmed(setattr)))
 
     with _not_kept_waiting(), _after_reading(read):
         try:
@@ -106,10 +106,10 @@ def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, 
                 ) from error
             off.append(f"Blender {bpy.app.version_string} has read the file but for something: {reason}")
     _leave_sculpt_mode()
-    return (*off, *_told(*_unrun()))
+    return (*off, *_without_trust(*_unrun()))
 
 
-def _told(*sentences: str) -> tuple[str, ...]:
+def _without_trust(*sentences: str) -> tuple[str, ...]:
     return tuple(f"{sentence} (without --trust)" for sentence in sentences)
 
 

@@ -74,7 +74,7 @@ def set_rotations(
     axes : (n, 3, 3), the axes wanted, as columns. Returns the numbers that were set.
     """
     names = [_ROTATIONS.get(mode, "rotation_euler") for mode in modes]
-    waiting = list(map(rotation.neighbours, numbers))
+    waiting = list(map(rotation.neighbors, numbers))
     best, least = list(numbers), [np.inf] * len(cameras)
     left, at_once = list(range(len(cameras))), 1
     while left:

@@ -15,7 +15,7 @@
 A format is a module in `FORMATS` with
 
     TITLE                           what people call it
-    recognises(source) → bool       by content; False for whatever it can't be, and never an error of its own
+    recognizes(source) → bool       by content; False for whatever it can't be, and never an error of its own
     read(source, options) → list[Camera]            where cameras can be read; in the file's own world
     write(cameras, options) → text, or {file name: text or bytes}      where they can be written; in the file's own world
     SUFFIX                          of the file that it writes; "" where these are several in a folder
@@ -64,21 +64,29 @@ from . import (
     fspy,
     gaussian_splatting,
     gltf,
+    infinigen,
+    instant_ngp,
+    kubric,
     llff,
     look_at,
     matrices,
     meshroom,
     metashape,
+    middlebury,
     mitsuba,
     mujoco,
+    mvsnet,
     nerfstudio_path,
+    nvisii,
     open3d,
     opencv,
     openmvg,
     opensfm,
     own,
     pbrt,
+    pose_files,
     pov_ray,
+    projections,
     ray_tracer_challenge,
     realitycapture,
     ros,
@@ -90,6 +98,7 @@ from . import (
     unity,
     unreal,
     usd,
+    visualsfm,
     vtk,
 )
 from .axes import leveled, moved, moved_back
@@ -108,7 +117,7 @@ __all__ = [
     "choose",
     "read",
     "readable",
-    "recognised",
+    "recognized",
     "save",
     "writable",
     "write",
@@ -128,10 +137,19 @@ FORMATS: dict[str, ModuleType] = {
     "meshroom": meshroom,
     "openmvg": openmvg,
     "bundler": bundler,
+    "visualsfm": visualsfm,
     "llff": llff,
+    "mvsnet": mvsnet,
+    "middlebury": middlebury,
+    "projections": projections,
+    "pose_files": pose_files,
     "arkit": arkit,
     "gaussian_splatting": gaussian_splatting,
     "nerfstudio_path": nerfstudio_path,
+    "instant_ngp": instant_ngp,
+    "kubric": kubric,
+    "nvisii": nvisii,
+    "infinigen": infinigen,
     "open3d": open3d,
     "opensfm": opensfm,
     "ros": ros,
@@ -169,10 +187,10 @@ def writable() -> list[str]:
     return [name for name, module in FORMATS.items() if hasattr(module, "write")]
 
 
-def read(given: str | Path, *, format: str | None = None, options: Options | None = None) -> list[Camera]:
+def read(content: str | Path, *, format: str | None = None, options: Options | None = None) -> list[Camera]:
     """The cameras of a text, a file or a folder.
 
-    given : a text, or the Path of a file or folder. format : one of `readable()`; None to recognize it by its content.
+    content : a text, or the Path of a file or folder. format : one of `readable()`; None to recognize it by its content.
 
     Raises
     ------
@@ -180,10 +198,10 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
         if there is no camera in it, or one that is no pinhole, lacks something, or is not what it should be.
     """
     options = options or Options()
-    source = Source(given)
-    module = _module(format or recognised(source), "read")
+    source = Source(content)
+    module = _module(format or recognized(source), "read")
     with _told_of_damage(source, module.TITLE), np.errstate(all="ignore"):  # anything may stand in a file
-        if format and not _recognises(module, source):
+        if format and not _recognizes(module, source):
             raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
         read_cameras = _of_all(source, module, options)
         return leveled(read_cameras) if options.up_from == "cameras" else read_cameras
@@ -199,19 +217,19 @@ def _of_all(source: Source, module: ModuleType, options: Options) -> list[Camera
     sources = [source] if len(parts) == 1 else [Source(text) for _, text in parts]
     cameras = []
     for (name, _), part in zip(parts, sources, strict=True):
-        if not module.recognises(part):
+        if not module.recognizes(part):
             raise InputError(f"{source.name} names the camera {checks.quoted(name)} and has no such camera: export it again")
         cameras += [replace(camera, name=name) for camera in _read(part, module, options)]
     return cameras
 
 
-def _recognises(module: ModuleType, source: Source) -> bool:
-    return module.recognises(source) or (source.is_folder and any(map(module.recognises, _in_folder(source, module))))
+def _recognizes(module: ModuleType, source: Source) -> bool:
+    return module.recognizes(source) or (source.is_folder and any(map(module.recognizes, _in_folder(source, module))))
 
 
 def _in_folder(source: Source, module: ModuleType) -> list[Source]:
     """The files of a folder that may each be a camera of this format, if it has a file for each."""
-    if getattr(module, "SEVERAL", "") != "a folder" or source.path is None or module.recognises(source):
+    if getattr(module, "SEVERAL", "") != "a folder" or source.path is None or module.recognizes(source):
         return []
     suffixes = _YAML if module.SUFFIX in _YAML else (module.SUFFIX,)
     return [file for suffix in suffixes for file in source.files(f"*{suffix}")]
@@ -223,7 +241,7 @@ def _each_of_folder(source: Source, module: ModuleType, options: Options) -> lis
     for file in _in_folder(source, module):
         path = Path(file.name)
         name = path.stem
-        if not module.recognises(file):
+        if not module.recognizes(file):
             others.append(path.name)
             continue
         with left_out.unless_pinhole(name):
@@ -264,7 +282,7 @@ def _told_of_damage(source: Source, title: str) -> Iterator[None]:
         raise InputError(f"{source.name} is damaged where it says its cameras ({title}): export it again") from error
 
 
-def recognised(source: str | Path | Source) -> str:
+def recognized(source: str | Path | Source) -> str:
     """The name of the format.
 
     Raises
@@ -277,7 +295,7 @@ def recognised(source: str | Path | Source) -> str:
         raise InputError("there is no text: copy a camera first")
     for name in readable():
         with _told_of_damage(source, FORMATS[name].TITLE):
-            if _recognises(FORMATS[name], source):
+            if _recognizes(FORMATS[name], source):
                 return name
     if source.json_problem:
         raise InputError(f"{source.name} looks like JSON and is none ({source.json_problem}): correct it")

@@ -25,7 +25,7 @@ _PICTURES = {"cameras": "images", "corrected_cameras": "corrected_images"}
 _POLYCAM = {f"t_{row}{column}" for row in range(3) for column in range(4)}
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return bool(_files(source)) or _is_record3d(source)
 
 

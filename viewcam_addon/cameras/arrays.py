@@ -57,7 +57,7 @@ class _Unknown:
     name: str
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     if source.is_binary or source.is_folder or source.document or source.xml is not None or len(source.text) > _MOST_CHARACTERS:
         return False
     if own.lines_of(source):  # several cameras of our own, whose names look like a program's

@@ -122,7 +122,7 @@ class Tracks:
         return np.where((depth > 0) & np.isfinite(errors), errors, np.inf)
 
 
-_SAMPLES, _NEIGHBOURS = 60, 4  # points of a picture, and how many of the next pictures each is looked up in
+_SAMPLES, _NEIGHBORS = 60, 4  # points of a picture, and how many of the next pictures each is looked up in
 
 
 class Depths:
@@ -135,7 +135,7 @@ class Depths:
         self.maps = [np.asarray(depth, dtype=np.float64) for depth in maps]
         random = np.random.default_rng(0)
         count = len(self.maps)
-        self.pairs = [(i, (i + step) % count) for i in range(count) for step in range(1, min(_NEIGHBOURS, count - 1) + 1)]
+        self.pairs = [(i, (i + step) % count) for i in range(count) for step in range(1, min(_NEIGHBORS, count - 1) + 1)]
         self.samples = []
         for depth in self.maps:
             rows, columns = np.nonzero(np.isfinite(depth) & (depth > 0))

@@ -19,7 +19,7 @@ TITLE = "Bundler"
 _OPENCV = np.array([1.0, -1.0, -1.0])
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return source.text[:200].lstrip().startswith("# Bundle file")
 
 

@@ -92,17 +92,17 @@ class _Image(NamedTuple):
 class Tracks(NamedTuple):
     """Points in world space, and where pictures show them.
 
-    positions : (n, 3). colours : (n, 3), 0 … 255.
+    positions : (n, 3). colors : (n, 3), 0 … 255.
     observations : of each picture the numbers of the points that it shows, (m,) from 0, and their places, (m, 2): x to the
         right and y down from the picture's corner.
     """
 
     positions: np.ndarray
-    colours: np.ndarray
+    colors: np.ndarray
     observations: Sequence[tuple[np.ndarray, np.ndarray]]
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return model(source) is not None
 
 
@@ -367,10 +367,10 @@ def _points(tracks: Tracks | None, images: int) -> tuple[list[str], str]:
         lines.append(" ".join(f"{_spaced(*place)} {point + 1}" for point, place in observed))
         for index, (point, _) in enumerate(observed):
             shown_in[point].append(f"{image} {index}")
-    rows = zip(tracks.positions.tolist(), tracks.colours.tolist(), shown_in, strict=True)
+    rows = zip(tracks.positions.tolist(), tracks.colors.tolist(), shown_in, strict=True)
     return lines, "".join(
-        f"{number} {_spaced(*position)} {_spaced(*colour)} 0.0 {' '.join(track)}\n"
-        for number, (position, colour, track) in enumerate(rows, start=1)
+        f"{number} {_spaced(*position)} {_spaced(*color)} 0.0 {' '.join(track)}\n"
+        for number, (position, color, track) in enumerate(rows, start=1)
     )
 
 
@@ -389,9 +389,9 @@ def points_without_tracks(source: Source) -> str:
         return "".join(f"{' '.join(row)}\n" for row in rows)
     reader, lines = _Reader(file), []
     for _ in range(reader.numbers("Q")[0]):
-        number, x, y, z, *colour, error, tracked = reader.numbers("Q3d3BdQ")
+        number, x, y, z, *color, error, tracked = reader.numbers("Q3d3BdQ")
         reader.skip(8 * tracked)
-        lines.append(f"{number} {_spaced(x, y, z, *colour, error)}\n")
+        lines.append(f"{number} {_spaced(x, y, z, *color, error)}\n")
     return "".join(lines)
 
 

@@ -3,23 +3,32 @@
 A list of pictures, each with `position`, the eye, and `rotation`, camera to world with x right, y down, z into the view, row
 after row; `fx`, `fy` in pixels of `width` × `height`. It has no principal point, and the training takes the middle for it.
 
-Source: gaussian-splatting's utils/camera_utils.py (camera_to_JSON).
+Viewers take the list as one of views, or, as SuperSplat, as a path with a keyframe each: so what is written here is a path for
+them, too. They turn it with the splats as they show these.
+
+Source: gaussian-splatting's utils/camera_utils.py (camera_to_JSON); antimatter15/splat's main.js (getViewMatrix) and
+SuperSplat's src/file-handler.ts (loadCameraPoses).
 """
+
+import json
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
-from . import axes, naming
+from . import axes, naming, own
 from .camera import Camera, Options
 from .source import Record, Source
 
 TITLE = "cameras.json of Gaussian splatting"
+SUFFIX = ".json"
 
 _KEYS = {"position", "rotation", "fx", "fy", "width", "height"}
 _MIDDLE = "The file says no principal point: it was taken in the picture's middle, as the training does"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return (
         isinstance(source.json, list)
         and bool(source.json)
@@ -48,3 +57,28 @@ def read(source: Source, _options: Options) -> list[Camera]:
             notes = (*notes, _MIDDLE)
         cameras.append(Camera(name, pinhole, True, notes, image))
     return cameras
+
+
+def write(cameras: Sequence[Camera], options: Options) -> str:
+    naming.refuse_mirrored(cameras, "cameras.json")
+    naming.refuse_shifted(cameras, "cameras.json", square=False)
+    lines = [json.dumps(_written(camera, number)) for number, camera in enumerate(cameras)]
+    if options.remembered:
+        lines[0] = json.dumps({"comment": options.remembered})[:-1] + f", {lines[0][1:]}"
+    return "[\n" + ",\n".join(lines) + "\n]\n"
+
+
+def _written(camera: Camera, number: int) -> dict[str, Any]:
+    pinhole = camera.pinhole
+    rows = axes.camera_to_world(pinhole)[:3]
+    return {
+        "id": number,
+        "img_name": camera.image or camera.name,
+        "width": pinhole.width,
+        "height": pinhole.height,
+        "position": [row[3] for row in rows],
+        "rotation": [[row[0], -row[1] + 0.0, -row[2] + 0.0] for row in rows],
+        "fy": pinhole.distance[1],
+        "fx": pinhole.distance[0],
+        own.KEY: own.document(pinhole),
+    }

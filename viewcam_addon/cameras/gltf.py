@@ -29,7 +29,7 @@ _Y_UP = "glTF's y points up: the numbers stay as they are unless the axes Y up â
 _NEAR = 0.01  # of what is written; glTF asks for one
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     document = _document(source)
     return "asset" in document and ("cameras" in document or "nodes" in document)
 

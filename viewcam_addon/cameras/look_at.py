@@ -87,7 +87,7 @@ _SPECIFIC = {
 # What says something of a camera only where the object is one.
 _GENERIC = {
     **dict.fromkeys(["position", "location", "origin", "pos", "from"], "eye"),
-    **dict.fromkeys(["center", "centre", "target", "at", "to"], "target"),
+    **dict.fromkeys(["center", "center", "target", "at", "to"], "target"),
     **dict.fromkeys(["direction", "forward", "front", "dir"], "direction"),
     "size": "size",
     "width": "width",
@@ -155,13 +155,13 @@ class _Scene:
     controls: str | None = None  # of three.js, which turn the camera to their target
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     if source.is_binary or source.is_folder or source.document or source.xml is not None:
         return False
     text = source.text
     if len(text) > _MOST_CHARACTERS:
         return False
-    if own.recognises(source):
+    if own.recognizes(source):
         try:
             own.pairs(text.replace("−", "-"))
         except InputError:

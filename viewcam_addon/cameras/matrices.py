@@ -56,7 +56,7 @@ _MOST = 100
 _ROUNDED = 1e-4  # what digits leave of a zero, relative to the largest number
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return not source.is_binary and bool(_matrices_in(source.text))
 
 

@@ -29,7 +29,7 @@ _LENSES = {
 }
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     document = source.document
     return isinstance(document.get("views"), list) and "intrinsics" in document and _first_view_is_ours(document["views"])
 

@@ -30,7 +30,7 @@ TITLE = "Agisoft Metashape XML"
 _LENS = ("k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     head = source.text[:4000]
     return "<document" in head and "<chunk" in source.text and source.xml is not None and source.xml.tag == "document"
 

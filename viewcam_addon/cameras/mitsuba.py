@@ -69,7 +69,7 @@ class _Look:
         return result
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     text = source.text
     return bool(_XML.search(text) and source_xml(source) is not None) or bool(_PYTHON.search(text) and _is_python(text))
 

@@ -27,7 +27,7 @@ _ORIENTATIONS = {"quat": 4, "axisangle": 4, "xyaxes": 6, "zaxis": 3, "euler": 3}
 _MOST = 4_000
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     root = source.xml
     if root is None:
         return False

@@ -81,6 +81,17 @@ def near(path: str, folder: Path) -> Path | None:
     return None
 
 
+def in_order(folder: Path | None, places: Sequence[str], count: int) -> list[str]:
+    """The paths of a data set's pictures in the order of their names, from the first of these folders that has so many of them;
+    none where there is no such folder."""
+    for place in places:
+        if folder and (folder / place).is_dir():
+            names = sorted(each.name for each in (folder / place).iterdir() if has_suffix(each.name))
+            if len(names) == count:
+                return [f"{place}/{each}" for each in names]
+    return []
+
+
 def check_image(file: object) -> None:
     """Refuse a path by which no dataset can name a picture.
 
@@ -145,6 +156,19 @@ def refuse_mirrored(cameras: Iterable[Camera], written: str) -> None:
     mirrored = [image_of(camera) for camera in cameras if camera.pinhole.mirrored]
     if mirrored:
         raise InputError(f"{written} can't say that a camera is mirrored, as in {several(mirrored)}: make its scale positive")
+
+
+def refuse_shifted(cameras: Iterable[Camera], written: str, square: bool) -> None:
+    """Raise InputError if a camera's principal point is not the middle, or, if `square`, its pixels are not square.
+
+    written : what can't say it, as a sentence names it.
+    """
+    for camera in cameras:
+        pinhole = camera.pinhole
+        if pinhole.principal_point != (pinhole.width / 2, pinhole.height / 2):
+            raise InputError(f"{written} can't say that a camera is shifted, as {checks.quoted(camera.name)} is")
+        if square and pinhole.distance[0] != pinhole.distance[1]:
+            raise InputError(f"{written} has square pixels, and those of {checks.quoted(camera.name)} are none")
 
 
 def _is_unseen(character: str) -> bool:

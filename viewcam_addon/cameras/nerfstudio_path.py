@@ -32,7 +32,7 @@ _FPS = 24
 _OF_NERFSTUDIO = f"The path is in the world that nerfstudio trains in: with {WORLD} beside it, the original world can be chosen"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     path = source.document.get("camera_path")
     return isinstance(path, list) and bool(path) and isinstance(path[0], dict) and "camera_to_world" in path[0]
 
@@ -86,12 +86,7 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
     if len(sizes) != 1:
         raise InputError("camera_path.json has one size for all cameras, and these have several: choose another format")
     ((width, height),) = sizes
-    for camera in cameras:
-        d_x, d_y = camera.pinhole.distance
-        if camera.pinhole.principal_point != (width / 2, height / 2):
-            raise InputError(f"camera_path.json can't say that a camera is shifted, as {checks.quoted(camera.name)} is")
-        if d_x != d_y:
-            raise InputError(f"camera_path.json has square pixels, and those of {checks.quoted(camera.name)} are none")
+    naming.refuse_shifted(cameras, "camera_path.json", square=True)
     lines = [
         json.dumps(
             {

@@ -15,18 +15,14 @@ lines; K that means the corner where it is exactly half the size: the middle of 
 Source: OpenCV's modules/core/src/persistence_yml.cpp and calib3d's projectPoints.
 """
 
-import contextlib
-import io
 import math
 import re
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from .. import checks, npy
+from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming, own
@@ -65,13 +61,12 @@ _HEIGHT = ("imageheight", "height", "h", "resy")
 _SIZE = ("imagesize", "size", "resolution", "imgsize", "imagesizewh")
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tx", "ty")
 """The names of the distortion's coefficients, in OpenCV's order."""
-_MOST_BYTES, _MOST_ARRAYS = 2**16, 1000  # of an NPZ
 _WIDEST = 50  # widths of the picture to a focal length, which are 177.7°
 _UNSAID = f"whose axes it means and which way it goes is not said: give --pose, one of {', '.join(POSES)}"
 _WAY = "R and t were taken as from world to camera, x right, y down, z into the view"
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return any(True for _ in _cameras_in(source))
 
 
@@ -215,8 +210,8 @@ def _cameras_in(source: Source):
 def _document(source: Source) -> Mapping[str, Any]:
     if source.is_folder:
         return {}
-    if source.data[:4] == b"PK\x03\x04":
-        return _npz(source)
+    if source.npz:
+        return {name: array.tolist() for name, array in source.npz.items()}
     if source.document:
         return source.document
     if isinstance(source.json, list):
@@ -224,20 +219,6 @@ def _document(source: Source) -> Mapping[str, Any]:
     if source.text.lstrip()[:1] == "<":
         return _xml(source)
     return source.yaml if _SAYS_K.search(source.text) else {}
-
-
-def _npz(source: Source) -> dict[str, Any]:
-    """Arrays of numbers without pickle, and no more of them than a camera has."""
-    result: dict[str, Any] = {}
-    try:
-        with zipfile.ZipFile(io.BytesIO(source.data)) as archive:
-            for name, member in npy.members(archive).items():
-                if member.file_size < _MOST_BYTES and len(result) < _MOST_ARRAYS:
-                    with contextlib.suppress(ValueError), archive.open(member) as file:
-                        result[name] = npy.read(file.read(member.file_size)).tolist()  # and no more, whatever is packed there
-    except (ValueError, OSError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error):
-        return {}
-    return result
 
 
 def _xml(source: Source) -> dict[str, Any]:
@@ -301,12 +282,17 @@ def plane_of_k(values: Sequence[float], size: tuple[int, int], half: float, what
         as `matrix_of_k` does, or if K can't count in pixels.
     """
     f_x, f_y, c_x, c_y = matrix_of_k(values, what)
+    refuse_widths(f_x, f_y, c_x, c_y, size, what)
+    return axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
+
+
+def refuse_widths(f_x: float, f_y: float, c_x: float, c_y: float, size: tuple[int, int], what: str) -> None:
+    """Raise InputError if K's numbers can't count in pixels."""
     if max(f_x, f_y) < max(size) / _WIDEST and max(abs(c_x), abs(c_y)) < 2:
         raise InputError(
             f"K of {what} has the focal length {f_x:g} and the principal point {c_x:g}, {c_y:g}, which seem to count in widths "
             "of the picture: multiply its rows by the width and the height"
         )
-    return axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
 
 
 def of_window(plane: ViewPlane, values: Mapping[str, Any], what: str) -> tuple[ViewPlane, tuple[str, ...]]:

@@ -24,7 +24,7 @@ _FISHEYE = ("k1", "k2", "k3", "k4")
 _PINHOLES = ("pinhole", "pinhole_radial_k1", "pinhole_radial_k3", "pinhole_brown_t2", "fisheye")
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return {"sfm_data_version", "views", "intrinsics"} <= source.document.keys()
 
 

@@ -43,7 +43,7 @@ Values = dict[str, object]
 
 _SPELLINGS = {
     **dict.fromkeys(("eye", "from", "origin", "location", "position", "lookfrom"), "eye"),
-    **dict.fromkeys(("lookat", "at", "to", "target", "center", "centre", "focalpoint"), "look_at"),
+    **dict.fromkeys(("lookat", "at", "to", "target", "center", "center", "focalpoint"), "look_at"),
     **dict.fromkeys(("up", "upvector", "vup", "viewup"), "up"),
     **dict.fromkeys(("distance", "dist", "d"), "distance"),
     **dict.fromkeys(("fov", "fieldofview", "angle"), "fov"),
@@ -84,7 +84,7 @@ class _Angle(float):
     """An angle whose unit stands beside it, in radians."""
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     if source.is_binary or source.is_folder:
         return False
     if lines_of(source):

@@ -53,7 +53,7 @@ _HARMLESS = {"shutteropen", "shutterclose", "focaldistance", "lensradius", "medi
 _Parameters = dict[str, tuple[list, int]]
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return not source.is_binary and source.text.lstrip()[:1] not in ("<", "{", "[") and _has_statement(source.text)
 
 

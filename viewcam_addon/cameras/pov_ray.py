@@ -54,7 +54,7 @@ _PIXELS = re.compile(r"\+([WwHh])(\d{1,6})\b")
 _UNITS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     if source.is_binary or not _CAMERA.search(source.text):
         return False
     text = texts.without(_COMMENT, source.text)

@@ -28,7 +28,7 @@ TITLE = "camera of The Ray Tracer Challenge (YAML)"
 _CAMERA = re.compile(r"^([ \t]*)-[ \t]+add:[ \t]*camera\b[^\n]*\n", re.MULTILINE)
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return not source.is_binary and bool(_CAMERA.search(source.text + "\n"))
 
 

@@ -26,7 +26,7 @@ SEVERAL = "a folder"
 _KEYS = {"image_width", "image_height", "camera_matrix", "distortion_model"}
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return "camera_matrix" in source.text and source.yaml.keys() >= _KEYS
 
 

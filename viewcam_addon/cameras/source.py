@@ -2,13 +2,17 @@
 
 Each is parsed once, whoever asks. JSON may have comments, as instant-ngp's has; keys that appear twice are refused, since
 nobody knows which counts. XML is read without a document type, entities or anything outside, and no deeper than 100 elements:
-what attacks XML parsers needs one of these.
+what attacks XML parsers needs one of these. Of an NPZ the small arrays of numbers are read, without pickle.
 """
 
 import codecs
+import contextlib
+import io
 import json
 import re
 import struct
+import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -19,13 +23,14 @@ from xml.parsers import expat
 
 import numpy as np
 
-from .. import checks
+from .. import checks, npy
 from ..errors import InputError
 from ..files import read_bytes
 from . import yaml
 
 _MOST_BYTES = 2**30
 _DEEPEST = 100
+_MOST_BYTES_OF_ARRAY, _MOST_ARRAYS = 2**16, 1000
 _STRING = r'"[^"\\]*(?:\\.[^"\\]*)*"?'
 _COMMENT = re.compile(rf"{_STRING}|//[^\n]*|/\*.*?(?P<end>\*/|\Z)", re.DOTALL)
 _TRAILING_COMMA = re.compile(rf"{_STRING}|,(?=\s*[\]}}])", re.DOTALL)
@@ -41,16 +46,16 @@ _UTF_16 = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"<\0?\0": "utf-16-le",
 
 
 class Source:
-    """A source that was given: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters.
+    """A source of cameras: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters.
 
     `parsed` is for formats whose content takes its time: what one has made of it, by its title.
 
-    given : a text or its bytes, the Path of a file or folder, or the files of a folder by their names.
+    content : a text or its bytes, the Path of a file or folder, or the files of a folder by their names.
     """
 
-    def __init__(self, given: "str | bytes | Path | Mapping[str, str | bytes]") -> None:
-        self.path = given if isinstance(given, Path) else None
-        self._given = given
+    def __init__(self, content: "str | bytes | Path | Mapping[str, str | bytes]") -> None:
+        self.path = content if isinstance(content, Path) else None
+        self._content = content
         self.parsed: dict[str, Any] = {}
 
     @property
@@ -60,7 +65,7 @@ class Source:
 
     @cached_property
     def is_folder(self) -> bool:
-        return self.path.is_dir() if self.path else isinstance(self._given, Mapping)
+        return self.path.is_dir() if self.path else isinstance(self._content, Mapping)
 
     @cached_property
     def data(self) -> bytes:
@@ -74,7 +79,7 @@ class Source:
         if self.is_folder:
             return b""
         if self.path is None:
-            return self._given if isinstance(self._given, bytes) else self._given.encode("utf-8", errors="replace")
+            return self._content if isinstance(self._content, bytes) else self._content.encode("utf-8", errors="replace")
         try:
             if self.path.stat().st_size > _MOST_BYTES:
                 raise InputError(f"{self.path} is larger than {_MOST_BYTES >> 20} MiB: give the file of the cameras alone")
@@ -107,7 +112,7 @@ class Source:
         usual = utf_16 or "utf-8-sig"
         head = data[:1024].decode(utf_16, errors="ignore").encode("ascii", errors="ignore") if utf_16 else data[:1024]
         declared = _XML_DECLARATION.match(head.removeprefix(b"\xef\xbb\xbf"))
-        if isinstance(self._given, str) or not declared:
+        if isinstance(self._content, str) or not declared:
             return usual, ""
         name = declared[1].decode("ascii", errors="replace")
         advice = "save it in UTF-8 and let it say so"
@@ -185,10 +190,26 @@ class Source:
         """The keys of the part of YAML in which cameras are written."""
         return yaml.read(self.text)
 
+    @cached_property
+    def npz(self) -> dict[str, np.ndarray]:
+        """The arrays of an NPZ by their names, of those as small as a camera's are; none if this is no NPZ."""
+        result: dict[str, np.ndarray] = {}
+        if self.data[:4] != b"PK\x03\x04":
+            return result
+        try:
+            with zipfile.ZipFile(io.BytesIO(self.data)) as archive:
+                for name, member in npy.members(archive).items():
+                    if member.file_size < _MOST_BYTES_OF_ARRAY and len(result) < _MOST_ARRAYS:
+                        with contextlib.suppress(ValueError), archive.open(member) as file:
+                            result[name] = npy.read(file.read(member.file_size))  # and no more, whatever is packed there
+        except (ValueError, OSError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error):
+            return {}
+        return result
+
     def file(self, *parts: str) -> "Source | None":
         """The file of that name in the folder, or beside this file; None if there is none."""
         if self.path is None:
-            held = self._given.get("/".join(parts)) if self.is_folder else None
+            held = self._content.get("/".join(parts)) if self.is_folder else None
             return None if held is None else Source(held)
         path = (self.path if self.is_folder else self.path.parent).joinpath(*parts)
         try:

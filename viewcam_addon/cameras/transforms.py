@@ -53,7 +53,7 @@ _LEAST_ANGLE = 1e-9  # radians
 _SAME_FOCAL = 1e-3  # relative: what camera_angle_x and fl_x may differ by for the few digits of one
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     return bool(_files(source))
 
 

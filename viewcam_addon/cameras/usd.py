@@ -35,7 +35,7 @@ _SIDES = ("Horizontal", "Vertical")
 _MOST_NAMED = 3
 
 
-def recognises(source: Source) -> bool:
+def recognizes(source: Source) -> bool:
     data = source.data
     zipped = source.path is not None and source.path.suffix.lower() == ".usdz"
     return data.startswith((b"#usda ", b"PXR-USDC")) or (zipped and data.startswith(b"PK"))
@@ -54,7 +54,7 @@ def read(source: Source, options: Options) -> list[Camera]:
 
 
 def _notes(stage: dict[str, Any]) -> tuple[str, ...]:
-    unit, notes = stage["metres_per_unit"], []
+    unit, notes = stage["meters_per_unit"], []
     if stage["y_up"] or unit != 1:
         turned = "y up was turned to z up" if stage["y_up"] else "its z points up"
         scaled = f"one unit of it is {unit:g} m" if unit != 1 else "it counts in meters"
@@ -68,7 +68,7 @@ def _notes(stage: dict[str, Any]) -> tuple[str, ...]:
 def in_world(source: Source, options: Options) -> Options:
     """The options, with the axes and the unit that the stage says."""
     stage = _stage(source)
-    unit = checks.number(f"metersPerUnit of {source.name}", stage["metres_per_unit"], 1e-12, 1e12)
+    unit = checks.number(f"metersPerUnit of {source.name}", stage["meters_per_unit"], 1e-12, 1e12)
     return dataclasses.replace(options, axes="y_up" if stage["y_up"] else options.axes, scale=options.scale * unit)
 
 

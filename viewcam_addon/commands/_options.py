@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import argument_types as types
-from ..errors import InputError, NotModelledError
+from ..errors import InputError, NotModeledError
 from ..terminal import say
 from ..tracer.scene.film import LEVELS, SAMPLES
 
@@ -127,7 +127,7 @@ def in_another_blender(options: argparse.Namespace) -> int | None:
         status = subprocess.run(command, check=False).returncode
     except OSError as error:
         raise InputError(f"{BLENDER} names {program}, which can't be started ({error.strerror}): correct it") from error
-    if status not in (0, InputError.exit_status, NotModelledError.exit_status):
+    if status not in (0, InputError.exit_status, NotModeledError.exit_status):
         raise InputError(
             f"{program}, which {BLENDER} names, ended with status {status}: see that it is Blender 4.2 or newer with the "
             "extension Virtual Pinhole, and that it can open the file"

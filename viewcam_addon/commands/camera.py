@@ -146,7 +146,7 @@ def _undistort(options: argparse.Namespace) -> Result:
     if options.axes != "as_is" or options.scale != 1 or options.original_world or options.up_from:
         raise InputError("--undistort leaves the world as it is, for its points' sake: turn and scale what it has written")
     read = cameras.read(dataset, format=options.format, options=options_of(options))
-    form = options.to or ("transforms" if cameras.recognised(dataset) == "transforms" else "colmap")
+    form = options.to or ("transforms" if cameras.recognized(dataset) == "transforms" else "colmap")
     if form not in undistortion.FORMS:
         raise InputError(f"--undistort writes {' or '.join(undistortion.FORMS)}: give --to one of these")
     for note in dict.fromkeys(note for camera in read for note in camera.notes):

@@ -108,7 +108,7 @@ def _check_many(options: argparse.Namespace, job: Any) -> Result:
             command="check",
         )
         summary = _carry_out.carry_out(plan, jobs_of, options.events, complete)
-    status = summary.exit_status or (3 if options.strict and summary.counts["not_all_modelled"] else 0)
+    status = summary.exit_status or (3 if options.strict and summary.counts["not_all_modeled"] else 0)
     return status, {**summary.to_json(), "exit_status": status, "strict": options.strict}
 
 

@@ -22,22 +22,22 @@ COLORS = {SAME: "green", SAME_BUT: "amber", DIFFERENT: "red"}
 
 
 @dataclass(frozen=True)
-class NotModelled:
+class NotModeled:
     """The part of a picture that the answer says nothing of.
 
     names : of the objects, those that the ledger has as approximated or skipped and that are in the picture, or may be, and
     those whose light is a renderer's choice. share : of the pixels, 0 to 1: those that show them or differ by them; None where
-    that was not measured. shown : those that show them alone. in_one_place : of the names those of surfaces in one place.
+    that was not measured. visible : those that show them alone. in_one_place : of the names those of surfaces in one place.
     seen_otherwise : those whose shadows not all kinds of rays see.
     """
 
     names: tuple[str, ...] = ()
     share: float | None = 0.0
-    shown: float = 0.0
+    visible: float = 0.0
     in_one_place: tuple[str, ...] = ()
     seen_otherwise: tuple[str, ...] = ()
 
-    def sorted_by(self, in_one_place: Sequence[str], seen_otherwise: Sequence[str]) -> "NotModelled":
+    def sorted_by(self, in_one_place: Sequence[str], seen_otherwise: Sequence[str]) -> "NotModeled":
         """A copy that tells which of its objects are modeled."""
         one_place, otherwise = (tuple(name for name in self.names if name in group) for group in (in_one_place, seen_otherwise))
         return replace(self, in_one_place=one_place, seen_otherwise=otherwise)
@@ -47,7 +47,7 @@ class NotModelled:
             "count": len(self.names),
             "names": list(self.names),
             "share": self.share,
-            "shown": self.shown,
+            "shown": self.visible,
             "in_one_place": list(self.in_one_place),
             "seen_otherwise": list(self.seen_otherwise),
         }
@@ -58,13 +58,13 @@ class Answer:
     """The answer of comparing two pictures.
 
     answer : one of ANSWERS. headline : a few words. text : the figures that stand for it, or what differs.
-    not_modelled : of the picture, whatever the answer.
+    not_modeled : of the picture, whatever the answer.
     """
 
     answer: str
     headline: str
     text: str
-    not_modelled: NotModelled = field(default_factory=NotModelled)
+    not_modeled: NotModeled = field(default_factory=NotModeled)
 
     @property
     def passed(self) -> bool:
@@ -88,7 +88,7 @@ class Answer:
             "passed": self.passed,
             "answer": self.answer,
             "sentence": self.sentence,
-            "not_modelled": self.not_modelled.to_json(),
+            "not_modeled": self.not_modeled.to_json(),
         }
 
 
@@ -100,21 +100,21 @@ def exit_status(answer: str, strict: bool) -> int:
     return 1 if answer == DIFFERENT else 3 if strict and answer == SAME_BUT else 0
 
 
-def answered(same: bool, headline: str, text: str, not_modelled: NotModelled) -> Answer:
+def answered(same: bool, headline: str, text: str, not_modeled: NotModeled) -> Answer:
     """The answer, whose headline names what is not modeled where the rest is the same.
 
     same : whether nothing differs. headline : without what is not modeled.
     """
     if not same:
-        return Answer(DIFFERENT, headline, text, not_modelled)
-    if not not_modelled.names:
-        return Answer(SAME, headline, text, not_modelled)
-    return Answer(SAME_BUT, f"{headline}, {but_for(not_modelled.to_json())} ({_named(not_modelled)})", text, not_modelled)
+        return Answer(DIFFERENT, headline, text, not_modeled)
+    if not not_modeled.names:
+        return Answer(SAME, headline, text, not_modeled)
+    return Answer(SAME_BUT, f"{headline}, {but_for(not_modeled.to_json())} ({_named(not_modeled)})", text, not_modeled)
 
 
 def in_the_picture(
     names: Sequence[str], surfaces: Mapping[str, NDArray[np.bool_]], changed: NDArray[np.bool_] | None, is_lit: bool
-) -> NotModelled:
+) -> NotModeled:
     """The part of a picture that is not modeled.
 
     names : of the objects that are not. surfaces : name → (height, width), the pixels that show it, of those that are surfaces
@@ -128,22 +128,22 @@ def in_the_picture(
     unseen = [name for name in names if name not in seen and (is_lit or name not in surfaces)]
     share = float(np.mean(pixels))
     if changed is None:
-        return NotModelled((*seen, *unseen), None if unseen else share, share)
+        return NotModeled((*seen, *unseen), None if unseen else share, share)
     if not (changed & ~pixels).any():
         unseen = []
-    return NotModelled((*seen, *unseen), float(np.mean(changed | pixels)), share)
+    return NotModeled((*seen, *unseen), float(np.mean(changed | pixels)), share)
 
 
-def but_for(not_modelled: Mapping[str, Any]) -> str:
+def but_for(not_modeled: Mapping[str, Any]) -> str:
     """but for 2 objects that are not modeled and 1 shadow that not all rays see
 
-    not_modelled : as of NotModelled.to_json.
+    not_modeled : as of NotModeled.to_json.
     """
-    one_place, otherwise = (not_modelled.get(key, ()) for key in ("in_one_place", "seen_otherwise"))
-    modelled = {*one_place, *otherwise}
+    one_place, otherwise = (not_modeled.get(key, ()) for key in ("in_one_place", "seen_otherwise"))
+    modeled = {*one_place, *otherwise}
     kinds = [
         (
-            [name for name in not_modelled["names"] if name not in modelled],
+            [name for name in not_modeled["names"] if name not in modeled],
             "object that is not",
             "objects that are not",
             " modeled",
@@ -165,8 +165,8 @@ def percent_of(share: float) -> str:
     return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.4g} %" if percent < 100.0 else "100 %"
 
 
-def _named(not_modelled: NotModelled) -> str:
-    named = several(not_modelled.names)
-    if not_modelled.share is None:
+def _named(not_modeled: NotModeled) -> str:
+    named = several(not_modeled.names)
+    if not_modeled.share is None:
         return f"{named}; on how much of the picture was not measured"
-    return f"{named}; {percent_of(not_modelled.share)} of the picture"
+    return f"{named}; {percent_of(not_modeled.share)} of the picture"

@@ -39,7 +39,7 @@ def write(comparison: GeometryComparison | RadianceComparison, path: str | os.Pa
     """
     picture, words, scale = _of_light(comparison) if isinstance(comparison, RadianceComparison) else _of_geometry(comparison)
     _write(picture, path)
-    return {"image": str(path), "colours": words, "scale": scale}
+    return {"image": str(path), "colors": words, "scale": scale}
 
 
 def write_sides(
@@ -59,7 +59,7 @@ def write_sides(
     InputError
         if a file can't be written.
     """
-    light = {} if everything is None else {"everything": everything["Combined"][..., :3]}
+    light: dict[str, NDArray] = {} if everything is None else {"everything": everything["Combined"][..., :3]}
     if isinstance(comparison, RadianceComparison):
         light |= {"reference": reference["Combined"][..., :3], "test": comparison.test}
     else:
@@ -76,8 +76,9 @@ def on_screen(
 ) -> tuple[pictures.Picture, pictures.Picture]:
     """Reference and test as an eye can compare them: light tone-mapped alike, geometry shaded."""
     if isinstance(comparison, RadianceComparison):
-        bright = pictures.brightness(reference["Combined"][..., :3])
-        return tuple(pictures.tone_mapped(side, bright) for side in (reference["Combined"][..., :3], comparison.test))
+        lit = reference["Combined"][..., :3]
+        bright = pictures.brightness(lit)
+        return pictures.tone_mapped(lit, bright), pictures.tone_mapped(comparison.test, bright)
     return pictures.shaded(reference), pictures.shaded(tests[0])
 
 
@@ -104,10 +105,10 @@ def _of_geometry(comparison: GeometryComparison) -> tuple[pictures.Picture, str,
     levels = pictures.on_scale(comparison.maps[row.name], low, high) if row.count else None
     marks = pictures.stain(comparison.mismatches, size)
     drawn = np.zeros(marks.shape[:2], np.uint8) if levels is None else levels
-    colours = _painted(drawn, pictures.colour_scale())
-    marks = marks[: len(colours), : len(colours[0])]
+    colors = _painted(drawn, pictures.color_scale())
+    marks = marks[: len(colors), : len(colors[0])]
     share = marks[..., 3:] / 255.0
-    blended = np.round(colours * (1 - share) + marks[..., :3] * share).astype(np.uint8)
+    blended = np.round(colors * (1 - share) + marks[..., :3] * share).astype(np.uint8)
     unit = "px" if row.unit == "px" else "of the depth"
     words = f"Dark {figure(low)} {unit} off, light {figure(high)} {unit}. Another surface seen: red, or teal where explained"
     return blended, words, {"kind": "logarithmic", "low": low, "high": high, "unit": unit}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..image import Image
 from ..pinhole import Pinhole
 from . import hypothesis_tests, noise_free
-from .answer import NotModelled, in_the_picture
+from .answer import NotModeled, in_the_picture
 from .light_verdict import FALSE_ALARMS
 from .radiance import VARIANCE_BATCHES
 from .sides import Sides, all_sides, samples_of
@@ -23,14 +23,14 @@ from .sides import Sides, all_sides, samples_of
 _ALL_BUT_NORMALS = ("Depth", "Position", "UV", "Object Index", "Material Index")
 
 
-def not_modelled(
+def not_modeled(
     names: Sequence[str],
     pixels: Mapping[str, NDArray[np.bool_]],
     reference: Image,
     tests: Sequence[Image],
     everything: Image | None = None,
     pinhole: Pinhole | None = None,
-) -> NotModelled:
+) -> NotModeled:
     """The part of a picture that is not modeled.
 
     names : of the objects that are not. pixels : name → (height, width), the pixels that show it, of those that are surfaces in
@@ -38,7 +38,7 @@ def not_modelled(
     samples, or None where there is none. pinhole : the camera where light was compared, None where geometry was.
     """
     if not names:
-        return NotModelled()
+        return NotModeled()
     changed = None
     if everything is not None and pinhole is not None:
         changed = _changed_light(reference, tests, everything, pinhole)

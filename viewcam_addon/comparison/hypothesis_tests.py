@@ -221,10 +221,10 @@ def _contour_errors(sides: Sides, rounding: Array, shift: float, across: Sequenc
     terms, allowances = bend * sides.difference[inner], np.abs(bend) * rounding[inner]
     is_white = np.add.outer(np.arange(height - 4), np.arange(width - 4)) % 2 == 1
     errors = []
-    for colour in (is_white, ~is_white):
-        allowance = allowances[colour].sum(axis=0)
-        allowance = allowance + shift * sum(np.abs((bend * slope[inner])[colour].sum(axis=0)) for slope in across)
-        errors.append(_errors(_beyond(terms[colour].sum(axis=0), allowance), (terms[colour] ** 2).sum(axis=0)))
+    for color in (is_white, ~is_white):
+        allowance = allowances[color].sum(axis=0)
+        allowance = allowance + shift * sum(np.abs((bend * slope[inner])[color].sum(axis=0)) for slope in across)
+        errors.append(_errors(_beyond(terms[color].sum(axis=0), allowance), (terms[color] ** 2).sum(axis=0)))
     return np.mean(errors, axis=0)[None, None]
 
 

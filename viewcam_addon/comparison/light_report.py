@@ -17,7 +17,7 @@ from .tolerances import ROUNDINGS
 
 # Under the loupe: one place for each test that failed, the first of them.
 _MOST_CROPS = 8
-_COLOURS = "blue where Cycles is darker, orange where it is brighter"
+_COLORS = "blue where Cycles is darker, orange where it is brighter"
 
 
 @np.errstate(all="ignore")
@@ -78,12 +78,12 @@ def _view(comparison: RadianceComparison, name: str, values: np.ndarray) -> page
         picture, legend = pictures.on_scale(values, 1e-2, high), page.logarithmic_legend(1e-2, high, limits, "roundings")
         return page.Tab(view, words, caption, {"image": pictures.png_uri(picture)}, legend)
     if kind == "difference":
-        caption = f"Cycles minus Tracer: {_COLOURS}."
+        caption = f"Cycles minus Tracer: {_COLORS}."
         limit, unit, allowed = difference.spread(values), "radiance", None
     else:
         test = row.hypothesis_tests[1 if kind == "tiles" else 0]
         what = {"tiles": f"The difference of each of the {test.name}"}.get(kind, "The difference of each pixel")
-        caption = f"{what} in standard errors of its own noise: {_COLOURS}."
+        caption = f"{what} in standard errors of its own noise: {_COLORS}."
         limit, unit, allowed = max(6.0, 1.25 * test.limit), "standard errors", test.limit
     picture = pictures.png_uri(pictures.signed(values, limit), pictures.signed_scale())
     return page.Tab(view, words, caption, {"image": picture}, page.signed_legend(limit, unit, allowed))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import listed
 from ..pinhole import Pinhole
-from .answer import Answer, NotModelled, answered, percent_of
+from .answer import Answer, NotModeled, answered, percent_of
 from .coincident import TakenOut
 from .hypothesis_tests import CONTOURS, PIXELS, WHOLE, HypothesisTest, Place
 from .noise_free import Edges
@@ -115,7 +115,7 @@ class RadianceComparison:
     is_noisy : whether chance had a part in it. rows : one for each quantity, Combined first. equal : further quantities, the
     same to the last bit. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
     maps : name to (height, width) float32, rows from the bottom: what differs in Combined and in quantities that fail.
-    not_modelled : what of the picture neither side models as it is. taken_out : pixels that the rest says nothing of.
+    not_modeled : what of the picture neither side models as it is. taken_out : pixels that the rest says nothing of.
     stated : the camera that was asked for, or None. search : of a comparison in rounds.
     """
 
@@ -128,12 +128,12 @@ class RadianceComparison:
     appearance: Appearance
     test: Array
     maps: dict[str, NDArray[np.float32]]
-    not_modelled: NotModelled = field(default_factory=NotModelled)
+    not_modeled: NotModeled = field(default_factory=NotModeled)
     taken_out: TakenOut = field(default_factory=TakenOut)
     stated: Pinhole | None = None
     search: Search | None = None
     renderer = "Cycles"
-    """Who made the test: light is compared with Cycles' alone."""
+    """The renderer of the test: light is compared with Cycles' alone."""
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -153,10 +153,10 @@ class RadianceComparison:
         if worst:
             others = f"; {listed([row.name for row in worst[1:]])} too" if len(worst) > 1 else ""
             return answered(
-                False, "Different here", f"{_difference(worst[0])}{_hint(worst[0])}{others}{_without(self)}.", self.not_modelled
+                False, "Different here", f"{_difference(worst[0])}{_hint(worst[0])}{others}{_without(self)}.", self.not_modeled
             )
         if self.is_empty:
-            return answered(False, "Nothing to compare", _nothing_left(self.taken_out), self.not_modelled)
+            return answered(False, "Nothing to compare", _nothing_left(self.taken_out), self.not_modeled)
         if not self.is_noisy:
             row = combined.noise_free
             text = (
@@ -164,9 +164,9 @@ class RadianceComparison:
                 f"value in the median and by at most {row.values[-1]:.1e}, {percent(row.worst[1])} of what float32 allows"
                 f"{_edges(combined)}{_without(self)}."
             )
-            return answered(True, "The same picture", text, self.not_modelled)
+            return answered(True, "The same picture", text, self.not_modeled)
         text = f"no pixel and no tile differs by more than chance; {_mean_text(combined, self.search)}{_without(self)}."
-        return answered(True, f"The same within noise at {samples_text(self)}", text, self.not_modelled)
+        return answered(True, f"The same within noise at {samples_text(self)}", text, self.not_modeled)
 
     @property
     def passed(self) -> bool:

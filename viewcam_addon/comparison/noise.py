@@ -49,7 +49,7 @@ def sign_critical(level: float) -> float:
 
 
 def student_tail(t: Array, freedom: Array) -> Array:
-    """Two-sided tail of Student's t: the regularised incomplete beta function I_x(ν/2, ½) at x = ν/(ν + t²).
+    """Two-sided tail of Student's t: the regularized incomplete beta function I_x(ν/2, ½) at x = ν/(ν + t²).
 
     By its continued fraction (Abramowitz and Stegun 26.5.8) after Lentz, for x below its mean; else by 1 − I_{1−x}(½, ν/2).
     """

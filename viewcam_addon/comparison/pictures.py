@@ -43,10 +43,10 @@ def png_uri(picture: Picture, scale: NDArray[np.uint8] | None = None) -> str:
 
 
 def png(picture: Picture, scale: NDArray[np.uint8] | None = None) -> bytes:
-    """The picture as a PNG file; a (height, width) one holds levels of a scale (colour_scale by default), 0 for none."""
+    """The picture as a PNG file; a (height, width) one holds levels of a scale (color_scale by default), 0 for none."""
     if picture.ndim == 3:
         return encoded(picture)
-    return encoded(picture, b"\0\0\0" + (colour_scale() if scale is None else scale).tobytes())
+    return encoded(picture, b"\0\0\0" + (color_scale() if scale is None else scale).tobytes())
 
 
 def shaded(image: Image) -> Picture:
@@ -65,23 +65,23 @@ def shaded(image: Image) -> Picture:
     return _to_screen(np.where(hit[..., None], linear, sky))
 
 
-def brightness(colour: NDArray) -> float:
+def brightness(color: NDArray) -> float:
     """The value that is shown just below white: the 98th percentile of the largest of each pixel's channels."""
-    return max(float(np.percentile(np.nan_to_num(colour.astype(np.float64)).max(axis=-1), 98)), 1e-12)
+    return max(float(np.percentile(np.nan_to_num(color.astype(np.float64)).max(axis=-1), 98)), 1e-12)
 
 
-def on_screen(colour: NDArray, bright: float) -> NDArray[np.float64]:
+def on_screen(color: NDArray, bright: float) -> NDArray[np.float64]:
     """Light (height, width, 3) as sRGB from 0 to 1, `bright` just below white."""
-    return _encoded(_exposed(colour, bright))
+    return _encoded(_exposed(color, bright))
 
 
-def tone_mapped(colour: NDArray, bright: float | None = None) -> Picture:
+def tone_mapped(color: NDArray, bright: float | None = None) -> Picture:
     """Light (height, width, 3), rows from the bottom, as a screen shows it. bright : its own `brightness` by default."""
-    return _to_screen(_exposed(colour, bright or brightness(colour)))
+    return _to_screen(_exposed(color, bright or brightness(color)))
 
 
-def _exposed(colour: NDArray, bright: float) -> NDArray[np.float64]:
-    return np.clip(np.nan_to_num(colour.astype(np.float64)) / bright * 0.9, 0.0, 1.0)
+def _exposed(color: NDArray, bright: float) -> NDArray[np.float64]:
+    return np.clip(np.nan_to_num(color.astype(np.float64)) / bright * 0.9, 0.0, 1.0)
 
 
 def on_scale(errors: NDArray[np.float32], low: float, high: float) -> Picture:
@@ -114,12 +114,12 @@ def stain(mismatches: Mismatches, size: tuple[int, int]) -> Picture:
     """Every mismatch as a colored pixel, for pictures that have more of them than marks can show: red where unexplained."""
     step = _step(size[0])
     picture = np.zeros((-(-size[1] // step), -(-size[0] // step), 4), np.uint8)
-    for chosen, colour in ((mismatches.explained, (20, 184, 200, 200)), (~mismatches.explained, (255, 59, 107, 170))):
-        picture[(size[1] - 1 - mismatches.rows[chosen]) // step, mismatches.columns[chosen] // step] = colour
+    for chosen, color in ((mismatches.explained, (20, 184, 200, 200)), (~mismatches.explained, (255, 59, 107, 170))):
+        picture[(size[1] - 1 - mismatches.rows[chosen]) // step, mismatches.columns[chosen] // step] = color
     return picture
 
 
-def colour_scale() -> NDArray[np.uint8]:
+def color_scale() -> NDArray[np.uint8]:
     """(LEVELS, 3) uint8 sRGB, from near black over violet and orange to a light yellow; lightness rises in even steps."""
     t = np.linspace(0.0, 1.0, LEVELS)
     hue = np.radians(280.0 + 185.0 * t)

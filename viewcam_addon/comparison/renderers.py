@@ -50,7 +50,7 @@ class Renderer:
         return tolerances.FLOAT32 if self.near is None else DEPTH_BUFFER * tolerances.FLOAT32 * depth / self.near
 
 
-# Rasterisers move vertices to a grid of 1/256 of a pixel before they decide which pixels a triangle covers (OpenGL asks for
+# Rasterizers move vertices to a grid of 1/256 of a pixel before they decide which pixels a triangle covers (OpenGL asks for
 # 1/16 at least, and graphics cards and llvmpipe have 8 bits): by half a step each way, and an edge by no more than its ends.
 SUBPIXEL = 2.0**-9 * 2**0.5
 # Normals of 16 bits for each coordinate, as "High Quality Normals" has them: half a step in each of three.

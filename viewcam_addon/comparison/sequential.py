@@ -41,14 +41,14 @@ _FEWEST_OF_ALL = TOTALS[1]
 # faults are found as with 1,024; a block of 8 × 8 pixels that is 5 % brighter is the last of them.
 _FEWEST = 1.28
 # Lights that a pass has divided by the color that they fell on: quotients have no mean of their own.
-_PER_COLOUR = ("Diffuse Direct", "Diffuse Indirect")
+_PER_COLOR = ("Diffuse Direct", "Diffuse Indirect")
 _MEANS = ("Combined", "Emission", "Environment", "Diffuse Color")
 
 
 class Rounds:
     """The pictures of all rounds so far, each the mean over all of its samples.
 
-    samples : of each side. reference, tests, everything : as of radiance.compare and everything.not_modelled. Each of the tests
+    samples : of each side. reference, tests, everything : as of radiance.compare and everything.not_modeled. Each of the tests
     has had a share of every round, so that they are alike and independent, and their spread tells their noise as ever.
     """
 
@@ -101,14 +101,14 @@ def _pooled(before: Image, now: Image, share: float) -> Image:
         if name in passes:
             passes[name] = _mixed(before.passes[name], now.passes[name], share)
     if "Diffuse Color" in passes:
-        for name in _PER_COLOUR:
+        for name in _PER_COLOR:
             if name in passes:
-                one, other = (of.passes[name] * of.passes["Diffuse Color"].astype(float) for of in (before, now))
-                color, mean = passes["Diffuse Color"].astype(float), _mixed(one, other, share)
+                earlier, later = (of.passes[name] * of.passes["Diffuse Color"].astype(float) for of in (before, now))
+                color, mean = passes["Diffuse Color"].astype(float), _mixed(earlier, later, share)
                 passes[name] = np.divide(mean, color, out=np.zeros(color.shape), where=color > 0.0).astype(np.float32)
     if "Variance" in passes:  # of a mean of two that are independent
-        one, other = (of.passes["Variance"].astype(float) for of in (before, now))
-        passes["Variance"] = ((1.0 - share) ** 2 * one + share**2 * other).astype(np.float32)
+        earlier, later = (of.passes["Variance"].astype(float) for of in (before, now))
+        passes["Variance"] = ((1.0 - share) ** 2 * earlier + share**2 * later).astype(np.float32)
     counts = {
         name: str(int(text) + int(now.attributes[name]))
         for name, text in before.attributes.items()

@@ -23,8 +23,8 @@ from .mismatches import largest_around
 from .tolerances import FLOAT32, Array
 
 QUANTITIES = ("Combined", "Alpha", *(name for name in LIGHT_PASSES if name in SETTINGS))
-_TIMES_COLOUR = ("Diffuse Direct", "Diffuse Indirect")
-_LIGHT = ("Emission", "Environment", *_TIMES_COLOUR)
+_TIMES_COLOR = ("Diffuse Direct", "Diffuse Indirect")
+_LIGHT = ("Emission", "Environment", *_TIMES_COLOR)
 CHANNEL_NAMES = ("red", "green", "blue")
 
 # A standard error below so many roundings of float32 of the value itself is no noise but rounding.
@@ -119,7 +119,7 @@ def all_sides(reference: Image, tests: Sequence[Image], anew: Sequence[Image] = 
     is_quiet = quiet(combined.reference, combined.variance) & alone
     for part in parts:
         known = np.where(is_quiet, 0.0, part.variance)
-        yield replace(part, variance=known, shared=shared if part.name in _TIMES_COLOUR else 0.0)
+        yield replace(part, variance=known, shared=shared if part.name in _TIMES_COLOR else 0.0)
 
 
 def _is_all(part: Sides, combined: Sides) -> NDArray[np.bool_]:
@@ -190,7 +190,7 @@ def _mean_and_spread(name: str, images: Sequence[Image]) -> tuple[Array, Array]:
 
 
 def _has(image: Image, name: str) -> bool:
-    needed = ("Combined",) if name == "Alpha" else (name, "Diffuse Color") if name in _TIMES_COLOUR else (name,)
+    needed = ("Combined",) if name == "Alpha" else (name, "Diffuse Color") if name in _TIMES_COLOR else (name,)
     return all(pass_name in image.passes for pass_name in needed)
 
 
@@ -199,4 +199,4 @@ def values_of(image: Image, name: str) -> Array:
     if name == "Alpha":
         return image["Combined"][..., 3:].astype(np.float64)
     values = image[name][..., :3].astype(np.float64)
-    return values * image["Diffuse Color"] if name in _TIMES_COLOUR else values
+    return values * image["Diffuse Color"] if name in _TIMES_COLOR else values

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pinhole import Pinhole
-from .answer import Answer, NotModelled, answered
+from .answer import Answer, NotModeled, answered
 from .cameras import ConversionError, Systematic
 from .far_from_origin import FarFromOrigin
 from .mismatches import KINDS, NOWHERE, PIXELS_PER_UNEXPLAINED, InOnePlace, Mismatches
@@ -40,7 +40,7 @@ class GeometryComparison:
     far_from_origin : what the distance from the origin costs, None where that is nothing to speak of.
     origin : the point of the world from which the coordinates of both pictures are counted.
     lacking : passes that only the reference has. in_one_place : pixels that show another of several surfaces in one place,
-    which is as right as the reference's. renderer : who made the test, by name. not_modelled : what of the picture neither
+    which is as right as the reference's. renderer : who made the test, by name. not_modeled : what of the picture neither
     side models as it is.
     """
 
@@ -58,7 +58,7 @@ class GeometryComparison:
     lacking: tuple[str, ...] = ()
     in_one_place: InOnePlace = NOWHERE
     renderer: str = "Cycles"
-    not_modelled: NotModelled = field(default_factory=NotModelled)
+    not_modeled: NotModeled = field(default_factory=NotModeled)
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -88,13 +88,13 @@ class GeometryComparison:
     def answer(self) -> Answer:
         """True if the two are the same picture, in one sentence, which names the gravest fault where there is one."""
         if self.is_empty:
-            return answered(False, "Nothing to compare", NOTHING_TO_COMPARE, self.not_modelled)
+            return answered(False, "Nothing to compare", NOTHING_TO_COMPARE, self.not_modeled)
         systematic_ok = self.systematic is None or self.systematic.ok  # where nothing is compared no row is
         conversion_ok = self.conversion is None or self.conversion.ok
         same = systematic_ok and conversion_ok and self.mismatches_ok and all(row.ok for row in self.rows)
         if same:
-            return answered(True, "The same picture", _agreement(self), self.not_modelled)
-        return answered(False, "Not the same picture", "; ".join(_faults(self)[:_MOST_FAULTS]) + ".", self.not_modelled)
+            return answered(True, "The same picture", _agreement(self), self.not_modeled)
+        return answered(False, "Not the same picture", "; ".join(_faults(self)[:_MOST_FAULTS]) + ".", self.not_modeled)
 
     @property
     def passed(self) -> bool:

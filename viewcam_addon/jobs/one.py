@@ -24,7 +24,7 @@ and ask again.
 """
 
 _MOMENT = 0.2  # seconds
-_KEPT = ("passed", "answer", "verdict", "figures", "not_modelled", "ledger", "level")
+_KEPT = ("passed", "answer", "verdict", "figures", "not_modeled", "ledger", "level")
 """The keys of a check that a sidecar keeps."""
 
 

@@ -24,7 +24,7 @@ _WORDS = {
     "failed": "failed",
     "left": "left to render",
     "checks_failed": "not what the reference tracer sees",
-    "not_all_modelled": "the same but for objects that are not modeled",
+    "not_all_modeled": "the same but for objects that are not modeled",
 }
 
 
@@ -72,10 +72,10 @@ def verdict(result: Result) -> str:
     largest = _part(figures, "position").get("max")
     words = f"identical to {plain(largest)} px" if isinstance(largest, float) else "identical"
     words = "the same within noise" if figures.get("noisy") else words
-    not_modelled = _part(check, "not_modelled")
+    not_modeled = _part(check, "not_modeled") or _part(check, "not_modelled")  # as folders of the first months have it
     return (
-        f"{words}, {but_for(not_modelled)}"
-        if result.answer == SAME_BUT and isinstance(not_modelled.get("names"), list)
+        f"{words}, {but_for(not_modeled)}"
+        if result.answer == SAME_BUT and isinstance(not_modeled.get("names"), list)
         else words
     )
 
@@ -110,7 +110,7 @@ def _answer(counts: Mapping[str, int]) -> str | None:
     """The answer at the page's head: the worst of all answers, or none where nothing went wrong and nothing was checked."""
     if counts["done"] < counts["shots"] or counts["checks_failed"]:
         return DIFFERENT
-    if counts["not_all_modelled"]:
+    if counts["not_all_modeled"]:
         return SAME_BUT
     return SAME if counts["checked"] == counts["shots"] else None
 

@@ -82,7 +82,7 @@ class Summary:
             **{state: states[state] for state in ("done", "failed", "left")},
             "checked": answers.total(),
             "checks_failed": answers[DIFFERENT],
-            "not_all_modelled": answers[SAME_BUT],
+            "not_all_modeled": answers[SAME_BUT],
         }
 
     @property

@@ -39,7 +39,7 @@ from .coco import Document, category, read_pictures, with_mask
 _SCENE = ("scene_camera", "scene_gt", "scene_gt_info")
 _FILES = ("depth", "mask", "mask_visib", "objects.json", *(f"{name}.json" for name in _SCENE))
 
-_MILLIMETRES = 1000.0
+_MILLIMETERS = 1000.0
 """In a meter."""
 
 _SAME = 1e-6
@@ -115,13 +115,13 @@ def _picture(
         {
             "obj_id": objects.number(each),
             "cam_R_m2c": turn.ravel().tolist(),
-            "cam_t_m2c": (_MILLIMETRES * matrix[:3, 3]).tolist(),
+            "cam_t_m2c": (_MILLIMETERS * matrix[:3, 3]).tolist(),
             "instance_id": each["id"],
         }
         for each, turn, matrix in zip(instances, turns, matrices, strict=True)
     ]
     seen = [_seen(each, pixels) for each, pixels in zip(instances, valid, strict=True)]
-    return {**_camera(document), "depth_scale": _MILLIMETRES / document["depth_png_steps"]}, poses, seen
+    return {**_camera(document), "depth_scale": _MILLIMETERS / document["depth_png_steps"]}, poses, seen
 
 
 class _Objects:
@@ -143,7 +143,7 @@ class _Objects:
 
     def to_json(self) -> dict[str, Any]:
         return {
-            str(number): {"name": name, "box": each.box, "object_to_model": (_MILLIMETRES * each.stretch).tolist()}
+            str(number): {"name": name, "box": each.box, "object_to_model": (_MILLIMETERS * each.stretch).tolist()}
             for number, (name, each) in enumerate(self._every, start=1)
         }
 
@@ -207,8 +207,9 @@ def _box(mask: Document | None) -> list[int]:
 
 
 def _camera(document: Document) -> Document:
-    camera = cameras.Camera(document["picture"], Pinhole(**document["camera"]), image=document["picture"])
-    return json.loads(cameras.write([camera], "bop", cameras.Options(scale=1 / _MILLIMETRES)))["0"]
+    picture = document["picture"]
+    camera = cameras.Camera(picture, Pinhole(**document["camera"]), image=picture, lens=files.lens(document))
+    return json.loads(cameras.write([camera], "bop", cameras.Options(scale=1 / _MILLIMETERS)))["0"]
 
 
 def _copy_rgb(path: Path, document: Document, output: Path, number: int) -> bool:

@@ -56,7 +56,7 @@ def panoptic(folder: Path) -> Document:
         ]
         file_name = files.of_picture(Path(document["picture"]), "instances.png").name
         annotations.append({"image_id": number, "file_name": file_name, "segments_info": segments})
-    things = [{**each, "isthing": 1, "color": _colour(each["id"])} for each in _categories(categories)]
+    things = [{**each, "isthing": 1, "color": _color(each["id"])} for each in _categories(categories)]
     return {"images": _images(pictures), "annotations": annotations, "categories": things}
 
 
@@ -105,6 +105,6 @@ def _categories(categories: dict[str, int]) -> list[Document]:
     return [{"id": number, "name": name, "supercategory": "object"} for name, number in categories.items()]
 
 
-def _colour(number: int) -> list[int]:
+def _color(number: int) -> list[int]:
     """The color of a category: neighbors far apart, by steps around each channel that share no divisor with 256."""
     return [number * step % 256 for step in (67, 149, 211)]

@@ -25,11 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import cameras
-from ..cameras import colmap
+from ..cameras import colmap, distortion
 from ..errors import InputError
 from ..files import folder_written_whole
 from ..image import BACKGROUND_DEPTH
-from ..pinhole import Pinhole
 from ..png import decoded
 from . import files
 from .coco import Document, read_pictures
@@ -59,7 +58,7 @@ class _Sampled(NamedTuple):
     source: NDArray[np.intp]
     depth: Array
     state: NDArray[np.int64]
-    colours: NDArray[np.uint8]
+    colors: NDArray[np.uint8]
 
 
 def write(folder: Path, output: Path, points: int = POINTS, overwrite: bool = False) -> dict[str, int]:
@@ -86,8 +85,7 @@ def write(folder: Path, output: Path, points: int = POINTS, overwrite: bool = Fa
         views = []
         for path, document in pictures:
             with files.understood(path):
-                name = files.picture(path, document)
-                views.append(cameras.Camera(name, Pinhole(**document["camera"]), image=name))
+                views.append(files.camera(path, document))
         tracks = tracks_of(pictures, views, points)
         for file, content in contents(views, tracks).items():
             (temporary / file).write_bytes(content)
@@ -111,17 +109,17 @@ def tracks_of(
     for number, (view, (path, document)) in enumerate(zip(views, pictures, strict=True)):
         with files.understood(path):
             depth, state, ids = _planes(path, document, states)
-            pieces.append(_sampled(number, view.pinhole, depth, state, _colours(path, document, ids), points))
+            pieces.append(_sampled(number, view, depth, state, _colors(path, document, ids), points))
     sampled = _Sampled(*map(np.concatenate, zip(*pieces, strict=True)))
     for number, (view, (path, document)) in enumerate(zip(views, pictures, strict=True)):
-        visible.append(_visible(sampled, number, view.pinhole, *_planes(path, document, states)[:2]))
+        visible.append(_visible(sampled, number, view, *_planes(path, document, states)[:2]))
     if longest is not None:
         visible = _shortened(visible, longest)
     often = np.bincount(np.concatenate([which for which, _ in visible]), minlength=len(sampled.source)) > 1
     new = np.cumsum(often) - 1
     return colmap.Tracks(
         sampled.positions[often],
-        sampled.colours[often],
+        sampled.colors[often],
         [(new[which[often[which]]], places[often[which]]) for which, places in visible],
     )
 
@@ -151,7 +149,7 @@ def _ply(tracks: colmap.Tracks) -> bytes:
         *((name, "u1") for name in ("red", "green", "blue")),
     ]
     vertices = np.zeros(len(tracks.positions), types)
-    for names, columns in (("x", "y", "z"), tracks.positions), (("red", "green", "blue"), tracks.colours):
+    for names, columns in (("x", "y", "z"), tracks.positions), (("red", "green", "blue"), tracks.colors):
         for name, column in zip(names, np.transpose(columns), strict=True):
             vertices[name] = column
     kinds = {"<f4": "float", "u1": "uchar"}
@@ -162,17 +160,17 @@ def _ply(tracks: colmap.Tracks) -> bytes:
     )
 
 
-def _colours(path: Path, document: Document, ids: NDArray[np.float32]) -> NDArray[np.uint8]:
+def _colors(path: Path, document: Document, ids: NDArray[np.float32]) -> NDArray[np.uint8]:
     """(height, width, 3): the picture beside a label file, if it is a PNG, or else its ids."""
     picture = files.photograph(path, document)
     if picture is None or picture.suffix != ".png":
-        return files.id_colours(ids)
+        return files.id_colors(ids)
     try:
         pixels = decoded(picture.read_bytes())
     except (OSError, ValueError) as error:
         raise InputError(f"{picture} is no PNG of 8 or 16 bits that can be read: render it again, or move it away") from error
-    colours = pixels[..., :3] if pixels.shape[-1] > 2 else np.repeat(pixels[..., :1], 3, axis=-1)
-    return (colours >> 8 * (colours.dtype.itemsize - 1)).astype(np.uint8)
+    colors = pixels[..., :3] if pixels.shape[-1] > 2 else np.repeat(pixels[..., :1], 3, axis=-1)
+    return (colors >> 8 * (colors.dtype.itemsize - 1)).astype(np.uint8)
 
 
 def _planes(path: Path, document: Document, states: dict[str, int]) -> tuple[Array, NDArray[np.int64], NDArray[np.float32]]:
@@ -204,24 +202,26 @@ def _has_no_points(folder: Path) -> bool:
 
 
 def _sampled(
-    number: int, camera: Pinhole, depth: Array, state: NDArray[np.int64], colours: NDArray[np.uint8], points: int
+    number: int, view: cameras.Camera, depth: Array, state: NDArray[np.int64], colors: NDArray[np.uint8], points: int
 ) -> _Sampled:
     rows, columns = np.nonzero(state >= 0)
     rank = (columns * _EVENLY[0] + rows * _EVENLY[1]) % 1.0
     chosen = np.sort(np.argsort(rank, kind="stable")[:points])
     rows, columns = rows[chosen], columns[chosen]
-    x, y = camera.view_plane(columns + 0.5, camera.height - (rows + 0.5))
+    camera = view.pinhole
+    x, y = distortion.view_plane(camera, view.lens, columns + 0.5, camera.height - (rows + 0.5))
     u, v, w = camera.basis()
     z = depth[rows, columns]
     positions = np.array(camera.eye) + z[:, None] * (x[:, None] * u + y[:, None] * v - w)
-    return _Sampled(positions, np.full(len(z), number), z, state[rows, columns], colours[rows, columns])
+    return _Sampled(positions, np.full(len(z), number), z, state[rows, columns], colors[rows, columns])
 
 
 def _visible(
-    sampled: _Sampled, number: int, camera: Pinhole, depth: Array, state: NDArray[np.int64]
+    sampled: _Sampled, number: int, view: cameras.Camera, depth: Array, state: NDArray[np.int64]
 ) -> tuple[NDArray[np.intp], Array]:
     """The points that a picture shows, and their places: (n, 2), x to the right and y **down** from the picture's corner."""
-    column, row, z = camera.project(sampled.positions)
+    camera = view.pinhole
+    column, row, z = distortion.project(camera, view.lens, sampled.positions)
     x, y = column - 0.5, camera.height - row - 0.5  # 0 at the first pixel's center
     with np.errstate(invalid="ignore"):
         inside = (x >= 1) & (x < camera.width - 2) & (y >= 1) & (y < camera.height - 2)

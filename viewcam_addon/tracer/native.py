@@ -25,10 +25,10 @@ from ..errors import InputError
 from ..image import GEOMETRY_PASSES, LIGHT_PASSES
 from ..pinhole import Pinhole
 from .scene import Mesh, Object, Scene, Spheres, ies, placing
-from .scene.colours import TEXELS, WHITE
+from .scene.colors import TEXELS, WHITE
 from .scene.film import FILTERS
 from .scene.lamps import RAYS, Lamp, World
-from .scene.materials import PLAIN, Colour, Material
+from .scene.materials import PLAIN, Color, Material
 from .scene.sameness import same_things
 from .scene.shader_nodes import KINDS, Closure, Node
 from .scene.value_nodes import IES, OWN
@@ -56,7 +56,7 @@ class _Attribute(Structure):
 class _Mesh(Structure):
     _fields_ = [
         *((name, c_size_t) for name in ("vertex_count", "count")),
-        *((name, c_void_p) for name in ("vertices", "triangles", "materials", "normals", "uvs", "colours")),
+        *((name, c_void_p) for name in ("vertices", "triangles", "materials", "normals", "uvs", "colors")),
         ("attributes", POINTER(_Attribute)),
         ("attribute_count", c_size_t),
     ]
@@ -333,7 +333,7 @@ class CoreScene:
             (geometry.materials, np.int32, (count,)),
             (geometry.corner_normals, np.float32, (count, 3, 3)),
             (geometry.corner_uvs, np.float32, (count, 3, 2)),
-            (geometry.corner_colours, np.float32, (count, 3, 3)),
+            (geometry.corner_colors, np.float32, (count, 3, 3)),
         )
         attributes = [
             _Attribute(name.encode(), values.shape[2], self._keep(values, np.float32, (count, 3, None)))
@@ -413,7 +413,7 @@ class CoreScene:
         nodes: dict[Node, int] = {}
         for name in ["", *scene.materials]:
             material = (scene.materials[name] if name else PLAIN) if name in used else Material()
-            self._add_textures(scene, (colour for _, colour in material.inputs), images)
+            self._add_textures(scene, (color for _, color in material.inputs), images)
             for closure in material.closures:
                 for value in (*dict(closure.node.inputs).values(), *(factor for factor, _ in closure.factors)):
                     if isinstance(value, Node):
@@ -432,7 +432,7 @@ class CoreScene:
             if lamp.is_dark:
                 continue
             if lamp.emission is not None:
-                self._add_textures(scene, lamp.emission.colours, images)
+                self._add_textures(scene, lamp.emission.colors, images)
                 self.add_nodes(lamp.emission, images, nodes)
             emission = _color(lamp.emission or WHITE, images, nodes)
             self.check(self.core.add_lamp(self.handle, described_lamp(lamp, self._links), emission))
@@ -440,15 +440,15 @@ class CoreScene:
         described = _Film(hidden_from=kinds(world.hidden_from), transparent=film.transparent, exposure=film.exposure)
         described.version = 100 * scene.cycles[0] + scene.cycles[1]
         described.filter, described.filter_width = FILTERS.index(film.filter), film.filter_width
-        self._add_textures(scene, (Colour(WHITE, image) for image in world.images), images)
+        self._add_textures(scene, (Color(WHITE, image) for image in world.images), images)
         described.world, described.has_backdrop = _described_world(world, images), world.backdrop is not None
         described.backdrop = _described_world(world.backdrop or world, images)
         self.check(self.core.set_film(self.handle, described))
         self._light = scene
 
-    def _add_textures(self, scene: Scene, colours: Iterable[Colour], images: dict[str, int]) -> None:
+    def _add_textures(self, scene: Scene, colors: Iterable[Color], images: dict[str, int]) -> None:
         """Add the images that colors show and that are not there yet. images : the numbers of those that are."""
-        for name in (colour.image for colour in colours):
+        for name in (color.image for color in colors):
             if name is None or name in images:
                 continue
             images[name] = len(images)
@@ -578,7 +578,7 @@ class CoreScene:
 
 def constant_value(node: Node) -> tuple[tuple[float, float, float], float] | None:
     """The value that a node makes everywhere, as a color and as a number; None where it varies or shows an image."""
-    if any(colour.image is not None for colour in node.colours):
+    if any(color.image is not None for color in node.colors):
         return None
     scene = CoreScene(_NOWHERE, 1)
     scene.add_nodes(node, {}, {})
@@ -711,16 +711,16 @@ def _constant_input(name: str, value: float | bool | str | tuple[float, ...]) ->
     return _Input(name.encode(), None, _Color((c_double * 3)(*numbers), -1, node=-1))
 
 
-def _color(value: Colour | Node | tuple[float, ...], images: Mapping[str, int], nodes: Mapping[Node, int]) -> _Color:
+def _color(value: Color | Node | tuple[float, ...], images: Mapping[str, int], nodes: Mapping[Node, int]) -> _Color:
     if isinstance(value, Node):
         described = _Color(image=-1, node=nodes[value])
-        value = Colour(WHITE)
-    elif isinstance(value, Colour):
+        value = Color(WHITE)
+    elif isinstance(value, Color):
         image = -1 if value.image is None else images[value.image]
         described = _Color(image=image, closest=value.closest, vertex=value.vertex, node=-1)
     else:
         described = _Color(image=-1, node=-1)
-    described.rgb[:] = value.rgb if isinstance(value, Colour) else value
+    described.rgb[:] = value.rgb if isinstance(value, Color) else value
     return described
 
 
@@ -775,11 +775,11 @@ def _origin(scene: Scene) -> NDArray[np.float64]:
     boxes = {name: _box(geometry) for name, geometry in scene.geometries.items()}
     least, greatest = np.full(3, np.inf), np.full(3, -np.inf)
     for placed in scene.objects:
-        centre, half = boxes[placed.geometry]
-        centres = placed.matrices[:, :3, :3] @ centre + placed.matrices[:, :3, 3]
+        center, half = boxes[placed.geometry]
+        centers = placed.matrices[:, :3, :3] @ center + placed.matrices[:, :3, 3]
         halves = np.abs(placed.matrices[:, :3, :3]) @ half
-        least = np.minimum(least, (centres - halves).min(axis=0, initial=np.inf))
-        greatest = np.maximum(greatest, (centres + halves).max(axis=0, initial=-np.inf))
+        least = np.minimum(least, (centers - halves).min(axis=0, initial=np.inf))
+        greatest = np.maximum(greatest, (centers + halves).max(axis=0, initial=-np.inf))
     radius = float(np.linalg.norm(greatest - least)) / 2 if np.isfinite(least).all() else 0.0
     if not radius > 0:
         return np.array(scene.camera.eye, np.float64)

@@ -142,7 +142,7 @@ def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
     assert lines[0][1] == "Rendering with Cycles" and lines[-1][1] == "Comparing"
     rows = dict(outcome.rows)
     assert rows["Median"].endswith(" px") and "Mismatches" in rows and rows["Modeled"] == "1 of 1 objects"
-    assert outcome.report.is_file() and all(path.is_file() for path in outcome.pictures.values()) and outcome.colours
+    assert outcome.report.is_file() and all(path.is_file() for path in outcome.pictures.values()) and outcome.colors
     assert "check untitled.blend --camera Camera --level geometry" in outcome.report.read_text()
     exported = json.loads((outcome.folder / "scene.json").read_text())
     assert "0.25" in json.dumps(exported["objects"]), "the edit is not in the picture that was compared"
@@ -186,19 +186,19 @@ def test_light_is_compared_with_as_many_samples_as_it_takes(seen, add_lamp):
     try:
         assert bpy.ops.viewcam.compare_with_cycles() == {"FINISHED"}
     finally:
-        for name in ("level", "said", "clay"):
+        for name in ("level", "chosen_level", "clay"):
             settings.property_unset(name)
     outcome = proof.background.latest
     assert outcome.answer == SAME, outcome.verdict
     assert outcome.what == "Camera, frame 1, direct" and "Light, to Tracer's" in dict(outcome.rows)
-    assert "Orange where Cycles is brighter" in outcome.colours
+    assert "Orange where Cycles is brighter" in outcome.colors
     assert set(outcome.pictures) == {"cycles", "tracer", "difference"}, "all of it is modeled"
     page = outcome.report.read_text(encoding="utf-8")
     assert "--find 2%" in page and "--clay" in page
     assert len(list(outcome.folder.glob("cycles-*.exr"))) == 8
 
 
-def test_cancelled_while_it_renders_it_leaves_no_process_and_no_file(seen):
+def test_canceled_while_it_renders_it_leaves_no_process_and_no_file(seen):
     seen.render.resolution_x, seen.render.resolution_y = 1920, 1080
     bpy.context.view_layer.update()
     before, there = state(seen), set(Path(bpy.app.tempdir).iterdir())
@@ -232,7 +232,7 @@ def test_its_steps_tell_how_far_it_is(stand_in):
 def test_light_is_rendered_in_pictures_that_are_counted(stand_in):
     comparison = stand_in(level="path")
     assert comparison.progress() == (0, "Rendering with Cycles, 1 of 8")
-    with open(comparison.folder / "said.txt", "a", encoding="utf-8") as log:
+    with open(comparison.folder / "output.txt", "a", encoding="utf-8") as log:
         log.write('{"event": "step", "name": "rendering", "number": 4, "of": 8}\n')
         log.flush()
         assert comparison.progress() == (3 / 10, "Rendering with Cycles, 4 of 8")
@@ -244,22 +244,22 @@ def test_light_is_rendered_in_pictures_that_are_counted(stand_in):
 
 def test_a_search_for_a_bias_tells_how_much_longer_it_takes(stand_in):
     comparison = stand_in(level="path", find="0.5%")
-    with open(comparison.folder / "said.txt", "a", encoding="utf-8") as said:
-        said.write('{"event": "forecast", "samples": 256, "taken": 64, "seconds": 41.6}\n')
-        said.flush()
+    with open(comparison.folder / "output.txt", "a", encoding="utf-8") as output:
+        output.write('{"event": "forecast", "samples": 256, "taken": 64, "seconds": 41.6}\n')
+        output.flush()
         assert comparison.progress() == (1 / 4, "Rendering with Cycles, 1 of 8, about 42 s more")
-        said.write('{"event": "step", "name": "rendering", "number": 6, "of": 8}\n')
-        said.flush()
+        output.write('{"event": "step", "name": "rendering", "number": 6, "of": 8}\n')
+        output.flush()
         assert comparison.progress() == ((64 + 192 / 2) / 256, "Rendering with Cycles, 6 of 8, about 42 s more")
     comparison.cancel()
 
 
 def test_a_report_that_is_kept_stands_in_its_folder_and_nothing_else_changes_there(stand_in, tmp_path):
     (tmp_path / "own.txt").write_text("the artist's")
-    cancelled = stand_in(keep_in=tmp_path)
-    cancelled.let(4)
-    wait_for((cancelled.folder / "report" / "index.html").exists)
-    cancelled.cancel()
+    canceled = stand_in(keep_in=tmp_path)
+    canceled.let(4)
+    wait_for((canceled.folder / "report" / "index.html").exists)
+    canceled.cancel()
     assert [path.name for path in tmp_path.iterdir()] == ["own.txt"]
     comparison = stand_in(keep_in=tmp_path / "new")
     comparison.let(8)

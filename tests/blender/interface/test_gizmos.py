@@ -79,7 +79,7 @@ def test_up_dragged_into_the_eye_stays(posed_camera, steps):
 
 @pytest.mark.parametrize("mode", ["XYZ", "ZYX", "QUATERNION", "AXIS_ANGLE"])
 @pytest.mark.parametrize("name", NAMES)
-def test_cancelling_restores_all_to_the_bit_though_the_camera_was_not_at_its_values(posed_camera, scene, steps, name, mode):
+def test_canceling_restores_all_to_the_bit_though_the_camera_was_not_at_its_values(posed_camera, scene, steps, name, mode):
     posed_camera.rotation_mode = mode
     posed_camera.virtual_pinhole.pole = "HOLD"
     cameras.CameraSync.of(posed_camera).edited(scene)
@@ -144,7 +144,7 @@ def test_a_camera_that_is_deleted_while_it_is_dragged_ends_the_drag(posed_camera
 @pytest.mark.parametrize("automatic", [False, True])
 @pytest.mark.parametrize("keyed", ["eye", "look_at"])
 def test_auto_keying_keys_what_is_animated(posed_camera, scene, steps, automatic, keyed):
-    """As with Blender's own fields: a value without a curve gets none."""
+    """A value without a curve gets none, as with Blender's own fields."""
     group = posed_camera.virtual_pinhole
     group.keyframe_insert(keyed, frame=1)
     group.keyframe_insert(keyed, frame=20)

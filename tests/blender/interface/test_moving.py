@@ -172,20 +172,20 @@ def test_swapping_looks_back(stated):
     assert (stated().eye, stated().look_at) == ((0, 0, 1), (7, -6, 5))
 
 
-def test_levelling_makes_up_the_worlds_z(posed_camera, stated):
+def test_leveling_makes_up_the_worlds_z(posed_camera, stated):
     posed_camera.virtual_pinhole.up = (1, 0.2, 0.3)
     bpy.ops.viewcam.level_camera()
     assert stated().up == (0, 0, 1)
 
 
-def test_levelling_makes_up_the_axis_that_the_preferences_say(posed_camera, stated, monkeypatch):
+def test_leveling_makes_up_the_axis_that_the_preferences_say(posed_camera, stated, monkeypatch):
     monkeypatch.setattr(preferences, "get", lambda: preferences.Defaults(default_up="-Y"))
     bpy.ops.viewcam.level_camera()
     assert stated().up == (0, -1, 0)
 
 
 @pytest.mark.parametrize("up", [(0, 0, 1), (0, 1, 0), (1, 1, 0)])
-def test_levelling_a_view_straight_down_leaves_no_doubt(posed_camera, stated, up):
+def test_leveling_a_view_straight_down_leaves_no_doubt(posed_camera, stated, up):
     group = posed_camera.virtual_pinhole
     group.eye, group.look_at, group.up = (0, 0, 9), (0, 0, 0), up
     bpy.ops.viewcam.level_camera()
@@ -412,7 +412,7 @@ def test_undo_restores_values_and_camera_bit_for_bit(posed_camera, selected_cube
 
 
 def test_dolly_in_a_menu_asks_for_the_distance_and_does_nothing_before(posed_camera, stated, monkeypatch):
-    """Where it stood in the panel, a click was followed by nothing that could be seen."""
+    """A click on it, while it stood in the panel, was followed by nothing that could be seen."""
     before, asked = stated(), []
     operator = moving.VIEWCAM_OT_dolly_camera
     properties = SimpleNamespace(is_property_set=lambda name: False)
@@ -429,7 +429,7 @@ REACH = math.dist((7, -6, 5), (0, 0, 1))
 
 
 @pytest.mark.parametrize("kind", [dragging.ORBIT, dragging.DOLLY, dragging.DOLLY_ZOOM, dragging.TRUCK])
-def test_a_drag_moves_visibly_there_and_back_and_cancelling_restores_every_bit(posed_camera, scene, kind):
+def test_a_drag_moves_visibly_there_and_back_and_canceling_restores_every_bit(posed_camera, scene, kind):
     bpy.context.view_layer.update()
     before, start = kept.state(posed_camera), cameras.stated(posed_camera, scene)
     drag = dragging.Drag(posed_camera, scene, kind)

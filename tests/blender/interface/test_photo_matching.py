@@ -1,5 +1,6 @@
 """Match Photo: what is drawn on a picture, the camera that follows, and Escape."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,8 +19,8 @@ ZOOM = 3.0  # pixels of the picture that one of the screen shows
 LEFT, BOTTOM = 50.0, 80.0
 
 
-def seen(*points):
-    column, row, _ = PHOTO.project(np.array(points, float))
+def seen(*points, photo=PHOTO):
+    column, row, _ = photo.project(np.array(points, float))
     return [(float(x), float(y)) for x, y in zip(column, row, strict=True)]
 
 
@@ -27,7 +28,7 @@ def seen(*points):
 def settings(fresh_blender):
     yield fresh_blender.context.window_manager.virtual_pinhole_match
     group = fresh_blender.context.window_manager.virtual_pinhole_match
-    for name in ("kind", "axes", "sides", "precision", "is_lens_known", "length"):
+    for name in ("kind", "axes", "sides", "precision", "is_lens_known", "is_principal_point_free", "length"):
         group.property_unset(name)
 
 
@@ -68,7 +69,7 @@ class Hand:
         self.event("LEFTMOUSE", "RELEASE", end)
 
 
-def draw_the_edges(hand):
+def draw_the_edges(hand, photo=PHOTO):
     for axis, start, end in (
         ("X", (-2, -1, 0), (2, -1, 0)),
         ("X", (-2, 1, 0), (2, 1, 0)),
@@ -78,7 +79,7 @@ def draw_the_edges(hand):
         ("Z", (2, 1, 0), (2, 1, 2)),
     ):
         hand.event(axis)
-        hand.drag(*seen(start, end))
+        hand.drag(*seen(start, end, photo=photo))
 
 
 def test_edges_dragged_over_a_picture_turn_the_camera_and_set_its_lens_and_the_eye_stays(posed_camera, scene, settings):
@@ -117,6 +118,25 @@ def test_a_lens_that_is_known_stays_to_the_bit_and_the_viewport_says_so(posed_ca
     assert np.allclose(cameras.read(posed_camera, scene).basis(), PHOTO.basis(), atol=1e-6)
     line = photo_matching.summary_of(hand.operator.result, posed_camera.data.lens)[0]
     assert line == "33.75 mm as it was,  d = 1800 px"
+
+
+def test_a_free_principal_point_becomes_the_shift_and_escape_takes_it_back(posed_camera, scene, settings):
+    photo = replace(PHOTO, distance=1200.0, principal_point=(830.0, 600.0))
+    settings.is_principal_point_free = True
+    settings.length, settings.precision, scene.cursor.location = 4.0, 0.1, (-2, -1, 0)
+    before = kept.state(posed_camera)
+    hand = Hand(posed_camera, scene)
+    draw_the_edges(hand, photo)
+    bpy.context.view_layer.update()
+    pinhole = cameras.read(posed_camera, scene)
+    np.testing.assert_allclose(pinhole.principal_point, photo.principal_point, atol=1e-3)
+    np.testing.assert_allclose(pinhole.eye, photo.eye, atol=1e-4)
+    assert pinhole.distance[0] == pytest.approx(1200, rel=1e-5)
+    # Blender's shift moves the picture the other way, in shares of its width.
+    np.testing.assert_allclose((posed_camera.data.shift_x, posed_camera.data.shift_y), (130 / 1920, -60 / 1920), atol=1e-6)
+    lines = photo_matching.summary_of(hand.operator.result, posed_camera.data.lens)
+    assert lines[1].startswith("Principal point: -130 ± ") and " +60 ± " in lines[1], lines
+    assert hand.event("ESC") == {"CANCELLED"} and kept.state(posed_camera) == before
 
 
 @pytest.mark.parametrize("enabled", [True, False])

@@ -20,7 +20,7 @@ def test_the_level_is_the_preferred_one_until_another_is_chosen(fresh_blender, m
     assert settings.level == "PATH"
     settings.level = "AUTO"
     assert settings.level == "AUTO"
-    settings.said = ""
+    settings.chosen_level = ""
 
 
 def test_the_render_menu_and_the_status_bar_are_as_before_without_the_add_on(registered_addon):
@@ -43,7 +43,7 @@ def test_the_render_menu_and_the_status_bar_are_as_before_without_the_add_on(reg
 WIDTH, HEIGHT = 12, 5
 
 
-def test_where_not_all_is_modelled_the_artists_own_picture_comes_first_and_the_others_say_so(outcome):
+def test_where_not_all_is_modeled_the_artists_own_picture_comes_first_and_the_others_say_so(outcome):
     (outcome.folder / "everything.png").write_bytes(pictures.png(np.full((HEIGHT, WIDTH, 3), (0, 0, 255), np.uint8)))
     gap = " " * proof_image._GAP
     assert columns(proof_image.load(outcome, "ALL")) == gap.join(letter * WIDTH for letter in "brgb")
@@ -57,7 +57,7 @@ def test_where_not_all_is_modelled_the_artists_own_picture_comes_first_and_the_o
     assert proof_image.labels("SWIPE", outcome.pictures) == ["Cycles with stand-ins", "Tracer with stand-ins"]
 
 
-def test_where_all_is_modelled_cycles_picture_has_everything(outcome):
+def test_where_all_is_modeled_cycles_picture_has_everything(outcome):
     assert columns(proof_image.load(outcome, "EVERYTHING")) == "r" * WIDTH
     assert proof_image.labels("EVERYTHING", outcome.pictures) == ["Cycles"]
     assert proof_image.labels("ALL", outcome.pictures) == ["Cycles", "Tracer", "Difference"]
@@ -66,8 +66,8 @@ def test_where_all_is_modelled_cycles_picture_has_everything(outcome):
 @pytest.fixture
 def outcome(tmp_path, fresh_blender):
     """A verdict whose pictures are red (Cycles), green (the tracer) and blue (the difference) all over."""
-    for name, colour in (("test", (255, 0, 0)), ("reference", (0, 255, 0)), ("difference", (0, 0, 255))):
-        (tmp_path / f"{name}.png").write_bytes(pictures.png(np.full((HEIGHT, WIDTH, 3), colour, np.uint8)))
+    for name, color in (("test", (255, 0, 0)), ("reference", (0, 255, 0)), ("difference", (0, 0, 255))):
+        (tmp_path / f"{name}.png").write_bytes(pictures.png(np.full((HEIGHT, WIDTH, 3), color, np.uint8)))
     proof_image._pixels.cache_clear()
     yield comparing.Outcome("", "Camera", None, "same", "The same picture: so it is.", folder=tmp_path)
     proof_image._pixels.cache_clear()
@@ -79,7 +79,7 @@ def columns(image):
     image.pixels.foreach_get(pixels)
     pixels = pixels.reshape(image.size[1], image.size[0], 4)
     assert (pixels == pixels[:1]).all()
-    return "".join("rgb"[int(colour[:3].argmax())] if colour[:3].any() else " " for colour in pixels[0])
+    return "".join("rgb"[int(color[:3].argmax())] if color[:3].any() else " " for color in pixels[0])
 
 
 def test_labels_stand_where_their_pictures_begin(outcome):
@@ -179,7 +179,7 @@ def test_escape_during_playback_ends_the_playback_and_not_the_comparison(monkeyp
         (
             {
                 "answer": "same_but",
-                "not_modelled": {"names": ["Hair"]},
+                "not_modeled": {"names": ["Hair"]},
                 "quantities": [{"noise_free": None, "ratio_error": 3e-4}],
             },
             "The same light, but for noise of 0.03 %, but for 1 object that is not modeled",

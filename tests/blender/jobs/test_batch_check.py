@@ -139,10 +139,8 @@ def test_shots_of_four_values_and_of_a_camera_pass_and_their_figures_say_so(stag
     assert all(each["verdict"].startswith("The same picture") for each in checks.values())
     bent = ["Suzanne: material 'Bumpy' turns the normals, and a plain one stands in"]
     assert [each["ledger"] for each in checks.values()] == [bent] * 3
-    assert all(each["answer"] == "same_but" and each["not_modelled"]["names"] == ["Suzanne"] for each in checks.values()), (
-        checks
-    )
-    assert all(0.01 < each["not_modelled"]["share"] < 0.9 for each in checks.values()), checks
+    assert all(each["answer"] == "same_but" and each["not_modeled"]["names"] == ["Suzanne"] for each in checks.values()), checks
+    assert all(0.01 < each["not_modeled"]["share"] < 0.9 for each in checks.values()), checks
     assert checks["left"]["figures"]["conversion"]["share"] <= 1
     assert checks["as it stands"]["figures"]["conversion"] is None, "nobody stated it"
 
@@ -163,7 +161,7 @@ def test_a_sidecar_that_is_not_blenders_camera_is_caught(stage, batch, monkeypat
     from viewcam_addon.blender.jobs import renderer
 
     read = renderer.cameras.read
-    monkeypatch.setattr(renderer.cameras, "read", lambda *given: replace(read(*given), distance=90.09))
+    monkeypatch.setattr(renderer.cameras, "read", lambda *arguments: replace(read(*arguments), distance=90.09))
     checks = verdicts(batch(LEFT))["left"]
     assert not checks["passed"] and "magnified" in checks["verdict"], checks
 
@@ -183,7 +181,7 @@ def test_a_conversion_that_lost_the_four_values_is_caught(stage, batch, monkeypa
 
 @pytest.mark.parametrize("engine", ["CYCLES", "VIEWCAM"])
 def test_pictures_are_the_same_bytes_with_and_without_their_checks(stage, batch, engine):
-    """Where a check has most to change and to give back: bent normals, a holdout, depth of field, a world's volume, indices."""
+    """A check changes and restores most here: bent normals, a holdout, depth of field, a world's volume, indices."""
     bpy.data.objects["Cone"].is_holdout = True
     layer = bpy.context.view_layer
     layer.use_pass_object_index = layer.use_pass_material_index = layer.use_pass_normal = True
@@ -269,7 +267,7 @@ def test_what_geometry_nodes_move_with_the_active_camera_is_read_for_each_shot(s
     """Nothing in the file has changed from shot to shot, and the scene is another all the same."""
     read = []
     export = scene_files.export_scene
-    monkeypatch.setattr(scene_files, "export_scene", lambda *given: read.append(1) or export(*given))
+    monkeypatch.setattr(scene_files, "export_scene", lambda *arguments: read.append(1) or export(*arguments))
     shots = (LEFT, RIGHT, replace(LEFT, name="again"))
     assert all(each["passed"] for each in verdicts(batch(*shots)).values()) and len(read) == 1
     read.clear()

@@ -18,9 +18,9 @@ pytestmark = pytest.mark.slow
 def picture(fresh_blender):
     """A function that writes a small PNG of one gray."""
 
-    def write(path, grey):
-        image = bpy.data.images.new("grey", 2, 2)
-        image.pixels = [grey, grey, grey, 1] * 4
+    def write(path, gray):
+        image = bpy.data.images.new("gray", 2, 2)
+        image.pixels = [gray, gray, gray, 1] * 4
         image.filepath_raw, image.file_format = str(path), "PNG"
         image.save()
         bpy.data.images.remove(image)
@@ -153,9 +153,9 @@ def test_the_versions_count(open_file, add_camera):
 
 
 def test_two_files_of_one_name_that_swap_their_contents_are_other_files(open_file, picture, tmp_path):
-    for folder, grey in (("left", 0.25), ("right", 0.5)):
+    for folder, gray in (("left", 0.25), ("right", 0.5)):
         (tmp_path / folder).mkdir()
-        picture(tmp_path / folder / "wall.png", grey)
+        picture(tmp_path / folder / "wall.png", gray)
         load(tmp_path / folder / "wall.png")
     before = open_file()
     (tmp_path / "left" / "wall.png").rename(tmp_path / "kept.png")
@@ -279,7 +279,7 @@ def test_what_binary_usd_reads_is_said_to_be_unknown(usd, open_file, tmp_path):
     assert "'stage.usdc' is binary USD" in sentence
 
 
-def test_the_configuration_of_colours_counts_with_its_tables_and_the_variable(open_file, tmp_path, monkeypatch):
+def test_the_configuration_of_colors_counts_with_its_tables_and_the_variable(open_file, tmp_path, monkeypatch):
     before = open_file()
     (tmp_path / "luts").mkdir()
     (tmp_path / "luts" / "film.cube").write_text("a table")

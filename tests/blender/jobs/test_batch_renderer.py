@@ -80,7 +80,7 @@ def state():
 
 
 def _value(owner, prop):
-    """As a text. Matrices and bounds of objects are evaluated, and statistics are of the last render."""
+    """A property's value as a text. Matrices and bounds of objects are evaluated, and statistics are of the last render."""
     if prop.type == "COLLECTION" or prop.identifier in ("rna_type", "stereo_3d_format"):
         return None
     value = getattr(owner, prop.identifier)
@@ -486,7 +486,7 @@ def taken(folder, name):
 
 
 def close(have, wanted):
-    """As Blender's float32 numbers have it: half a dozen roundings of 2⁻²⁴ of lengths of 10 seen from 10."""
+    """Equality but for Blender's float32: half a dozen roundings of 2⁻²⁴ of lengths of 10 seen from 10."""
     points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
     actual, expected = have.project(points), wanted.project(points)
     error = np.hypot(actual[0] - expected[0], actual[1] - expected[1]).max()
@@ -512,7 +512,7 @@ def test_a_colmap_model_is_rendered_camera_by_camera_and_comes_back(blend, tmp_p
             assert np.abs(np.array(pinhole.eye) - exact.eye).max() <= (0 if form == "transforms" else 1e-14)
 
 
-def test_a_mirrored_camera_with_y_up_in_centimetres_renders_as_such(blend, tmp_path):
+def test_a_mirrored_camera_with_y_up_in_centimeters_renders_as_such(blend, tmp_path):
     pytest.importorskip("pxr", reason="make test installs what reads USD")
     wanted = Options(axes="y_up", scale=0.01)
     cameras.save([Camera("left", MIRRORED)], tmp_path / "camera.usda", "usd", wanted)

@@ -48,9 +48,9 @@ def stage(fresh_blender, scene, tmp_path):
     scene.view_settings.view_transform = "Standard"
     scene.render.resolution_x, scene.render.resolution_y = 160, 120
     scene.render.image_settings.color_mode = "RGB"
-    for colour, center in BALLS.items():
+    for color, center in BALLS.items():
         bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=RADIUS, location=center)
-        bpy.context.object.data.materials.append(_shining(colour))
+        bpy.context.object.data.materials.append(_shining(color))
     data = bpy.data.cameras.new("Shifted")
     data.lens, data.shift_x, data.shift_y = 36, 0.11, -0.07
     scene.camera = bpy.data.objects.new("Shifted", data)
@@ -65,14 +65,14 @@ def stage(fresh_blender, scene, tmp_path):
     return save
 
 
-def _shining(colour):
+def _shining(color):
     material = bpy.data.materials.new("Shining")
     if not material.node_tree:  # new materials have one from 5.0 on
         material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     shining, output = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeOutputMaterial")
-    shining.inputs["Color"].default_value = (*colour, 1)
+    shining.inputs["Color"].default_value = (*color, 1)
     links.new(shining.outputs[0], output.inputs["Surface"])
     return material
 
@@ -91,7 +91,7 @@ def batch(tmp_path):
 
 @dataclass(frozen=True)
 class Camera:
-    """As both formats tell it, brought to x right, y down, z into the view."""
+    """A camera of either format, brought to x right, y down, z into the view."""
 
     to_camera: np.ndarray
     f: tuple[float, float]
@@ -170,9 +170,9 @@ def ball_centers(picture):
     light = picture.max(axis=-1)
     shining = picture / np.maximum(light, 1e-3)[..., None] > 0.5
     places = []
-    for colour in BALLS:
-        weight = np.where((shining == np.array(colour, bool)).all(axis=-1), light, 0.0)
-        assert weight.sum() > 5, f"the ball {colour} can't be seen: the view tests nothing"
+    for color in BALLS:
+        weight = np.where((shining == np.array(color, bool)).all(axis=-1), light, 0.0)
+        assert weight.sum() > 5, f"the ball {color} can't be seen: the view tests nothing"
         places.append([np.average(axis, weights=weight) for axis in (columns, rows)])
     return np.array(places)
 
@@ -290,10 +290,10 @@ def test_one_command_makes_depth_masks_and_points_that_lie_on_a_cube_in_its_colo
     bpy.context.object.data.materials.append(_shining((0, 1, 0)))
     assert batch(stage(), SHOTS[:3], "--transforms", "--labels", "depth,masks", "--test", "front") == 0
     assert " points: " in capfd.readouterr().out
-    told = json.loads((tmp_path / "out" / "transforms.json").read_text())
-    assert told["test_filenames"] == ["front.png"] and told["train_filenames"] == ["rolled.png", "above.png"]
+    document = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    assert document["test_filenames"] == ["front.png"] and document["train_filenames"] == ["rolled.png", "above.png"]
     keys = "depth_file_path", "mask_path", "depth_path"
-    assert all((tmp_path / "out" / frame[key]).is_file() for frame in told["frames"] for key in keys)
+    assert all((tmp_path / "out" / frame[key]).is_file() for frame in document["frames"] for key in keys)
     lines = [line.split() for line in (tmp_path / "out/sparse/0/points3D.txt").read_text().splitlines() if line[0] != "#"]
     points, colors = np.array([line[1:4] for line in lines], float), np.array([line[4:7] for line in lines], int)
     assert len(points) > 30 and np.abs(np.abs(points).max(axis=1) - 0.6).max() < 1e-6

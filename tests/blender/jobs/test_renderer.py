@@ -329,7 +329,7 @@ def test_for_the_least_level_a_scene_is_exported_once(blend, monkeypatch, lit_by
     read = []
     for module, name in ((export_geometry, "mesh_of"), (images, "picture_of")):
         function = getattr(module, name)
-        monkeypatch.setattr(module, name, lambda *given, f=function, name=name: read.append(name) or f(*given))
+        monkeypatch.setattr(module, name, lambda *arguments, f=function, name=name: read.append(name) or f(*arguments))
     exported = jobs.export(Job(blend=path, level="auto", recenter=recenter))
     assert sorted(read) == ["mesh_of"] + ["picture_of"] * (level != "geometry"), read
     assert (exported.ledger, list(exported.materials), len(exported.lamps)) == (

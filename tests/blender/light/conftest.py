@@ -39,11 +39,11 @@ def stage(fresh_blender, scene, camera, add, mesh_from, make_material, set_world
         monkey.location = rng.uniform(-0.5, 0.5, 3)
         floor.location, floor.rotation_euler = (0, 0, rng.uniform(-2, -1.5)), rng.uniform(-0.1, 0.1, 3)
         for block in (monkey, floor):
-            colour = (*rng.uniform(0.2, 1, 3), 1)
+            color = (*rng.uniform(0.2, 1, 3), 1)
             first = next(iter(block.data.materials), None)
             shader = first and first.node_tree.nodes["Shader"]
             if shader and "Color" in shader.inputs:
-                shader.inputs["Color"].default_value = colour
+                shader.inputs["Color"].default_value = color
 
     return arrange
 

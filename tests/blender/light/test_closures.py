@@ -23,7 +23,7 @@ from viewcam_addon.image import Image
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import native, render
 
-COLOUR = (0.8, 0.5, 0.2, 1.0)
+COLOR = (0.8, 0.5, 0.2, 1.0)
 GLOSSY, GLASS, PRINCIPLED = "ShaderNodeBsdfGlossy", "ShaderNodeBsdfGlass", "ShaderNodeBsdfPrincipled"
 METALLIC = [] if bpy.app.version < (4, 3) else ["ShaderNodeBsdfMetallic"]
 ROUGHNESSES = (0.2, 0.5, 0.8, 1.0)
@@ -39,46 +39,46 @@ TABLES, ROUGHEST, BECKMANN, REFRACTED = (3e-5, 1e-4), (3e-5, 1.5e-4), (1.2e-6, 1
 
 def of_formulas():
     for r in ROUGHNESSES:
-        yield "ShaderNodeBsdfDiffuse", {"Color": COLOUR, "Roughness": r}, {}
-        yield GLOSSY, {"Color": COLOUR, "Roughness": r}, {"distribution": "GGX"}
-        yield GLASS, {"Color": COLOUR, "Roughness": r, "IOR": 1.45}, {"distribution": "GGX"}
+        yield "ShaderNodeBsdfDiffuse", {"Color": COLOR, "Roughness": r}, {}
+        yield GLOSSY, {"Color": COLOR, "Roughness": r}, {"distribution": "GGX"}
+        yield GLASS, {"Color": COLOR, "Roughness": r, "IOR": 1.45}, {"distribution": "GGX"}
         for kind in METALLIC:
-            yield kind, {"Base Color": COLOUR, "Roughness": r}, {"distribution": "GGX"}
+            yield kind, {"Base Color": COLOR, "Roughness": r}, {"distribution": "GGX"}
             physical = {"distribution": "GGX", "fresnel_type": "PHYSICAL_CONDUCTOR"}
             yield kind, {"IOR": (0.2, 0.9, 1.5), "Extinction": (3.9, 2.4, 1.9), "Roughness": r}, physical
-    yield PRINCIPLED, {"Base Color": COLOUR, "Metallic": 1.0, "Roughness": 0.4}, {"distribution": "GGX"}
+    yield PRINCIPLED, {"Base Color": COLOR, "Metallic": 1.0, "Roughness": 0.4}, {"distribution": "GGX"}
 
 
 def of_bare_facets(roughnesses):
     for r in roughnesses:
-        yield GLOSSY, {"Color": COLOUR, "Roughness": r}, {"distribution": "MULTI_GGX"}
+        yield GLOSSY, {"Color": COLOR, "Roughness": r}, {"distribution": "MULTI_GGX"}
         for kind in METALLIC:
-            yield kind, {"Base Color": COLOUR, "Roughness": r}, {"distribution": "MULTI_GGX"}
+            yield kind, {"Base Color": COLOR, "Roughness": r}, {"distribution": "MULTI_GGX"}
 
 
 def of_tables():
     for r in ROUGHNESSES:
-        yield GLASS, {"Color": COLOUR, "Roughness": r, "IOR": 1.6}, {"distribution": "MULTI_GGX"}
-        yield PRINCIPLED, {"Base Color": COLOUR, "Roughness": r}, {}
-        yield PRINCIPLED, {"Base Color": COLOUR, "Roughness": r, "Metallic": 0.6, "Specular Tint": (0.9, 0.5, 0.7, 1)}, {}
-        yield PRINCIPLED, {"Base Color": COLOUR, "Coat Weight": 0.7, "Coat Roughness": r, "Coat Tint": (0.9, 0.6, 0.4, 1)}, {}
-        yield PRINCIPLED, {"Base Color": COLOUR, "Transmission Weight": 0.7, "Roughness": r, "IOR": 1.33}, {}
+        yield GLASS, {"Color": COLOR, "Roughness": r, "IOR": 1.6}, {"distribution": "MULTI_GGX"}
+        yield PRINCIPLED, {"Base Color": COLOR, "Roughness": r}, {}
+        yield PRINCIPLED, {"Base Color": COLOR, "Roughness": r, "Metallic": 0.6, "Specular Tint": (0.9, 0.5, 0.7, 1)}, {}
+        yield PRINCIPLED, {"Base Color": COLOR, "Coat Weight": 0.7, "Coat Roughness": r, "Coat Tint": (0.9, 0.6, 0.4, 1)}, {}
+        yield PRINCIPLED, {"Base Color": COLOR, "Transmission Weight": 0.7, "Roughness": r, "IOR": 1.33}, {}
     yield from of_bare_facets(ROUGHNESSES[:-1])
-    yield PRINCIPLED, {"Base Color": COLOUR, "Specular IOR Level": 0.9, "Roughness": 0.3}, {"distribution": "GGX"}
-    yield PRINCIPLED, {"Base Color": COLOUR, "Specular IOR Level": 0.2, "IOR": 2.0, "Coat Weight": 1.0, "Coat IOR": 1.9}, {}
-    yield PRINCIPLED, {"Base Color": COLOUR, "Diffuse Roughness": 0.6}, {}
+    yield PRINCIPLED, {"Base Color": COLOR, "Specular IOR Level": 0.9, "Roughness": 0.3}, {"distribution": "GGX"}
+    yield PRINCIPLED, {"Base Color": COLOR, "Specular IOR Level": 0.2, "IOR": 2.0, "Coat Weight": 1.0, "Coat IOR": 1.9}, {}
+    yield PRINCIPLED, {"Base Color": COLOR, "Diffuse Roughness": 0.6}, {}
 
 
 def of_beckmann():
     for r in ROUGHNESSES:
-        yield GLOSSY, {"Color": COLOUR, "Roughness": r}, {"distribution": "BECKMANN"}
+        yield GLOSSY, {"Color": COLOR, "Roughness": r}, {"distribution": "BECKMANN"}
 
 
 def seen_through():
     for r in ROUGHNESSES:
-        yield GLASS, {"Color": COLOUR, "Roughness": r, "IOR": 1.45}, {"distribution": "GGX"}
-        yield "ShaderNodeBsdfRefraction", {"Color": COLOUR, "Roughness": r, "IOR": 1.45}, {"distribution": "GGX"}
-    yield "ShaderNodeBsdfTranslucent", {"Color": COLOUR}, {}
+        yield GLASS, {"Color": COLOR, "Roughness": r, "IOR": 1.45}, {"distribution": "GGX"}
+        yield "ShaderNodeBsdfRefraction", {"Color": COLOR, "Roughness": r, "IOR": 1.45}, {"distribution": "GGX"}
+    yield "ShaderNodeBsdfTranslucent", {"Color": COLOR}, {}
 
 
 @pytest.fixture
@@ -126,33 +126,33 @@ def of_stretched_facets():
     )
     ggx = {"distribution": "GGX"}
     for amount, rotation in ((0.3, 0.0), (0.7, 0.1), (-0.6, 0.0), (-0.4, 0.85), (0.99, 0.3)):
-        stretched = {"Color": COLOUR, "Roughness": 0.5, "Anisotropy": amount, "Rotation": rotation}
+        stretched = {"Color": COLOR, "Roughness": 0.5, "Anisotropy": amount, "Rotation": rotation}
         yield GLOSSY, stretched | next(tangents), ggx
         for kind in METALLIC:
-            stretched = {"Base Color": COLOUR, "Roughness": 0.4, "Anisotropy": abs(amount), "Rotation": rotation}
+            stretched = {"Base Color": COLOR, "Roughness": 0.4, "Anisotropy": abs(amount), "Rotation": rotation}
             yield kind, stretched | next(tangents), ggx
-        stretched = {"Base Color": COLOUR, "Metallic": 1.0, "Anisotropic": abs(amount), "Anisotropic Rotation": rotation}
+        stretched = {"Base Color": COLOR, "Metallic": 1.0, "Anisotropic": abs(amount), "Anisotropic Rotation": rotation}
         yield PRINCIPLED, stretched | next(tangents), ggx
 
 
 def of_stretched_tables():
     for amount in (0.4, 1.0):
-        yield GLOSSY, {"Color": COLOUR, "Roughness": 0.6, "Anisotropy": amount}, {"distribution": "MULTI_GGX"}
-        layers = {"Base Color": COLOUR, "Metallic": 0.4, "Transmission Weight": 0.3, "Coat Weight": 0.5}
+        yield GLOSSY, {"Color": COLOR, "Roughness": 0.6, "Anisotropy": amount}, {"distribution": "MULTI_GGX"}
+        layers = {"Base Color": COLOR, "Metallic": 0.4, "Transmission Weight": 0.3, "Coat Weight": 0.5}
         yield PRINCIPLED, layers | {"Anisotropic": amount, "Anisotropic Rotation": 0.2}, {}
 
 
 def of_sheen():
     """Both kinds. Where less than 1e-4 is scattered the table's digits are none of the fit's: smoother ones are left out."""
     for r in (0.2, 0.3, 0.5, 0.8, 1.0):
-        yield "ShaderNodeBsdfSheen", {"Color": COLOUR, "Roughness": r}, {"distribution": "MICROFIBER"}
+        yield "ShaderNodeBsdfSheen", {"Color": COLOR, "Roughness": r}, {"distribution": "MICROFIBER"}
     for r in (0.3, 0.6, 1.0):
-        yield "ShaderNodeBsdfSheen", {"Color": COLOUR, "Roughness": r}, {"distribution": "ASHIKHMIN"}
+        yield "ShaderNodeBsdfSheen", {"Color": COLOR, "Roughness": r}, {"distribution": "ASHIKHMIN"}
 
 
 def of_layers_below_sheen():
     for weight, r in ((0.3, 0.5), (1.0, 0.3), (1.0, 0.9)):
-        sheen = {"Base Color": COLOUR, "Sheen Weight": weight, "Sheen Roughness": r, "Sheen Tint": (0.9, 0.6, 0.5, 1)}
+        sheen = {"Base Color": COLOR, "Sheen Weight": weight, "Sheen Roughness": r, "Sheen Tint": (0.9, 0.6, 0.5, 1)}
         yield PRINCIPLED, sheen, {}
         yield PRINCIPLED, sheen | {"Coat Weight": 0.6, "Coat Roughness": 0.3}, {}
 
@@ -218,14 +218,14 @@ def test_what_is_lit_from_behind_is_cycles(patches):
 
 def test_what_shines_below_a_coat_is_cycles(patches):
     """Without the sun, since Cycles would ask it or the surface that shines by chance."""
-    shining = {"Base Color": COLOUR, "Emission Color": COLOUR, "Emission Strength": 0.7}
+    shining = {"Base Color": COLOR, "Emission Color": COLOR, "Emission Strength": 0.7}
     shaders = [
         (PRINCIPLED, shining | {"Coat Weight": weight, "Coat Tint": (0.9, 0.6, 0.4, 1)}, {}) for weight in (0.0, 0.5, 1.0)
     ]
     check(patches(shaders, energy=0.0), shaders, TABLES)
 
 
-TINTED = {"Base Color": COLOUR, "Roughness": 0.4, "Specular Tint": (0.9, 0.5, 0.7, 1), "Coat Weight": 0.3, "Coat Tint": COLOUR}
+TINTED = {"Base Color": COLOR, "Roughness": 0.4, "Specular Tint": (0.9, 0.5, 0.7, 1), "Coat Weight": 0.3, "Coat Tint": COLOR}
 WHITE = (1.0, 1.0, 1.0)
 
 
@@ -274,7 +274,7 @@ def test_a_table_that_is_looked_up_a_quarter_of_a_step_beside_is_found(patches, 
     entry = ctypes.CDLL(str(copy)).viewcam_core
     entry.restype, entry.argtypes = ctypes.POINTER(native._Core), [ctypes.c_char_p]
     monkeypatch.setattr(native, "core", lambda name=None: entry(None).contents)
-    shaders = [(PRINCIPLED, {"Base Color": COLOUR, "Roughness": 0.4}, {})]
+    shaders = [(PRINCIPLED, {"Base Color": COLOR, "Roughness": 0.4}, {})]
     with pytest.raises(AssertionError, match="p50"):
         check(patches(shaders), shaders, TABLES)
 
@@ -327,13 +327,13 @@ def test_rough_refraction_beside_a_translucent_is_up_to_5_percent_off_and_told(
     scene.render.resolution_x = scene.render.resolution_y = 96
     set_world((1, 1, 1), 1.0)
     materials = [
-        painted("ShaderNodeBsdfRefraction", {"Color": COLOUR, "Roughness": 0.77}, {"distribution": "GGX"}),
-        painted(GLASS, {"Color": COLOUR, "Roughness": 0.77}, {"distribution": "MULTI_GGX"}),
-        painted(PRINCIPLED, {"Base Color": COLOUR, "Transmission Weight": 0.61, "Roughness": 0.77}),
+        painted("ShaderNodeBsdfRefraction", {"Color": COLOR, "Roughness": 0.77}, {"distribution": "GGX"}),
+        painted(GLASS, {"Color": COLOR, "Roughness": 0.77}, {"distribution": "MULTI_GGX"}),
+        painted(PRINCIPLED, {"Base Color": COLOR, "Transmission Weight": 0.61, "Roughness": 0.77}),
     ]
     for tree in (material.node_tree for material in materials):
         mixed, other = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTranslucent")
-        other.inputs["Color"].default_value = COLOUR
+        other.inputs["Color"].default_value = COLOR
         tree.links.new(tree.nodes["Shader"].outputs[0], mixed.inputs[1])
         tree.links.new(other.outputs[0], mixed.inputs[2])
         tree.links.new(mixed.outputs[0], tree.nodes["Output"].inputs["Surface"])

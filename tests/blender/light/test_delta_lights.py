@@ -124,7 +124,7 @@ def test_smooth_surfaces_shade_smoothly_and_cast_the_shadows_of_their_facets(pic
 
 
 @pytest.mark.parametrize("exposure", [1.0, 0.3])
-def test_emission_is_the_exact_colour(pictures, make_material, scene, exposure):
+def test_emission_is_the_exact_color(pictures, make_material, scene, exposure):
     scene.cycles.film_exposure = exposure
     monkey = bpy.data.objects["Monkey"]
     monkey.data.materials[0] = make_material("Glow", "ShaderNodeEmission")

@@ -55,7 +55,7 @@ def test_light_on_surfaces_in_one_place_is_taken_out_and_named(room, tmp_path, r
     assert comparison.answer.answer == "same_but", comparison.sentence
     assert set(comparison.taken_out.names) == {"Floor", kind.capitalize()}
     assert 0.02 < comparison.taken_out.pixels.mean() < 0.9
-    assert 0.02 < comparison.not_modelled.share < 0.9 and set(comparison.not_modelled.names) == {"Floor", kind.capitalize()}
+    assert 0.02 < comparison.not_modeled.share < 0.9 and set(comparison.not_modeled.names) == {"Floor", kind.capitalize()}
     brighter = tuple(replace(lamp, irradiance=tuple(1.03 * x for x in lamp.irradiance)) for lamp in exported.lamps)
     assert not compared(replace(exported, lamps=brighter), level, tests, exported).passed
 
@@ -128,7 +128,7 @@ def lit_past_a_sheet(scene, camera, add, add_lamp, mesh_from):
     ],
 )
 def test_light_past_what_not_all_rays_see_is_taken_out_and_named(lit_past_a_sheet, tmp_path, read_passes, light, sheet, name):
-    """How much of it a picture has is Cycles' weights of importance sampling: 4 % less in a tile, or 14 times as much."""
+    """Cycles' weights of importance sampling decide how much of it a picture has: 4 % less in a tile, or 14 times as much."""
     lit_past_a_sheet(light, sheet)
     paths = [tmp_path / f"cycles-{number}.exr" for number in range(4)]
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=256), paths)
@@ -137,7 +137,7 @@ def test_light_past_what_not_all_rays_see_is_taken_out_and_named(lit_past_a_shee
     assert comparison.passed, "\n".join(comparison.lines())
     assert comparison.taken_out.seen_otherwise.keys() == {name} and not comparison.pairs
     assert 0.02 < comparison.taken_out.pixels.mean() < 0.7
-    assert comparison.not_modelled.names == (name,)
+    assert comparison.not_modeled.names == (name,)
     if light != "shadowless":  # which the ledger tells as approximated already
         assert "but for 1 shadow that not all rays see" in comparison.sentence and "not modeled" not in comparison.sentence
     brighter = [replace(image, passes={**image.passes, "Combined": 1.03 * image["Combined"]}) for image in tests]

@@ -12,7 +12,7 @@ from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
 
-COLOUR = (0.8, 0.5, 0.2, 1.0)
+COLOR = (0.8, 0.5, 0.2, 1.0)
 # p99, calibrated: heights are looked up a tenth of a pixel beside, as Cycles does from 4.5 on (1e-4), or a whole one (1.2e-5).
 DISPLACED = 2e-4 if bpy.app.version >= (4, 5) else 2e-5
 # p50, p99: the tables' own differences, as in test_closures.py; since 5.1 normals are two numbers of 16 bits.
@@ -23,13 +23,13 @@ DIFFUSE, GLOSSY, PRINCIPLED = "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfGlossy", "
 
 def shaders():
     """(class, inputs, properties, which normals are mapped)."""
-    yield DIFFUSE, {"Color": COLOUR}, {}, ("Normal",)
-    yield DIFFUSE, {"Color": COLOUR, "Roughness": 0.7}, {}, ("Normal",)
-    yield GLOSSY, {"Color": COLOUR, "Roughness": 0.5}, {"distribution": "GGX"}, ("Normal",)
-    yield "ShaderNodeBsdfGlass", {"Color": COLOUR, "Roughness": 0.6}, {"distribution": "GGX"}, ("Normal",)
-    yield PRINCIPLED, {"Base Color": COLOUR}, {}, ("Normal",)
-    yield PRINCIPLED, {"Base Color": COLOUR, "Metallic": 1.0}, {}, ("Normal",)
-    coat = {"Base Color": COLOUR, "Coat Weight": 0.8, "Coat Roughness": 0.4}
+    yield DIFFUSE, {"Color": COLOR}, {}, ("Normal",)
+    yield DIFFUSE, {"Color": COLOR, "Roughness": 0.7}, {}, ("Normal",)
+    yield GLOSSY, {"Color": COLOR, "Roughness": 0.5}, {"distribution": "GGX"}, ("Normal",)
+    yield "ShaderNodeBsdfGlass", {"Color": COLOR, "Roughness": 0.6}, {"distribution": "GGX"}, ("Normal",)
+    yield PRINCIPLED, {"Base Color": COLOR}, {}, ("Normal",)
+    yield PRINCIPLED, {"Base Color": COLOR, "Metallic": 1.0}, {}, ("Normal",)
+    coat = {"Base Color": COLOR, "Coat Weight": 0.8, "Coat Roughness": 0.4}
     for mapped in (("Normal",), ("Coat Normal",), ("Normal", "Coat Normal")):
         yield PRINCIPLED, coat, {}, mapped
     if bpy.app.version >= (4, 3):
@@ -179,7 +179,7 @@ def test_every_shader_is_bumped_as_in_cycles(patches):
 
 
 def test_every_space_and_strength_is_cycles(patches):
-    lambert = (DIFFUSE, {"Color": COLOUR}, {}, ("Normal",))
+    lambert = (DIFFUSE, {"Color": COLOR}, {}, ("Normal",))
     cases = [
         (lambert, {"color": (0.7, 0.4, 0.9) if space in SPACES[:3] else (0.7, 0.4, 0.1), "strength": strength, "space": space})
         for space in SPACES
@@ -202,12 +202,12 @@ def test_every_shader_is_bumped_by_its_displacement_as_in_cycles(patches):
 
 
 def test_every_way_to_displace_is_cycles(patches):
-    lambert = (DIFFUSE, {"Color": COLOUR}, {}, ())
+    lambert = (DIFFUSE, {"Color": COLOR}, {}, ())
     cases = [(lambert, {name: value}) for name, value in (("Midlevel", 0.9), ("Scale", -0.3), ("Scale", 1.0))]
     cases += [(lambert, {"vector": vector}) for vector in (("ShaderNodeTexCoord", "UV"), ("ShaderNodeNewGeometry", "Position"))]
     cases += [(lambert, {"space": "OBJECT"}), (lambert, {"raw": True})]
     cases += [(lambert, {"kind": "VectorDisplacement", "space": space}) for space in ("OBJECT", "WORLD")]
-    cases += [((DIFFUSE, {"Color": COLOUR}, {}, ("Normal",)), {})]  # a map of the smooth normal, in which nothing is displaced
+    cases += [((DIFFUSE, {"Color": COLOR}, {}, ("Normal",)), {})]  # a map of the smooth normal, in which nothing is displaced
     check(patches(cases, displace), cases, p50=2e-5, p99=DISPLACED)
 
 
@@ -219,7 +219,7 @@ def test_what_differs_of_a_displacement_is_float32_which_counts_more_the_closer_
     """
     materials = []
     for height in (24.0, 96.0):
-        materials.append(painted(DIFFUSE, {"Color": COLOUR}))
+        materials.append(painted(DIFFUSE, {"Color": COLOR}))
         displace(materials[-1], (), height=height)
     strewn(materials, cells=6)
     apart = []
@@ -232,7 +232,7 @@ def test_what_differs_of_a_displacement_is_float32_which_counts_more_the_closer_
 
 
 def test_heights_of_all_that_varies_and_all_ways_to_bump_are_cycles(patches):
-    lambert = (DIFFUSE, {"Color": COLOUR}, {}, ("Normal",))
+    lambert = (DIFFUSE, {"Color": COLOR}, {}, ("Normal",))
     vectors = [("ShaderNodeTexCoord", output) for output in ("Object", "Generated", "UV", "Camera")]
     vectors += [("ShaderNodeNewGeometry", "Position"), ("ShaderNodeUVMap", "UV"), ("ShaderNodeVertexColor", "Color")]
     cases = [(lambert, {"vector": vector}) for vector in vectors]
@@ -243,13 +243,13 @@ def test_heights_of_all_that_varies_and_all_ways_to_bump_are_cycles(patches):
 
 def test_a_narrow_filter_shows_what_float32_leaves_of_it(patches):
     """Cycles' heights are rounded by 2⁻²⁴ of up to 2; places a tenth of a pixel of 1/36 away make 4e-5 of that in a slope."""
-    lambert = (DIFFUSE, {"Color": COLOUR}, {}, ("Normal",))
+    lambert = (DIFFUSE, {"Color": COLOR}, {}, ("Normal",))
     cases = [(lambert, {"filter_width": width}) for width in (0.1, 10.0)]
     check(patches(cases, bump), cases, p50=2e-5, p99=2e-4)
 
 
 def test_textures_make_heights(patches):
-    lambert = (DIFFUSE, {"Color": COLOUR}, {}, ("Normal",))
+    lambert = (DIFFUSE, {"Color": COLOR}, {}, ("Normal",))
     noise = ("ShaderNodeTexNoise", {"noise_dimensions": "2D"})
     cases = [
         (lambert, {"texture": texture, "Distance": 0.05})
@@ -274,7 +274,7 @@ def body(camera, add, mesh_from, make_material):
     pixels[:, 2:] = 0.9, 1.0
     image.pixels.foreach_set(pixels.ravel())
     image.update()
-    material = make_material("Skin", PRINCIPLED, Base_Color=COLOUR)
+    material = make_material("Skin", PRINCIPLED, Base_Color=COLOR)
     mesh.materials.append(material)
     monkey = add(mesh, "Monkey", pass_index=1)
     monkey.scale, monkey.rotation_euler = (1.2, 0.8, 1.0), (0.2, 0.1, 0.4)
@@ -327,7 +327,7 @@ def test_a_smooth_body_is_stretched_along_tangents_of_its_own(render_pair, body,
 
 
 def test_a_pixel_seen_in_mirrors_is_as_wide_as_its_way_is_long(scene, render_pair, camera, add, make_material):
-    floor, mirror = make_material("Floor", DIFFUSE, Color=COLOUR), make_material("Mirror", GLOSSY, Roughness=0.0)
+    floor, mirror = make_material("Floor", DIFFUSE, Color=COLOR), make_material("Mirror", GLOSSY, Roughness=0.0)
     bump(floor, ("Normal",), Distance=0.3)
     for name, material, corners in (
         ("Floor", floor, [(-6, -6, 0), (6, -6, 0), (6, 6, 0), (-6, 6, 0)]),
@@ -435,9 +435,9 @@ def test_a_normal_that_is_a_little_wrong_is_found(patches, monkeypatch, wrong):
             node = native.Node(node.type, (*node.inputs, (wrong, changes[wrong])))
         return right(node, *numbers)
 
-    cases = [((DIFFUSE, {"Color": COLOUR}, {}, ("Normal",)), {"color": (0.7, 0.4, 0.9)})]
+    cases = [((DIFFUSE, {"Color": COLOR}, {}, ("Normal",)), {"color": (0.7, 0.4, 0.9)})]
     if wrong == "uv":
-        cases.append(((DIFFUSE, {"Color": COLOUR}, {}, ("Normal",)), {"color": (0.7, 0.4, 0.9), "uv": "Second"}))
+        cases.append(((DIFFUSE, {"Color": COLOR}, {}, ("Normal",)), {"color": (0.7, 0.4, 0.9), "uv": "Second"}))
     monkeypatch.setattr(native, "_described_node", described)
     with pytest.raises(AssertionError, match="p50"):
         check(patches(cases), cases)
@@ -462,7 +462,7 @@ def test_a_displacement_that_is_a_little_wrong_is_found(patches, monkeypatch, wr
             node = native.Node("bump", (*node.inputs, (wrong, 1.3)))
         return right(node, *numbers)
 
-    cases = [((DIFFUSE, {"Color": COLOUR}, {}, ()), {})]
+    cases = [((DIFFUSE, {"Color": COLOR}, {}, ()), {})]
     monkeypatch.setattr(native, "_described_node", described)
     with pytest.raises(AssertionError, match="p50"):
         check(patches(cases, displace), cases, p50=2e-5, p99=2e-4)
@@ -483,7 +483,7 @@ def test_a_bump_that_is_a_little_wrong_is_found(patches, monkeypatch, name):
             node = native.Node(node.type, (*node.inputs, (name, True if name == "invert" else (WRONG[name],) * 3)))
         return right(node, *numbers)
 
-    cases = [((DIFFUSE, {"Color": COLOUR}, {}, ("Normal",)), {})]
+    cases = [((DIFFUSE, {"Color": COLOR}, {}, ("Normal",)), {})]
     monkeypatch.setattr(native, "_described_node", described)
     with pytest.raises(AssertionError, match="p50"):
         check(patches(cases, bump), cases)

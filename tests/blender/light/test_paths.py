@@ -210,7 +210,7 @@ def test_a_percent_less_light_is_caught(take, scene, sabotage, monkeypatch):
     """The tests above must be able to fail."""
     from viewcam_addon.blender.scenes import export, shaders
     from viewcam_addon.tracer.scene.film import Bounces
-    from viewcam_addon.tracer.scene.materials import Colour, sum_of
+    from viewcam_addon.tracer.scene.materials import Color, sum_of
 
     if sabotage == "albedo":
         right = shaders.read
@@ -218,7 +218,7 @@ def test_a_percent_less_light_is_caught(take, scene, sabotage, monkeypatch):
         def darker(material):
             reading = right(material)
             rgb = tuple(0.99 * value for value in reading.material.surface["color"].rgb)
-            reading.material = sum_of(diffuse=Colour(rgb))
+            reading.material = sum_of(diffuse=Color(rgb))
             return reading
 
         monkeypatch.setattr(shaders, "read", darker)

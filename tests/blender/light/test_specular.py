@@ -80,8 +80,8 @@ def rays(sheet, shown_directions, scene, make_material, read_passes, tmp_path):
         true, shading = (picture["Normal"][seen].T.astype(np.float64) for picture in (flat, smooth))
         true /= np.sqrt(dot(true, true))
         shading /= np.sqrt(dot(shading, shading))
-        colour = way["Combined"][seen].T[:3].astype(np.float64)
-        return ray, true, shading, np.where(colour.any(axis=0), 2 * colour - 1, 0.0), true[2] < 0
+        color = way["Combined"][seen].T[:3].astype(np.float64)
+        return ray, true, shading, np.where(color.any(axis=0), 2 * color - 1, 0.0), true[2] < 0
 
     return cast
 

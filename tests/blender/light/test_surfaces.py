@@ -84,9 +84,9 @@ def test_a_principled_surface_without_gloss(pictures, make_material):
     assert not reasons(sides)
 
 
-def is_gloss(colours):
+def is_gloss(colors):
     """True if what scatters diffusely is another share at each angle; the plain material scatters the same everywhere."""
-    return len(np.unique(colours[..., 0])) > 100
+    return len(np.unique(colors[..., 0])) > 100
 
 
 @pytest.mark.parametrize("slots", [0, 1, 2])
@@ -173,7 +173,7 @@ def test_a_file_of_two_bytes_a_number(pictures, floor, tmp_path, space, opacity)
 @pytest.mark.parametrize("domain", ["POINT", "CORNER"])
 @pytest.mark.parametrize("kind", ["FLOAT_COLOR", "BYTE_COLOR"])
 @pytest.mark.parametrize("name", ["Paint", ""])
-def test_colours_of_the_mesh(pictures, floor, domain, kind, name):
+def test_colors_of_the_mesh(pictures, floor, domain, kind, name):
     mesh = bpy.data.objects["Floor"].data
     mesh.color_attributes.new("Other", "FLOAT_COLOR", "POINT")
     attribute = mesh.color_attributes.new("Paint", kind, domain)
@@ -189,19 +189,19 @@ def test_colours_of_the_mesh(pictures, floor, domain, kind, name):
     assert not reasons(sides) and len(np.unique(sides[0].cycles[0]["Diffuse Color"])) > 1000
 
 
-def test_materials_of_one_mesh_show_its_colours_of_any_name_with_their_alphas(pictures, floor):
+def test_materials_of_one_mesh_show_its_colors_of_any_name_with_their_alphas(pictures, floor):
     mesh = bpy.data.objects["Monkey"].data
     for seed, name in enumerate(("Paint", "Tint", "Shown")):
         attribute = mesh.color_attributes.new(name, "FLOAT_COLOR", "POINT")
         attribute.data.foreach_set("color", np.random.default_rng(seed).random(4 * len(attribute.data), np.float32))
     mesh.color_attributes.render_color_index = mesh.color_attributes.find("Shown")
     mesh.materials.clear()
-    for colour, alpha in (("Paint", "Tint"), ("Tint", ""), ("", "Paint")):
+    for color, alpha in (("Paint", "Tint"), ("Tint", ""), ("", "Paint")):
         material = floor.copy()
         mesh.materials.append(material)
         tree, shader = material.node_tree, material.node_tree.nodes["Shader"]
         mix, plain = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfDiffuse")
-        for name, output, socket in ((colour, "Color", shader.inputs["Color"]), (alpha, "Alpha", mix.inputs[0])):
+        for name, output, socket in ((color, "Color", shader.inputs["Color"]), (alpha, "Alpha", mix.inputs[0])):
             node = tree.nodes.new("ShaderNodeVertexColor")
             node.layer_name = name
             tree.links.new(node.outputs[output], socket)
@@ -233,8 +233,8 @@ ODD_TREES = {
     "a background": ("mix", "ShaderNodeBackground", None),
     "a color in place of a shader": ("mix", "ShaderNodeGamma", None),
     "a number in place of a shader": ("mix", "ShaderNodeNewGeometry", "Backfacing"),
-    "a shader as a color": ("colour", "ShaderNodeBsdfDiffuse", None),
-    "a shader as a color, by EEVEE": ("colour", "ShaderNodeShaderToRGB", None),
+    "a shader as a color": ("color", "ShaderNodeBsdfDiffuse", None),
+    "a shader as a color, by EEVEE": ("color", "ShaderNodeShaderToRGB", None),
 }
 
 
@@ -247,7 +247,7 @@ def test_what_cycles_makes_of_odd_nodes(pictures, floor, odd):
     if "Color" in node.inputs:
         node.inputs["Color"].default_value = GIVEN
     output_socket = node.outputs[output or 0]
-    if how == "colour":
+    if how == "color":
         if kind == "ShaderNodeShaderToRGB":
             tree.links.new(tree.nodes.new("ShaderNodeBsdfDiffuse").outputs[0], node.inputs[0])
         mixed = tree.nodes.new("ShaderNodeGamma")
@@ -372,7 +372,7 @@ def test_a_scene_seen_from_its_eye_is_lit_likewise(pictures, scene):
 
 
 @pytest.mark.skipif(bpy.app.version >= (5, 0), reason="since 5.0 nodes always count")
-def test_without_nodes_the_viewports_colours_count(pictures, floor, scene):
+def test_without_nodes_the_viewports_colors_count(pictures, floor, scene):
     floor.use_nodes, floor.diffuse_color = False, (0.7, 0.4, 0.2, 1)
     scene.world.use_nodes, scene.world.color = False, (0.1, 0.2, 0.3)
     scene.world.cycles_visibility.diffuse = False

@@ -83,11 +83,11 @@ def focus():
         (focus, "path", "Camera"),
     ],
 )
-def test_what_is_not_modelled_and_in_the_picture_makes_it_amber(stage, change, level, name):
+def test_what_is_not_modeled_and_in_the_picture_makes_it_amber(stage, change, level, name):
     change()
     check = stage(level)
     assert (check.answer, check.passed) == ("same_but", True), check.sentence
-    names = check.figures["not_modelled"]
+    names = check.figures["not_modeled"]
     assert names["names"] == [name] and 0.01 < names["share"] < 0.9, names
     assert f"but for 1 object that is not modeled ({name}; " in check.sentence
 
@@ -95,11 +95,11 @@ def test_what_is_not_modelled_and_in_the_picture_makes_it_amber(stage, change, l
 @pytest.mark.parametrize(
     ("change", "name", "level"), [(subsurface, "Ball", "path"), (hair, "Ball", "path"), (fog, "Fog", "path")]
 )
-def test_what_is_not_modelled_and_neither_seen_nor_lights_what_is_leaves_it_green(stage, change, name, level):
+def test_what_is_not_modeled_and_neither_seen_nor_lights_what_is_leaves_it_green(stage, change, name, level):
     change()
     bpy.data.objects[name].location = BEHIND
     check = stage(level)
-    assert check.answer == "same" and check.figures["not_modelled"]["share"] == 0.0, check.sentence
+    assert check.answer == "same" and check.figures["not_modeled"]["share"] == 0.0, check.sentence
     assert any(entry["status"] != "exported" for entry in check.figures["ledger"]), "it is in the ledger all the same"
 
 
@@ -109,8 +109,8 @@ def test_hair_that_is_not_seen_and_casts_a_shadow_into_the_picture_makes_it_ambe
     ball.location, lamp.location, lamp.data.size = (0, 0, 6), (0, 0, 9), 0.1  # above what the camera sees
     bpy.context.view_layer.update()
     figures = stage("path").figures
-    assert figures["answer"] == "same_but" and figures["not_modelled"]["names"] == ["Ball"], figures["sentence"]
-    assert figures["not_modelled"]["shown"] == 0.0 and figures["not_modelled"]["share"] > 0.005, figures["not_modelled"]
+    assert figures["answer"] == "same_but" and figures["not_modeled"]["names"] == ["Ball"], figures["sentence"]
+    assert figures["not_modeled"]["shown"] == 0.0 and figures["not_modeled"]["share"] > 0.005, figures["not_modeled"]
 
 
 def test_surface_scattering_below_the_skin_is_no_matter_of_geometry(stage):
@@ -141,6 +141,6 @@ def test_strict_fails_what_is_amber_and_lets_pass_what_is_green(stage):
     assert stage("geometry", strict=True).passed
 
 
-def test_all_that_is_modelled_is_green_and_rendered_once(stage, tmp_path):
+def test_all_that_is_modeled_is_green_and_rendered_once(stage, tmp_path):
     assert stage("path", report=tmp_path / "report").answer == "same"
     assert not (tmp_path / "report" / "everything.exr").exists()

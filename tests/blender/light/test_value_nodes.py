@@ -36,8 +36,8 @@ class N:
         node = tree.nodes.new("ShaderNode" + self.kind)
         for name, value in self.properties.items():
             if name == "stops":
-                for position, colour in value:
-                    node.color_ramp.elements.new(position).color = colour
+                for position, color in value:
+                    node.color_ramp.elements.new(position).color = color
             elif name == "ramp":
                 node.color_ramp.interpolation = value
             elif name == "curves":
@@ -66,7 +66,7 @@ U, V = N("SeparateXYZ", {"Vector": UV}, "X"), N("SeparateXYZ", {"Vector": UV}, "
 OBJECT = N("TexCoord", output="Object")
 
 
-def two_colours():
+def two_colors():
     """Colors that vary over the mesh, one of them beyond 1."""
     less = N("Math", {"Value": V, "Value_001": 0.7}, operation="MULTIPLY")
     return tuple(N("CombineColor", {"Red": r, "Green": g, "Blue": b}) for r, g, b in ((U, V, 0.3), (0.4, U, less)))
@@ -83,7 +83,7 @@ ATTRIBUTES = (
 def graphs(image, straight):
     """name → what a patch shows."""
     result = {}
-    a, b = two_colours()
+    a, b = two_colors()
     for word in KINDS["math"].inputs["operation"]:
         result[f"math {word}"] = N("Math", {"Value": U, "Value_001": V, "Value_002": 0.4}, operation=word.upper())
     warm = N("Gamma", {"Color": (0.8, 0.3, 0.1, 1.0), "Gamma": 1.2})
@@ -216,8 +216,8 @@ def conversions(a, b):
             result[f"vector transform {kind} {start} {end}"] = N("VectorTransform", {"Vector": OBJECT}, **words)
     kelvin = N("MapRange", {"Value": U, "To Min": 500.0, "To Max": 9000.0}, clamp=False)
     result["blackbody"] = N("Blackbody", {"Temperature": kelvin})
-    nanometres = N("MapRange", {"Value": U, "To Min": 400.0, "To Max": 700.0}, clamp=False)
-    result["wavelength"] = N("Wavelength", {"Wavelength": nanometres})
+    nanometers = N("MapRange", {"Value": U, "To Min": 400.0, "To Max": 700.0}, clamp=False)
+    result["wavelength"] = N("Wavelength", {"Wavelength": nanometers})
     for word in ("Normal", "Dot"):
         result[f"normal {word}"] = N("Normal", {"Normal": OBJECT}, word)
     for word in ("Is Camera Ray", "Is Shadow Ray", "Ray Length"):
@@ -246,7 +246,7 @@ def procedural():
     result["white noise value"] = N("TexWhiteNoise", {"Vector": cells}, "Value")
     for name in ("TexNoise", "TexWhiteNoise", "TexChecker", "TexMagic", "TexBrick", "TexGradient", "TexWave", "TexVoronoi"):
         result[f"{name} without a vector"] = N(name, {}, "Color" if name != "TexNoise" else "Fac")
-    a, b = two_colours()
+    a, b = two_colors()
     for word in ("Color", "Fac"):
         result[f"checker {word}"] = N("TexChecker", {"Vector": place, "Color1": a, "Color2": b, "Scale": 3.3}, word)
         result[f"magic {word}"] = N("TexMagic", {"Vector": place, "Scale": 1.3, "Distortion": 1.2}, word, turbulence_depth=4)
@@ -368,7 +368,7 @@ def test_every_node_makes_what_cycles_makes(floor, images, part):
     check(floor(dict(list(graphs(*images).items())[part::PARTS])))
 
 
-def test_a_colour_whose_alpha_is_used_is_divided_by_it(floor, images):
+def test_a_color_whose_alpha_is_used_is_divided_by_it(floor, images):
     material = N("TexImage", {}, "Color", image=images[1])
     node = material.add
 
@@ -421,7 +421,7 @@ def test_a_node_that_is_a_little_wrong_is_found(floor, images, monkeypatch, wron
 def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(
     scene, camera, add, make_material, read_passes, tmp_path
 ):
-    """Of a grid that a modifier bends, and of one with a texture space of its own."""
+    """A modifier bends one grid; the other has a texture space of its own."""
     scene.render.resolution_x = scene.render.resolution_y = 48
     camera.location, camera.rotation_euler, camera.data.lens = (0.013, 0.029, 4.0), (0, 0, 0), 40.0
     material = make_material("Generated", "ShaderNodeEmission")

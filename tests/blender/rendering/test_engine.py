@@ -282,7 +282,7 @@ def test_a_bug_is_one_sentence_and_no_file_even_when_part_of_the_picture_is_ther
     assert "Traceback" not in "".join(capfd.readouterr())
 
 
-def test_what_can_not_be_modelled_is_one_warning(lit, write, monkey, camera_object, capfd):
+def test_what_can_not_be_modeled_is_one_warning(lit, write, monkey, camera_object, capfd):
     camera_object.data.dof.use_dof = True
     monkey.is_shadow_catcher = True
     write()

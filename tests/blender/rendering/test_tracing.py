@@ -1,4 +1,4 @@
-"""Tracing beside the thread that asked for it: bands arrive there, and cancelling ends it."""
+"""Tracing beside the thread that asked for it: bands arrive there, and canceling ends it."""
 
 import gc
 import queue
@@ -21,8 +21,8 @@ from viewcam_addon.tracer.scene import Scene
 SCENE = Scene(Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 40, 30), {}, ())
 
 
-def bands(is_cancelled=lambda: False, scene=SCENE):
-    return tracing.bands(scene, "geometry", 1, 0, 2, is_cancelled)
+def bands(is_canceled=lambda: False, scene=SCENE):
+    return tracing.bands(scene, "geometry", 1, 0, 2, is_canceled)
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def test_who_cancels_is_heard_before_the_next_band_and_gets_no_error(endless):
     assert len(received) <= 1 and endless == ["began", "stopped"]
 
 
-def test_whether_it_is_cancelled_is_asked_every_twentieth_of_a_second(endless, monkeypatch):
+def test_whether_it_is_canceled_is_asked_every_twentieth_of_a_second(endless, monkeypatch):
     """A band that is waited for without end, or for longer, would hold Escape up."""
     asked, waits = [], []
 
@@ -86,7 +86,7 @@ def test_an_error_of_the_tracer_is_raised_here():
         list(tracing.bands(SCENE, "light", 1, 0, 2, lambda: False))
 
 
-def test_a_cancelled_render_leaves_nothing_for_the_garbage_collector(monkeypatch):
+def test_a_canceled_render_leaves_nothing_for_the_garbage_collector(monkeypatch):
     real, tracers = renders.Tracer, []
 
     class Tracer(real):

@@ -11,7 +11,7 @@ from viewcam_addon.blender import versions
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import materials
 from viewcam_addon.blender.temporary_settings import overridden
-from viewcam_addon.errors import NotModelledError
+from viewcam_addon.errors import NotModeledError
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.scene import Mesh, Spheres
 
@@ -323,9 +323,9 @@ def test_a_view_layer_that_is_not_rendered_is_not_compared(two_layers, both_side
     assert not two_layers[0].use
 
 
-def test_strict_names_what_can_not_be_modelled(add, mesh_from):
+def test_strict_names_what_can_not_be_modeled(add, mesh_from):
     add(mesh_from("cube"), "Ghost").is_holdout = True
-    with pytest.raises(NotModelledError, match="'Ghost' can't be modeled, a holdout"):
+    with pytest.raises(NotModeledError, match="'Ghost' can't be modeled, a holdout"):
         jobs.export(Job(strict=True))
 
 
@@ -569,7 +569,7 @@ def test_real_models(scene, camera, both_sides, models_folder, name):
 
 
 def bare_objects(count):
-    """As many triangles without a material, each a mesh of its own."""
+    """Objects of one triangle without a material, each a mesh of its own."""
     objects = []
     for _ in range(count):
         mesh = bpy.data.meshes.new("Bare")

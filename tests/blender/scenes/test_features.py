@@ -257,9 +257,7 @@ def test_compositor_sequencer_and_film_do_not_matter(monkey, scene, both_sides):
     scene.cycles.film_exposure = 3
     strips = scene.sequence_editor_create()
     strips = strips.strips if hasattr(strips, "strips") else strips.sequences
-    strips.new_effect(
-        "Colour", "COLOR", 1, frame_start=1, **({"length": 9} if bpy.app.version >= (5, 0) else {"frame_end": 10})
-    )
+    strips.new_effect("Color", "COLOR", 1, frame_start=1, **({"length": 9} if bpy.app.version >= (5, 0) else {"frame_end": 10}))
     both_sides().check()
 
 

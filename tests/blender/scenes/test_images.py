@@ -9,7 +9,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.scenes.images import picture_of
-from viewcam_addon.tracer.scene.colours import RGBE
+from viewcam_addon.tracer.scene.colors import RGBE
 
 
 @pytest.fixture

@@ -163,7 +163,7 @@ def test_emissions_are_mixed_and_added_and_fall_off_as_light_does(add_lamp, expo
     assert not reasons and point.emission is not None
 
 
-def test_whatever_nodes_make_the_same_everywhere_colours_a_lamp(add_lamp, export):
+def test_whatever_nodes_make_the_same_everywhere_colors_a_lamp(add_lamp, export):
     tree = use_nodes(add_lamp("POINT", energy=10.0).data)
     emission = next(node for node in tree.nodes if node.type == "EMISSION")
     warm, half = tree.nodes.new("ShaderNodeBlackbody"), tree.nodes.new("ShaderNodeGamma")
@@ -189,7 +189,7 @@ def test_whatever_nodes_make_the_same_everywhere_colours_a_lamp(add_lamp, export
         ("TexSky", "Color", "'Sky Texture' that is not modeled"),
     ],
 )
-def test_what_a_lamps_nodes_say_that_is_not_modelled_is_named(add_lamp, export, kind, output, words):
+def test_what_a_lamps_nodes_say_that_is_not_modeled_is_named(add_lamp, export, kind, output, words):
     attach(add_lamp("SUN"), kind, output)
     reasons = export()[1]["Lamp"]
     assert words in reasons and "plain light" in reasons

@@ -9,13 +9,13 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.scenes import materials, shaders
 from viewcam_addon.blender.temporary_settings import overridden
-from viewcam_addon.tracer.scene.materials import PLAIN_COLOR, Colour, Material, sum_of
+from viewcam_addon.tracer.scene.materials import PLAIN_COLOR, Color, Material, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import KINDS, SHADERS, Node, node
 
 RED, GREEN = (0.5, 0.25, 0.125), (0.0, 1.0, 0.5)
 
 
-def colour(rgb):
+def color(rgb):
     return (*rgb, 1.0)
 
 
@@ -58,13 +58,13 @@ def approximately(material, *words):
 
 
 NORMAL = node("geometry", output="normal")
-CHECKS = node("image", image=Colour((1.0, 1.0, 1.0), "Checks"), extension="mirror", interpolation="cubic")
+CHECKS = node("image", image=Color((1.0, 1.0, 1.0), "Checks"), extension="mirror", interpolation="cubic")
 TEXTURED = node(
     "mix",
-    factor=Colour((1.0, 1.0, 1.0), "Checks"),
+    factor=Color((1.0, 1.0, 1.0), "Checks"),
     first=node(
         "principled",
-        base_color=Colour(RED, "Checks", closest=True),
+        base_color=Color(RED, "Checks", closest=True),
         roughness=0.25,
         coat_weight=0.5,
         normal=node("normal_map", color=CHECKS),
@@ -72,7 +72,7 @@ TEXTURED = node(
     second=node(
         "add",
         first=node(
-            "glossy", color=Colour(GREEN, vertex=True), roughness=Colour((1.0, 1.0, 1.0), "Checks"), distribution="beckmann"
+            "glossy", color=Color(GREEN, vertex=True), roughness=Color((1.0, 1.0, 1.0), "Checks"), distribution="beckmann"
         ),
         second=node(
             "mix",
@@ -85,17 +85,15 @@ TEXTURED = node(
 
 VALUES = [
     CHECKS,
-    node(
-        "image", image=Colour((1.0, 1.0, 1.0), "Checks"), vector=node("mapping", vector=node("texture_coordinate"), scale=2.0)
-    ),
-    node("image", image=Colour((1.0, 1.0, 1.0), "Checks"), projection="box", blend=0.25, vector=node("geometry")),
-    node("environment", image=Colour((1.0, 1.0, 1.0), "Checks"), projection="mirror_ball", interpolation="cubic"),
+    node("image", image=Color((1.0, 1.0, 1.0), "Checks"), vector=node("mapping", vector=node("texture_coordinate"), scale=2.0)),
+    node("image", image=Color((1.0, 1.0, 1.0), "Checks"), projection="box", blend=0.25, vector=node("geometry")),
+    node("environment", image=Color((1.0, 1.0, 1.0), "Checks"), projection="mirror_ball", interpolation="cubic"),
     node("math", a=node("object_info", output="material_index")),
     node("math", a=CHECKS, b=-2.0, operation="smooth_max", clamp=True),
     node("vector_math", a=node("geometry", output="true_normal"), b=(0.5, -1.0, 2.0), operation="dot_product"),
     node("vector_math", a=CHECKS, operation="fract"),
     node("map_range", value=node("layer_weight", output="facing", blend=0.25), interpolation="stepped", clamp=False),
-    node("mix_color", factor=node("fresnel", ior=1.25), a=CHECKS, b=Colour((1.0, 1.0, 1.0), vertex=True), blend="dodge"),
+    node("mix_color", factor=node("fresnel", ior=1.25), a=CHECKS, b=Color((1.0, 1.0, 1.0), vertex=True), blend="dodge"),
     node("mix_number", a=node("separate", color=CHECKS, output="y"), clamp_factor=False),
     node("combine_color", x=node("rgb_to_bw", color=CHECKS), z=node("object_info", output="object_index")),
     node("attribute", name="Paint", output="alpha"),
@@ -160,7 +158,7 @@ def test_an_ies_text_is_made_for_blender_and_gone_with_the_stand_in(diffuse):
 def test_a_displacement_is_read_as_the_height_that_it_is_made_of(diffuse):
     """And as what it is made into along the normal, where it is a Vector Displacement, or goes along other axes."""
     height = node("noise", vector=node("texture_coordinate"), scale=3.0)
-    material = sum_of(diffuse=Colour(RED), displacement=height)
+    material = sum_of(diffuse=Color(RED), displacement=height)
     with overridden() as overrides:
         materials.stand_in(overrides, diffuse, shaders.Reading(material))
         assert exactly(diffuse) == material
@@ -184,12 +182,12 @@ CURVES = {"rgb_curves": "color", "vector_curves": "vector", "float_curve": "valu
 @pytest.mark.parametrize("kind", CURVES)
 @pytest.mark.parametrize("extrapolate", [False, True])
 def test_curves_are_drawn_that_have_the_table_again(diffuse, image, kind, extrapolate):
-    """As straight lines between its entries. Calibrated: 5e-6, of float32 and the slope."""
+    """They are straight lines between its entries. Calibrated: 5e-6, of float32 and the slope."""
     table = bpy.data.images.new("Table", 257, 1, float_buffer=True, is_data=True)
     wanted = np.sin(np.linspace(0, 4, 257)[None, :, None] * (1.0, 1.5, 2.0) + 0.3).astype(np.float32) * 1.5
     wanted[..., 1:] = wanted[..., :1] if kind == "float_curve" else wanted[..., 1:]
     table.pixels.foreach_set(np.append(wanted, np.ones((1, 257, 1), np.float32), axis=2).ravel())
-    settings = {"table": Colour((1.0, 1.0, 1.0), "Table"), "least": -0.25, "most": 1.5, "extrapolate": extrapolate}
+    settings = {"table": Color((1.0, 1.0, 1.0), "Table"), "least": -0.25, "most": 1.5, "extrapolate": extrapolate}
     value = node(kind, **{CURVES[kind]: CHECKS}, factor=0.75, **settings)
     material = Material(surface=node("emission", color=value))
     with overridden() as overrides:
@@ -254,38 +252,36 @@ def test_the_stand_in_of_a_shader_is_read_as_that_shader(diffuse, image, surface
             assert name == "distribution" or rounded(read_closure.node[name]) == rounded(wanted.node[name]), name
 
 
-def rounded(colour):
+def rounded(color):
     """A color, to what float32 holds."""
-    return (
-        replace(colour, rgb=tuple(float(np.float32(value)) for value in colour.rgb)) if isinstance(colour, Colour) else colour
-    )
+    return replace(color, rgb=tuple(float(np.float32(value)) for value in color.rgb)) if isinstance(color, Color) else color
 
 
 @pytest.fixture
 def diffuse(make_material):
-    return make_material("Skin", "ShaderNodeBsdfDiffuse", Color=colour(RED))
+    return make_material("Skin", "ShaderNodeBsdfDiffuse", Color=color(RED))
 
 
 def test_the_shaders_that_are_components_are_read_as_they_are(make_material):
-    assert exactly(make_material("d", "ShaderNodeBsdfDiffuse", Color=colour(RED))) == sum_of(diffuse=Colour(RED))
-    emission = make_material("e", "ShaderNodeEmission", Color=colour(RED), Strength=4.0)
-    assert exactly(emission) == sum_of(emission=Colour((2.0, 1.0, 0.5)))
-    mirror = make_material("m", "ShaderNodeBsdfGlossy", Color=colour(RED), Roughness=0.0)
-    assert exactly(mirror) == sum_of(mirror=Colour(RED))
-    glass = make_material("g", "ShaderNodeBsdfGlass", Color=colour(RED), Roughness=0.0, IOR=1.5)
-    assert exactly(glass) == sum_of(glass=Colour(RED), ior=1.5)
-    clear = make_material("r", "ShaderNodeBsdfRefraction", Color=colour(RED), Roughness=0.0, IOR=1.25)
-    assert exactly(clear) == sum_of(refraction=Colour(RED), ior=1.25)
+    assert exactly(make_material("d", "ShaderNodeBsdfDiffuse", Color=color(RED))) == sum_of(diffuse=Color(RED))
+    emission = make_material("e", "ShaderNodeEmission", Color=color(RED), Strength=4.0)
+    assert exactly(emission) == sum_of(emission=Color((2.0, 1.0, 0.5)))
+    mirror = make_material("m", "ShaderNodeBsdfGlossy", Color=color(RED), Roughness=0.0)
+    assert exactly(mirror) == sum_of(mirror=Color(RED))
+    glass = make_material("g", "ShaderNodeBsdfGlass", Color=color(RED), Roughness=0.0, IOR=1.5)
+    assert exactly(glass) == sum_of(glass=Color(RED), ior=1.5)
+    clear = make_material("r", "ShaderNodeBsdfRefraction", Color=color(RED), Roughness=0.0, IOR=1.25)
+    assert exactly(clear) == sum_of(refraction=Color(RED), ior=1.25)
 
 
 @pytest.mark.parametrize(("socket", "value"), [("Specular IOR Level", 0.0), ("IOR", 1.0)])
 def test_a_principled_surface_without_gloss_is_lamberts(make_material, socket, value):
-    material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED), Roughness=0.3, Anisotropic=0.5)
+    material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=color(RED), Roughness=0.3, Anisotropic=0.5)
     inputs = material.node_tree.nodes["Shader"].inputs
     inputs[socket].default_value = value
-    assert exactly(material) == sum_of(diffuse=Colour(RED))
-    inputs["Emission Color"].default_value, inputs["Emission Strength"].default_value = colour(GREEN), 2.0
-    assert exactly(material) == sum_of(diffuse=Colour(RED), emission=Colour((0.0, 2.0, 1.0)))
+    assert exactly(material) == sum_of(diffuse=Color(RED))
+    inputs["Emission Color"].default_value, inputs["Emission Strength"].default_value = color(GREEN), 2.0
+    assert exactly(material) == sum_of(diffuse=Color(RED), emission=Color((0.0, 2.0, 1.0)))
 
 
 PRINCIPLED = {
@@ -305,7 +301,7 @@ PRINCIPLED = {
 
 @pytest.mark.parametrize("name", sorted(PRINCIPLED))
 def test_a_principled_surface_is_read_with_what_it_is_given(make_material, name):
-    material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED))
+    material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=color(RED))
     inputs = material.node_tree.nodes["Shader"].inputs
     socket = SHADERS["principled"].inputs[name]
     if socket not in inputs:  # Diffuse Roughness came with 4.3
@@ -319,7 +315,7 @@ def test_a_principled_surface_is_read_with_what_it_is_given(make_material, name)
 
 @pytest.mark.parametrize("socket", ["Subsurface Weight", "Thin Film Thickness"])
 def test_what_a_principled_surface_is_beyond_that_is_named_and_left_out(make_material, socket):
-    material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED))
+    material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=color(RED))
     plain = exactly(material)
     material.node_tree.nodes["Shader"].inputs[socket].default_value = 0.5
     assert approximately(material, "'Shader'", socket, "0.5") == plain
@@ -327,9 +323,9 @@ def test_what_a_principled_surface_is_beyond_that_is_named_and_left_out(make_mat
 
 @pytest.mark.parametrize("kind", ["diffuse", "glossy", "glass", "refraction"])
 def test_rough_shaders_are_read_as_shaders(make_material, kind):
-    material = make_material("rough", SHADERS[kind].class_name, Color=colour(RED), Roughness=0.25)
+    material = make_material("rough", SHADERS[kind].class_name, Color=color(RED), Roughness=0.25)
     read = exactly(material).surface
-    assert read.type == kind and read["color"] == Colour(RED) and read["roughness"] == Colour((0.25,) * 3)
+    assert read.type == kind and read["color"] == Color(RED) and read["roughness"] == Color((0.25,) * 3)
 
 
 def test_what_is_stretched_across_a_tangent_is_stretched_along_one_a_quarter_further(make_material):
@@ -365,18 +361,18 @@ def test_distributions_are_read_by_name(make_material, word):
 
 def test_shaders_are_mixed_and_added_by_constant_factors(diffuse):
     nodes = diffuse.node_tree.nodes
-    glow = add_shader(diffuse, "ShaderNodeEmission", Color=colour((1, 1, 1)), Strength=2.0)
-    mirror = add_shader(diffuse, "ShaderNodeBsdfGlossy", Color=colour(GREEN), Roughness=0.0)
+    glow = add_shader(diffuse, "ShaderNodeEmission", Color=color((1, 1, 1)), Strength=2.0)
+    mirror = add_shader(diffuse, "ShaderNodeBsdfGlossy", Color=color(GREEN), Roughness=0.0)
     added = add_shader(diffuse, "ShaderNodeAddShader", (0, glow), (1, mirror))
     mixed = add_shader(diffuse, "ShaderNodeMixShader", (1, nodes["Shader"]), (2, added))
     mixed.inputs[0].default_value = 0.25
     show(diffuse, mixed)
     assert exactly(diffuse) == sum_of(
-        diffuse=Colour((0.375, 0.1875, 0.09375)), emission=Colour((0.5,) * 3), mirror=Colour((0.0, 0.25, 0.125))
+        diffuse=Color((0.375, 0.1875, 0.09375)), emission=Color((0.5,) * 3), mirror=Color((0.0, 0.25, 0.125))
     )
     both = add_shader(diffuse, "ShaderNodeAddShader", (0, mixed), (1, nodes["Shader"]))
     show(diffuse, both)
-    assert exactly(diffuse).surface["first"]["second"]["color"] == Colour((0.875, 0.4375, 0.21875)), "two of a kind add up"
+    assert exactly(diffuse).surface["first"]["second"]["color"] == Color((0.875, 0.4375, 0.21875)), "two of a kind add up"
 
 
 @pytest.mark.parametrize(("factor", "left"), [(0.0, "first"), (-1.0, "first"), (1.0, "second"), (7.0, "second")])
@@ -386,12 +382,12 @@ def test_what_has_no_weight_in_a_mixture_is_not_looked_at(diffuse, factor, left)
     mixed = add_shader(diffuse, "ShaderNodeMixShader", *enumerate(pair if left == "first" else pair[::-1], start=1))
     mixed.inputs[0].default_value = factor
     show(diffuse, mixed)
-    assert exactly(diffuse) == sum_of(diffuse=Colour(RED))
+    assert exactly(diffuse) == sum_of(diffuse=Color(RED))
 
 
 @pytest.mark.parametrize(("socket", "weight"), [("Coat Roughness", "Coat Weight"), ("Sheen Tint", "Sheen Weight")])
 def test_what_makes_an_input_that_does_not_count_is_not_followed(make_material, socket, weight):
-    material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED))
+    material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=color(RED))
     link(material, "ShaderNodeAmbientOcclusion", 0, socket)
     exactly(material)
     material.node_tree.nodes["Shader"].inputs[weight].default_value = 0.5
@@ -399,33 +395,33 @@ def test_what_makes_an_input_that_does_not_count_is_not_followed(make_material, 
 
 
 @pytest.mark.parametrize("kind", ["AmbientOcclusion", "TexGabor", "RadialTiling", "TexSky", "Bevel"])
-def test_a_texture_that_is_not_modelled_leaves_the_color_of_the_viewport_and_is_named(diffuse, kind):
+def test_a_texture_that_is_not_modeled_leaves_the_color_of_the_viewport_and_is_named(diffuse, kind):
     if not hasattr(bpy.types, f"ShaderNode{kind}"):
         pytest.skip(f"Blender {bpy.app.version_string} has no {kind}")
     diffuse.diffuse_color = (*RED, 1.0)
     link(diffuse, f"ShaderNode{kind}", 0, "Color")
-    assert approximately(diffuse, "not modeled") == sum_of(diffuse=Colour(RED))
+    assert approximately(diffuse, "not modeled") == sum_of(diffuse=Color(RED))
 
 
-def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
+def test_a_factor_that_is_not_modeled_is_a_half(diffuse):
     mixed = add_shader(diffuse, "ShaderNodeMixShader", (1, diffuse.node_tree.nodes["Shader"]))
     mixed.name = "Blend"
     link(diffuse, "ShaderNodeAmbientOcclusion", 0, 0, "Blend")
     show(diffuse, mixed)
     (closure,) = approximately(diffuse, "'Ambient Occlusion'", "not modeled").closures
-    assert closure.node["color"] == Colour(tuple(value / 2 for value in RED)) and not closure.factors
+    assert closure.node["color"] == Color(tuple(value / 2 for value in RED)) and not closure.factors
 
 
-def test_other_shaders_are_lamberts_of_their_colour(make_material):
-    toon = make_material("t", "ShaderNodeBsdfToon", Color=colour(RED))
-    assert approximately(toon, "'Shader'", "not modeled") == sum_of(diffuse=Colour(RED))
+def test_other_shaders_are_lamberts_of_their_color(make_material):
+    toon = make_material("t", "ShaderNodeBsdfToon", Color=color(RED))
+    assert approximately(toon, "'Shader'", "not modeled") == sum_of(diffuse=Color(RED))
 
 
-def test_what_has_no_colour_has_the_viewports(make_material):
+def test_what_has_no_color_has_the_viewports(make_material):
     unknown = make_material("s", "ShaderNodeBsdfDiffuse")
     link(unknown, "ShaderNodeAmbientOcclusion", 0, "Color").name = "Wires"
-    unknown.diffuse_color = colour(GREEN)
-    assert approximately(unknown, "'Wires'", "not modeled") == sum_of(diffuse=Colour(GREEN))
+    unknown.diffuse_color = color(GREEN)
+    assert approximately(unknown, "'Wires'", "not modeled") == sum_of(diffuse=Color(GREEN))
 
 
 def test_constant_nodes_reroutes_muted_nodes_and_groups_are_looked_through(diffuse):
@@ -442,20 +438,20 @@ def test_constant_nodes_reroutes_muted_nodes_and_groups_are_looked_through(diffu
     node.node_tree = group
     node.inputs["Power"].default_value = 2.0
     rgb, reroute = tree.nodes.new("ShaderNodeRGB"), tree.nodes.new("NodeReroute")
-    rgb.outputs[0].default_value = colour(RED)
+    rgb.outputs[0].default_value = color(RED)
     muted = tree.nodes.new("ShaderNodeInvert")
     muted.mute = True
     tree.links.new(rgb.outputs[0], muted.inputs["Color"])
     tree.links.new(muted.outputs[0], reroute.inputs[0])
     tree.links.new(reroute.outputs[0], node.inputs["Tint"])
     show(diffuse, node)
-    assert exactly(diffuse) == sum_of(emission=Colour((1.0, 0.5, 0.25)))
+    assert exactly(diffuse) == sum_of(emission=Color((1.0, 0.5, 0.25)))
 
 
-def test_a_value_is_a_grey_and_a_colour_has_a_luminance(make_material):
+def test_a_value_is_a_gray_and_a_color_has_a_luminance(make_material):
     material = make_material("e", "ShaderNodeEmission")
     link(material, "ShaderNodeValue", 0, "Color").outputs[0].default_value = 0.5
-    link(material, "ShaderNodeRGB", 0, "Strength").outputs[0].default_value = colour((0.0, 1.0, 0.0))
+    link(material, "ShaderNodeRGB", 0, "Strength").outputs[0].default_value = color((0.0, 1.0, 0.0))
     assert exactly(material).surface["color"].rgb == pytest.approx((0.5 * 0.7151687,) * 3)
 
 
@@ -466,12 +462,12 @@ def image(fresh_blender):
     return block
 
 
-def test_an_image_and_the_meshs_colours_are_factors(diffuse, image):
+def test_an_image_and_the_meshs_colors_are_factors(diffuse, image):
     texture = link(diffuse, "ShaderNodeTexImage", 0, "Color")
     texture.image, texture.interpolation = image, "Closest"
-    assert exactly(diffuse) == sum_of(diffuse=Colour((1.0, 1.0, 1.0), "Checks", closest=True))
+    assert exactly(diffuse) == sum_of(diffuse=Color((1.0, 1.0, 1.0), "Checks", closest=True))
     link(diffuse, "ShaderNodeVertexColor", 0, "Color")
-    assert exactly(diffuse) == sum_of(diffuse=Colour((1.0, 1.0, 1.0), vertex=True))
+    assert exactly(diffuse) == sum_of(diffuse=Color((1.0, 1.0, 1.0), vertex=True))
 
 
 @pytest.mark.parametrize(
@@ -504,25 +500,25 @@ def test_an_image_is_laid_out_by_what_the_mesh_has(diffuse, image):
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e30])
-def test_colours_that_light_can_not_have_are_named(diffuse, value):
+def test_colors_that_light_can_not_have_are_named(diffuse, value):
     diffuse.node_tree.nodes["Shader"].inputs["Color"].default_value = (value, 0.5, 0.5, 1)
     approximately(diffuse, "'Shader'", "Color")
 
 
-def test_without_nodes_or_without_an_output_the_viewports_colour_counts(diffuse):
-    diffuse.diffuse_color = colour(GREEN)
+def test_without_nodes_or_without_an_output_the_viewports_color_counts(diffuse):
+    diffuse.diffuse_color = color(GREEN)
     diffuse.node_tree.nodes.remove(diffuse.node_tree.nodes["Output"])
-    assert shaders.read(diffuse).material == sum_of(diffuse=Colour(GREEN))
+    assert shaders.read(diffuse).material == sum_of(diffuse=Color(GREEN))
 
 
 def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image):
-    """What Cycles is shown is what the tracer is given, or the shader below would be another."""
+    """Cycles is shown the nodes that the tracer has, or the shader below would be another."""
     material = sum_of(
-        diffuse=Colour(RED),
-        emission=Colour((1.0, 2.0, 3.0)),
-        mirror=Colour(GREEN),
-        glass=Colour((1.0, 1.0, 1.0)),
-        refraction=Colour(RED),
+        diffuse=Color(RED),
+        emission=Color((1.0, 2.0, 3.0)),
+        mirror=Color(GREEN),
+        glass=Color((1.0, 1.0, 1.0)),
+        refraction=Color(RED),
         ior=1.25,
     )
     before = [node.name for node in diffuse.node_tree.nodes]
@@ -530,14 +526,14 @@ def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image
         materials.stand_in(overrides, diffuse, shaders.Reading(material))
         assert exactly(diffuse) == material
     assert [node.name for node in diffuse.node_tree.nodes] == before
-    assert exactly(diffuse) == sum_of(diffuse=Colour(RED))
+    assert exactly(diffuse) == sum_of(diffuse=Color(RED))
 
 
-def test_products_of_colours_are_read_as_what_they_stand_for(diffuse, image):
+def test_products_of_colors_are_read_as_what_they_stand_for(diffuse, image):
     material = sum_of(
-        diffuse=Colour((0.5, 0.25, 0.0), image.name_full, closest=True, vertex=True),
-        emission=Colour((4.0, 2.0, 1.0), vertex=True),
-        mirror=Colour((0.5, 0.5, 0.5), image.name_full),
+        diffuse=Color((0.5, 0.25, 0.0), image.name_full, closest=True, vertex=True),
+        emission=Color((4.0, 2.0, 1.0), vertex=True),
+        mirror=Color((0.5, 0.5, 0.5), image.name_full),
     )
     with overridden() as overrides:
         materials.stand_in(overrides, diffuse, shaders.Reading(material, {image.name_full: image}))

@@ -54,7 +54,7 @@ def test_the_view_layers_own_world_counts(set_world, scene, export):
 
 
 @pytest.mark.skipif(bpy.app.version >= (5, 0), reason="since 5.0 nodes always count")
-def test_a_world_without_nodes_has_its_plain_colour(set_world, export):
+def test_a_world_without_nodes_has_its_plain_color(set_world, export):
     world = set_world()
     world.use_nodes, world.color = False, (0.25, 0.5, 1.0)
     exported, reasons = export()
@@ -124,7 +124,7 @@ def test_what_the_camera_sees_may_be_another_world_than_what_lights(sky, export)
 
 
 @pytest.mark.parametrize("kind", ["ShaderNodeMix", "ShaderNodeMixRGB"])
-def test_so_may_its_colour_and_its_strength(set_world, export, kind):
+def test_so_may_its_color_and_its_strength(set_world, export, kind):
     world = set_world()
     tree, background = world.node_tree, background_of(world)
     color = ask_for_camera(tree, kind, "Color", (1.0, 0.5, 0.25, 1.0), (0.0, 0.0, 1.0, 1.0))
@@ -159,7 +159,7 @@ def test_an_image_that_is_missing_is_the_magenta_that_cycles_shows(set_world, ex
 
 
 def test_cycles_is_shown_a_constant_world_where_the_image_is_missing(set_world):
-    """Where it sampled it as light, it had some that scattered rays lose."""
+    """Sampled as light, it would give some that scattered rays lose."""
     world = set_world(strength=2.0)
     texture = world.node_tree.nodes.new("ShaderNodeTexEnvironment")
     world.node_tree.links.new(texture.outputs["Color"], background_of(world).inputs["Color"])
@@ -207,7 +207,7 @@ def test_film_and_bounces_are_the_scenes(scene, export):
     assert exported.bounces == Bounces(7, 3, 2, 5) and not reasons
 
 
-def test_every_filter_of_cycles_is_modelled(scene, export):
+def test_every_filter_of_cycles_is_modeled(scene, export):
     for each in type(scene.cycles).bl_rna.properties["pixel_filter_type"].enum_items:
         scene.cycles.pixel_filter_type = each.identifier
         exported, reasons = export()

@@ -48,7 +48,7 @@ def other_blender_fails(request, monkeypatch):
 
 @pytest.fixture
 def tree(set_world):
-    """The nodes of a world, and add(kind, **properties) that adds one; colour(socket) makes that its color."""
+    """The nodes of a world, and add(kind, **properties) that adds one; color(socket) makes that its color."""
     nodes = set_world().node_tree
 
     class Tree:
@@ -63,7 +63,7 @@ def tree(set_world):
         def link(self, output, socket):
             nodes.links.new(output, socket)
 
-        def colour(self, output):
+        def color(self, output):
             nodes.links.new(output, self.background.inputs["Color"])
 
     return Tree()
@@ -85,13 +85,13 @@ def directions(width):
 
 
 def test_each_pixel_is_what_the_world_shows_in_the_middle_of_its_directions(tree, export):
-    tree.colour(shifted_direction(tree))
+    tree.color(shifted_direction(tree))
     exported, reasons = export()
     pixels = exported.images[exported.world.image].pixels
     assert exported.world.radiance == (1, 1, 1) and exported.world.backdrop is None and not exported.lamps
     assert np.abs(pixels - directions(64) - 2).max() < 1e-6  # float32, and 3e-6 of a pixel
     assert "both sides show an image of it, 64 × 32 pixels, that Cycles renders" in reasons
-    assert not exported.not_modelled
+    assert not exported.not_modeled
 
 
 def test_a_camera_that_sees_another_world_is_shown_another_image(tree, export):
@@ -99,7 +99,7 @@ def test_a_camera_that_sees_another_world_is_shown_another_image(tree, export):
     tree.link(tree.add("ShaderNodeLightPath").outputs["Is Camera Ray"], add.inputs[0])
     tree.link(shifted_direction(tree), add.inputs[1])
     add.inputs[2].default_value = (1, 2, 3, 1)
-    tree.colour(add.outputs[0])
+    tree.color(add.outputs[0])
     exported, _ = export()
     lights, seen = (exported.images[each.image].pixels for each in (exported.world, exported.world.backdrop))
     assert np.abs(lights - directions(64) - 2).max() < 1e-6
@@ -110,7 +110,7 @@ def test_a_world_that_tells_other_rays_apart_is_what_diffuse_ones_see_and_is_nam
     mix = tree.add("ShaderNodeMixRGB")
     tree.link(tree.add("ShaderNodeLightPath").outputs["Is Diffuse Ray"], mix.inputs[0])
     mix.inputs[1].default_value, mix.inputs[2].default_value = (0, 0, 1, 1), (0.5, 0, 0, 1)
-    tree.colour(mix.outputs[0])
+    tree.color(mix.outputs[0])
     exported, reasons = export()
     lights, seen = (exported.images[each.image].pixels for each in (exported.world, exported.world.backdrop))
     assert (lights == (0.5, 0, 0)).all() and (seen == (0, 0, 1)).all()
@@ -119,7 +119,7 @@ def test_a_world_that_tells_other_rays_apart_is_what_diffuse_ones_see_and_is_nam
 
 def test_the_sun_of_a_sky_is_a_lamp_of_its_direction_and_size(tree, export):
     sky = tree.add("ShaderNodeTexSky", sky_type=WITH_SUN, sun_elevation=0.5, sun_rotation=1.0, sun_size=0.02)
-    tree.colour(sky.outputs[0])
+    tree.color(sky.outputs[0])
     exported, reasons = export()
     (sun,) = exported.lamps
     stated = (math.cos(0.5) * math.sin(1.0), math.cos(0.5) * math.cos(1.0), math.sin(0.5))
@@ -133,7 +133,7 @@ def test_the_sun_of_a_sky_is_a_lamp_of_its_direction_and_size(tree, export):
 
 def test_the_light_of_a_sun_goes_with_what_is_done_to_the_sky(tree, export):
     sky = tree.add("ShaderNodeTexSky", sky_type=WITH_SUN, sun_elevation=0.5)
-    tree.colour(sky.outputs[0])
+    tree.color(sky.outputs[0])
     (sun,) = export()[0].lamps
     tree.background.inputs["Strength"].default_value = 0.25
     sky.sun_size *= 2  # as much light, from a larger disc
@@ -146,7 +146,7 @@ def test_links_that_go_in_a_circle_are_none(tree, export):
     for node, number in ((first, 0.25), (second, 0.5)):
         node.inputs[0].default_value, node.inputs[1].default_value = number, 0.125
     tree.link(first.outputs[0], second.inputs[0])
-    tree.colour(second.outputs[0])
+    tree.color(second.outputs[0])
     tree.link(second.outputs[0], first.inputs[0])
     exported, reasons = export()
     assert (exported.images[exported.world.image].pixels == 0.5).all()
@@ -155,7 +155,7 @@ def test_links_that_go_in_a_circle_are_none(tree, export):
 
 def test_neither_export_nor_render_changes_what_is_open(tree, export, scene, tmp_path):
     sky = tree.add("ShaderNodeTexSky", sky_type=WITH_SUN)
-    tree.colour(sky.outputs[0])
+    tree.color(sky.outputs[0])
     kinds = ("worlds", "objects", "lights", "scenes", "cameras", "libraries")
 
     def state():
@@ -172,14 +172,14 @@ def test_neither_export_nor_render_changes_what_is_open(tree, export, scene, tmp
 
 
 def test_a_transparent_film_shows_no_sun(tree, export, scene):
-    tree.colour(tree.add("ShaderNodeTexSky", sky_type=WITH_SUN).outputs[0])
+    tree.color(tree.add("ShaderNodeTexSky", sky_type=WITH_SUN).outputs[0])
     scene.render.film_transparent = True
     assert [lamp.hidden_from for lamp in export()[0].lamps] == [{"camera"}]
 
 
 @pytest.mark.usefixtures("other_blender_fails")
 def test_where_no_other_blender_renders_it_a_constant_world_stands_in(tree, export):
-    tree.colour(tree.add("ShaderNodeTexSky").outputs[0])
+    tree.color(tree.add("ShaderNodeTexSky").outputs[0])
     exported, reasons = export()
     assert exported.world.image is None and "can't be rendered by another Blender" in reasons and "constant" in reasons
 
@@ -190,23 +190,23 @@ def test_what_an_image_cannot_stand_in_for_is_named(tree, export, obstacle, monk
     if obstacle == "a script":
         node = tree.add("ShaderNodeScript", script=bpy.data.texts.new("shader.osl"))
         node.outputs.new("NodeSocketColor", "Color")
-        tree.colour(node.outputs[0])
+        tree.color(node.outputs[0])
     elif obstacle == "painted pixels":
         node = tree.add("ShaderNodeTexEnvironment", projection="MIRROR_BALL")
         node.image = bpy.data.images.new("Painted", 4, 2)
         node.image.pixels[0] = 0.5
-        tree.colour(node.outputs[0])
+        tree.color(node.outputs[0])
     else:
-        tree.colour(shifted_direction(tree, "Camera"))
+        tree.color(shifted_direction(tree, "Camera"))
     exported, reasons = export()
     assert exported.world.image is None and "that more than a direction and the file decides" in reasons
 
 
 @pytest.mark.parametrize("kind", ["PREETHAM", "HOSEK_WILKIE", WITH_SUN])
 def test_cycles_shows_the_same_image_and_nearly_the_sky_itself(tree, camera_object, scene, read_passes, tmp_path, kind):
-    """Of a sky between two pixels the image is off by what it is curved there; the mean tells what a surface is lit by."""
+    """The image differs from the sky between two pixels by its curvature there; the mean tells what a surface is lit by."""
     sky = tree.add("ShaderNodeTexSky", sky_type=kind, sun_disc=False)
-    tree.colour(sky.outputs[0])
+    tree.color(sky.outputs[0])
     scene.render.resolution_x, scene.render.resolution_y = 64, 48
     camera_object.rotation_euler, camera_object.data.lens = (math.radians(115), 0, 0.3), 25
     exported = jobs.both_sides(Job(level="direct", samples=1), [tmp_path / "image.exr"])
@@ -232,7 +232,7 @@ def test_each_of_many_renders_shows_the_camera_its_own_image(tree, camera_object
     tree.link(tree.add("ShaderNodeLightPath").outputs["Is Camera Ray"], add.inputs[0])
     tree.link(shifted_direction(tree), add.inputs[1])
     add.inputs[2].default_value = (5, 5, 5, 1)
-    tree.colour(add.outputs[0])
+    tree.color(add.outputs[0])
     addresses = []
 
     def watched(*arguments, **how):

@@ -5,7 +5,7 @@ import pytest
 from core_probes import ScatteredBy
 
 from viewcam_addon.tracer.native import constant_value
-from viewcam_addon.tracer.scene.materials import Colour
+from viewcam_addon.tracer.scene.materials import Color
 from viewcam_addon.tracer.scene.shader_nodes import KINDS, node
 
 WHITE = (1.0, 1.0, 1.0)
@@ -118,7 +118,7 @@ def test_a_white_furnace_stays_white(name, roughness, degrees, behind):
 
 @pytest.mark.parametrize("name", ["ggx", "stretched", "velvet", "beckmann", "metal", "conductor", "lambert", "oren-nayar"])
 def test_light_goes_both_ways_alike(name):
-    """Of what is scattered more than once it does not, as in Cycles."""
+    """Light that is scattered more than once does not, as in Cycles."""
     shader = ROUGH[name]
     if shader.type == "metallic":
         shader = node("metallic", **dict(shader.inputs) | {"distribution": "ggx"})
@@ -136,14 +136,14 @@ def test_light_goes_both_ways_alike(name):
 
 
 def test_inputs_that_vary_are_numbers_by_their_luminance():
-    assert Colour((0.0, 1.0, 0.0), vertex=True).varies and not Colour(WHITE).varies
+    assert Color((0.0, 1.0, 0.0), vertex=True).varies and not Color(WHITE).varies
 
 
-def test_a_constant_colour_is_a_number_by_its_luminance():
+def test_a_constant_color_is_a_number_by_its_luminance():
     """Also where a node has made it, which is then a constant itself."""
     luminance = np.dot((0.2126390, 0.7151687, 0.0721923), (0.5, 0.25, 1.0))
-    for colour in ((0.5, 0.25, 1.0), node("gamma", color=(0.5, 0.25, 1.0))):
-        assert constant_value(node("math", operation="add", a=colour, b=0.0))[1] == pytest.approx(luminance, rel=1e-12)
+    for color in ((0.5, 0.25, 1.0), node("gamma", color=(0.5, 0.25, 1.0))):
+        assert constant_value(node("math", operation="add", a=color, b=0.0))[1] == pytest.approx(luminance, rel=1e-12)
 
 
 @pytest.mark.parametrize("version", [402, 502])

@@ -7,7 +7,7 @@ from core_probes import ScatteredBy
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
-from viewcam_addon.tracer.scene.colours import RGBE
+from viewcam_addon.tracer.scene.colors import RGBE
 from viewcam_addon.tracer.scene.film import Film
 from viewcam_addon.tracer.scene.lamps import World
 from viewcam_addon.tracer.scene.materials import Material, Picture

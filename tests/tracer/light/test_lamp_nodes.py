@@ -11,7 +11,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import ies, scene_file
 from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun
-from viewcam_addon.tracer.scene.materials import Colour, Material, Picture, sum_of
+from viewcam_addon.tracer.scene.materials import Color, Material, Picture, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 DOWN = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 32, 24)
@@ -36,7 +36,7 @@ def ies_text(across, up, values, kind=1, factor=1.0):
 
 
 def lambert(albedo) -> Material:
-    return sum_of(diffuse=Colour((albedo,) * 3))
+    return sum_of(diffuse=Color((albedo,) * 3))
 
 
 def square(make_mesh, half=1.0):
@@ -114,7 +114,7 @@ def test_a_table_of_one_candela_is_a_plain_lamp(floor, kind, across, up):
 
 
 def test_between_the_angles_of_a_table_light_goes_on_as_it_grows(floor):
-    """Where three steps are even, Catmull's and Rom's cubics are straight; the floor is seen below 32°."""
+    """Catmull's and Rom's cubics are straight over three even steps; the floor is seen below 32°."""
     up = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 90.0]
     rendered, _, cosine = floor(replace(LAMP, emission=node("ies", text=ies_text([0.0], up, [angle + 10.0 for angle in up]))))
     plain, *_ = floor(replace(LAMP, power=(POWER / CANDELA,) * 3))
@@ -160,16 +160,16 @@ def test_a_panel_shows_what_lights(make_mesh, make_lit):
     assert not row[:middle].any()
 
 
-def test_a_lamp_that_nodes_colour_everywhere_alike_is_that_coloured_lamp(floor):
+def test_a_lamp_that_nodes_color_everywhere_alike_is_that_colored_lamp(floor):
     warm = node("blackbody", temperature=2500.0)
-    coloured, *_ = floor(replace(LAMP, emission=node("mix_color", factor=1.0, a=warm, b=(0.5, 0.0, 0.0))))
+    colored, *_ = floor(replace(LAMP, emission=node("mix_color", factor=1.0, a=warm, b=(0.5, 0.0, 0.0))))
     plain, *_ = floor(replace(LAMP, power=(POWER / 2, 0.0, 0.0)))
-    assert (coloured == plain).all()
+    assert (colored == plain).all()
 
 
 @pytest.mark.parametrize("count", [2, 6])
 def test_lamps_with_nodes_light_what_each_does(floor, count):
-    """Of few lamps each is asked, of more one by chance, whose nodes are no part of the choice."""
+    """Each of few lamps is sampled, and of more one by chance, whose nodes are no part of the choice."""
     lamps = [replace(LAMP, name=str(number), emission=(WAY, SQUARED)[number % 2]) for number in range(count)]
     rendered = floor(*lamps, samples=1 if count == 2 else 256)[0]
     alone = count // 2 * (floor(lamps[0])[0] + floor(lamps[1])[0])
@@ -180,7 +180,7 @@ def test_lamps_with_nodes_light_what_each_does(floor, count):
 
 
 def test_a_file_gives_back_a_lamps_nodes_and_a_displacement(make_mesh, make_lit, tmp_path):
-    image = node("image", image=Colour((1, 1, 1), "gobo"), vector=node("geometry"))
+    image = node("image", image=Color((1, 1, 1), "gobo"), vector=node("geometry"))
     text = ies_text([0.0], [0.0, 90.0], [3.0, 1.0])
     lamps = (
         replace(LAMP, emission=WAY),
@@ -220,7 +220,7 @@ def test_what_is_none_is_refused_in_a_sentence(make, words):
 
 
 def test_a_lamp_names_an_image_of_the_scene(make_mesh, make_lit):
-    gobo = replace(LAMP, emission=node("image", image=Colour((1, 1, 1), "gobo")))
+    gobo = replace(LAMP, emission=node("image", image=Color((1, 1, 1), "gobo")))
     with pytest.raises(InputError, match="emission of light 'lamp' names the image 'gobo'"):
         make_lit(DOWN, (square(make_mesh), lambert(1.0)), lamps=(gobo,))
 

@@ -12,14 +12,14 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import Tracer, render
 from viewcam_addon.tracer.scene.film import Film
 from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, Material, sum_of
+from viewcam_addon.tracer.scene.materials import Color, Material, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 pytestmark = pytest.mark.slow
 
 # Looks at a square meter of floor, so far off that its pixels are alike; lamps stand beside its view.
 CAMERA = Pinhole((0, 0, 100), (0, 0, 0), (0, 1, 0), 6400, 64, 64)
-WHITE, MIRROR = sum_of(diffuse=Colour((1.0, 1.0, 1.0))), sum_of(mirror=Colour((1.0, 1.0, 1.0)))
+WHITE, MIRROR = sum_of(diffuse=Color((1.0, 1.0, 1.0))), sum_of(mirror=Color((1.0, 1.0, 1.0)))
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def above(number, random_matrix):
 def test_many_lamps_of_all_kinds_give_the_sum_of_what_each_gives(make_lit, floor, make_mesh, random_matrix, shader):
     """Whichever half of a tree is asked, from before and behind, and weighted against scattered rays where these find lamps."""
     square = make_mesh([(2, -1, 1), (2, 1, 1), (2, 1, 3), (2, -1, 3)], [(0, 2, 1), (0, 3, 2)])
-    shining, dark = (square, sum_of(emission=Colour((2.0,) * 3))), (square, sum_of(diffuse=Colour((0.0,) * 3)))
+    shining, dark = (square, sum_of(emission=Color((2.0,) * 3))), (square, sum_of(diffuse=Color((0.0,) * 3)))
     lamps = [above(number, random_matrix) for number in range(60)]
 
     def measure(*lamps, samples, thing=dark):
@@ -100,7 +100,7 @@ def test_many_lamps_of_all_kinds_give_the_sum_of_what_each_gives(make_lit, floor
 
 
 def test_the_one_of_many_lamps_that_is_near_is_asked_by_what_it_brings(lit):
-    """Of 64 lamps all but one are 100 m away: asked one time in 64, the noise of the near one would be 8
+    """One of 64 lamps is near, the others 100 m away: sampled one time in 64, the noise of the near one would be 8
     times the mean; it is 0.67 of it."""
     far = [Point(f"far {i}", position=(100 * np.cos(i), 100 * np.sin(i), 10), power=(10.0,) * 3) for i in range(63)]
     mean, error = lit(*far, Point("near", position=(3, 0, 3), power=(10.0,) * 3), samples=16)
@@ -157,11 +157,11 @@ def test_a_coated_surface_beside_a_lamp_and_a_sky_has_the_sum_of_both(make_lit, 
 def test_shining_surfaces_beside_lamps_are_found_as_often_as_it_takes(lit, make_mesh):
     """Both ways of finding them, weighted, and the choice among them and a lamp."""
     square = make_mesh([(2, -1, 1), (2, 1, 1), (2, 1, 3), (2, -1, 3)], [(0, 2, 1), (0, 3, 2)])
-    glow = ((square, sum_of(emission=Colour((5.0,) * 3))),)
+    glow = ((square, sum_of(emission=Color((5.0,) * 3))),)
     lamp = Point("point", position=(-3, 0, 3), power=(50.0,) * 3)
-    (first, one), (second, two) = lit(lamp), lit(things=glow, samples=256)
+    (first, first_error), (second, two) = lit(lamp), lit(things=glow, samples=256)
     mean, error = lit(lamp, things=glow, samples=64)
-    assert error < 0.02 * mean and abs(mean - first - second) <= 4 * np.sqrt(one**2 + two**2 + error**2)
+    assert error < 0.02 * mean and abs(mean - first - second) <= 4 * np.sqrt(first_error**2 + two**2 + error**2)
 
 
 @pytest.mark.parametrize("kind", ["camera", "diffuse", "glossy", "transmission"])
@@ -174,8 +174,8 @@ def test_what_a_lamp_hides_from_it_does_not_light_and_is_not_seen_by(make_lit, f
     views = {
         "camera": (up, ()),
         "diffuse": (CAMERA, ((floor, WHITE),)),
-        "glossy": (CAMERA, ((floor, sum_of(mirror=Colour((1.0,) * 3))),)),
-        "transmission": (up, ((pane, sum_of(refraction=Colour((1.0,) * 3))),)),
+        "glossy": (CAMERA, ((floor, sum_of(mirror=Color((1.0,) * 3))),)),
+        "transmission": (up, ((pane, sum_of(refraction=Color((1.0,) * 3))),)),
     }
     for hidden in (frozenset(), frozenset({kind})):
         lamp = Area("area", matrix=matrix, size=(900, 900), power=(1e6,) * 3, hidden_from=hidden)

@@ -11,22 +11,22 @@ from viewcam_addon.tracer.render import Keeper, render
 from viewcam_addon.tracer.scene import Scene
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import MOST_LINKS, Area, Point, Sun
-from viewcam_addon.tracer.scene.materials import Colour, Material, sum_of
+from viewcam_addon.tracer.scene.materials import Color, Material, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import Node
 
 DOWN = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 32, 24)
 UP = Pinhole((0, 0, 4), (0, 0, 8), (0, 1, 0), 40, 32, 24)
 LEFT, RIGHT, LIGHT, SCREEN = "object 0", "object 1", "object 2", "object 3"
-WHITE = sum_of(diffuse=Colour((1.0, 1.0, 1.0)))
-BLACK = sum_of(diffuse=Colour((0.0, 0.0, 0.0)))
-CHROME = sum_of(mirror=Colour((1.0, 1.0, 1.0)))
-SATIN = Material(surface=Node("glossy", (("color", Colour((1.0, 1.0, 1.0))), ("roughness", 0.5))))
-PANE = Material(surface=Node("transparent", (("color", Colour((0.5, 0.5, 0.5))),)))
+WHITE = sum_of(diffuse=Color((1.0, 1.0, 1.0)))
+BLACK = sum_of(diffuse=Color((0.0, 0.0, 0.0)))
+CHROME = sum_of(mirror=Color((1.0, 1.0, 1.0)))
+SATIN = Material(surface=Node("glossy", (("color", Color((1.0, 1.0, 1.0))), ("roughness", 0.5))))
+PANE = Material(surface=Node("transparent", (("color", Color((0.5, 0.5, 0.5))),)))
 ROUNDING = 2e-7  # of float32, in which pictures are; the sums of float64 differ by their order alone
 
 
 def glow(strength):
-    return sum_of(emission=Colour((strength,) * 3))
+    return sum_of(emission=Color((strength,) * 3))
 
 
 @pytest.fixture

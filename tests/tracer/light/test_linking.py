@@ -9,13 +9,13 @@ from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import Keeper, render
 from viewcam_addon.tracer.scene.lamps import MOST_LINKS, Point, Sun
-from viewcam_addon.tracer.scene.materials import Colour, sum_of
+from viewcam_addon.tracer.scene.materials import Color, sum_of
 
 DOWN = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 32, 24)
 OVERHEAD = Sun("sun", towards=(0, 0, 1), irradiance=(3, 2, 1))
 LEFT, RIGHT, SCREEN = "object 0", "object 1", "object 2"
-WHITE = sum_of(diffuse=Colour((1.0, 1.0, 1.0)))
-BLACK = sum_of(diffuse=Colour((0.0, 0.0, 0.0)))
+WHITE = sum_of(diffuse=Color((1.0, 1.0, 1.0)))
+BLACK = sum_of(diffuse=Color((0.0, 0.0, 0.0)))
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def test_the_eye_sees_a_lamp_and_a_mirror_that_it_does_not_light_shows_none(make
     """A ball of light behind the eye, in a mirror below it."""
     mirror = make_mesh([[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]], [[0, 1, 2], [0, 2, 3]])
     lamp = Point("lamp", position=(0, 0, 8), power=(9, 9, 9), radius=2.0)
-    chrome = sum_of(mirror=Colour((1.0, 1.0, 1.0)))
+    chrome = sum_of(mirror=Color((1.0, 1.0, 1.0)))
 
     def most(camera, lamp):
         scene = make_lit(camera, (mirror, chrome), lamps=(lamp,))

@@ -13,7 +13,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene.film import Bounces, Film
 from viewcam_addon.tracer.scene.lamps import Area, Point, Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, Material, sum_of
+from viewcam_addon.tracer.scene.materials import Color, Material, sum_of
 
 FLOAT32 = 2.0**-24
 # A picture is a mean of float64, rounded once; smooth normals are float32, and what only visibility sees.
@@ -24,11 +24,11 @@ SUN = Sun("sun", towards=(1, -2, 3), irradiance=(3, 2, 1))
 
 
 def lambert(*albedo) -> Material:
-    return sum_of(diffuse=Colour(albedo if len(albedo) == 3 else albedo * 3))
+    return sum_of(diffuse=Color(albedo if len(albedo) == 3 else albedo * 3))
 
 
 def glow(*radiance) -> Material:
-    return sum_of(emission=Colour(radiance if len(radiance) == 3 else radiance * 3))
+    return sum_of(emission=Color(radiance if len(radiance) == 3 else radiance * 3))
 
 
 def square(make_mesh, half=1.0, height=0.0, x=0.0, y=0.0, up=True):
@@ -75,7 +75,7 @@ def test_suns_and_a_much_darker_sky_add_up(make_mesh, make_lit, count, level):
 
 def furnace(make_mesh, make_lit, albedo, bounces, samples=64):
     camera = Pinhole((0.3, -0.2, 0.1), (1, 0.5, 0.7), (0, 0, 1), 20, 32, 24)
-    material = sum_of(diffuse=Colour((albedo,) * 3), emission=Colour((1.0,) * 3))
+    material = sum_of(diffuse=Color((albedo,) * 3), emission=Color((1.0,) * 3))
     return render(make_lit(camera, (box(make_mesh), material), bounces=bounces), "path", samples, threads=1)
 
 
@@ -125,7 +125,7 @@ def test_the_world_is_hidden_by_what_diffuse_rays_see_and_not_by_what_shadow_ray
 
 
 def test_a_smooth_ball_in_a_white_world_loses_what_its_normals_send_into_it(ball, make_lit):
-    """Of the cosine lobe about N_s the part beyond the plane of N_g is (1 − N_s·N_g)/2; of a convex ball nothing else is."""
+    """The part of the cosine lobe about N_s beyond the plane of N_g is (1 − N_s·N_g)/2; a convex ball loses nothing else."""
     camera = Pinhole((0, -4, 1), (0, 0, 0), (0, 0, 1), 60, 32, 24)
     scene = make_lit(camera, (ball(12), lambert(1)), world=World((1, 1, 1)))
     passes, seen = render(scene, "path", 256, threads=1), render(scene)
@@ -146,7 +146,7 @@ def test_clear_glass_in_a_white_world_can_not_be_seen(ball, make_mesh, make_sphe
     flat = type(flat)(flat.vertices, flat.triangles, flat.materials)
     without_end = Bounces(1024, 1024, 1024, 1024)
     for shape in (flat, box(make_mesh, 0.7), make_spheres([[0, 0, 0]], 1)):
-        for material in (sum_of(glass=Colour((1, 1, 1)), ior=1.5), sum_of(mirror=Colour((1, 1, 1)))):
+        for material in (sum_of(glass=Color((1, 1, 1)), ior=1.5), sum_of(mirror=Color((1, 1, 1)))):
             scene = make_lit(camera, (shape, material), world=World((1, 1, 1)), bounces=without_end)
             picture = render(scene, "path", 8, threads=1)["Combined"]
             assert np.abs(picture[..., :3] - 1).max() <= ROUNDED, f"{np.abs(picture[..., :3] - 1).max():.1e}"
@@ -304,21 +304,21 @@ def radiosity(patches, most):
     """
     steps = np.linspace(-1, 1, patches + 1)
     polygons, albedo, normals = [], [], []
-    for axis, sign, colour in WALLS.values():
+    for axis, sign, color in WALLS.values():
         for a in range(patches):
             for b in range(patches):
                 polygons.append(corners(axis, sign, (steps[a], steps[b]), (steps[a + 1], steps[b + 1])))
-                albedo.append(colour)
+                albedo.append(color)
                 normals.append(-sign * np.eye(3)[axis])
     polygons, albedo, normals = np.array(polygons), np.array(albedo), np.array(normals)
-    centres, walls = polygons.mean(axis=1), np.repeat(np.arange(6), patches**2)
+    centers, walls = polygons.mean(axis=1), np.repeat(np.arange(6), patches**2)
     between = np.zeros((len(walls), len(walls)))
     from_lamp = np.zeros(len(walls))
     for wall in range(6):
         here, there = walls == wall, walls != wall
-        between[np.ix_(here, there)] = form_factors(centres[here], normals[here], polygons[there])
+        between[np.ix_(here, there)] = form_factors(centers[here], normals[here], polygons[there])
         if wall != CEILING:
-            from_lamp[here] = form_factors(centres[here], normals[here], corners(2, 1, (-HALF, -HALF), (HALF, HALF))[None])[
+            from_lamp[here] = form_factors(centers[here], normals[here], corners(2, 1, (-HALF, -HALF), (HALF, HALF))[None])[
                 :, 0
             ]
     light = first = RADIANCE * from_lamp[:, None] * albedo
@@ -332,8 +332,8 @@ def radiosity(patches, most):
 def back_wall(make_mesh, make_lit, reflections, by_lamp=False, samples=256, seed=0, walls=WALLS, brightness=1.0):
     """The tracer's mean radiance of the back wall, and its standard error."""
     things = [
-        (make_mesh(corners(axis, sign, (-1, -1), (1, 1)), [[0, 1, 2], [0, 2, 3]]), sum_of(diffuse=Colour(colour)))
-        for axis, sign, colour in walls.values()
+        (make_mesh(corners(axis, sign, (-1, -1), (1, 1)), [[0, 1, 2], [0, 2, 3]]), sum_of(diffuse=Color(color)))
+        for axis, sign, color in walls.values()
     ]
     lamps, radiance = (), RADIANCE * brightness
     if by_lamp:
@@ -343,7 +343,7 @@ def back_wall(make_mesh, make_lit, reflections, by_lamp=False, samples=256, seed
         lamps = (Area("lamp", matrix=matrix, size=(2 * HALF, 2 * HALF), power=(power,) * 3),)
     else:  # part of the ceiling, which shines as well
         square = corners(2, 1, (-HALF, -HALF), (HALF, HALF)) - (0, 0, 1e-6)
-        material = sum_of(diffuse=Colour(walls["ceiling"][2]), emission=Colour((radiance,) * 3))
+        material = sum_of(diffuse=Color(walls["ceiling"][2]), emission=Color((radiance,) * 3))
         things.append((make_mesh(square, [[0, 1, 2], [0, 2, 3]]), material))
     scene = make_lit(CAMERA, *things, lamps=lamps, bounces=Bounces(reflections, 1024, 1024, 1024), film=Film(filter="BOX"))
     passes = render(scene, "path", samples, seed, threads=1)
@@ -386,5 +386,5 @@ def test_one_bounce_fewer_is_told(make_mesh, make_lit, known):
 
 
 def test_an_albedo_that_is_1_percent_off_is_told(make_mesh, make_lit, known):
-    darker = {name: (axis, sign, tuple(0.99 * value for value in colour)) for name, (axis, sign, colour) in WALLS.items()}
+    darker = {name: (axis, sign, tuple(0.99 * value for value in color)) for name, (axis, sign, color) in WALLS.items()}
     assert off(known, back_wall(make_mesh, make_lit, 3, by_lamp=True, walls=darker), 3)[0] > 1

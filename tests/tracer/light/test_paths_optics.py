@@ -7,7 +7,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import World
-from viewcam_addon.tracer.scene.materials import Colour, Material, sum_of
+from viewcam_addon.tracer.scene.materials import Color, Material, sum_of
 
 FLOAT32 = 2.0**-24
 WHITE = (1.0, 1.0, 1.0)
@@ -21,7 +21,7 @@ def rectangle(make_mesh, x, y, z):
 
 
 def glow(radiance) -> Material:
-    return sum_of(emission=Colour((radiance,) * 3))
+    return sum_of(emission=Color((radiance,) * 3))
 
 
 def fresnel_of_angles(angle, ior):
@@ -36,7 +36,7 @@ def test_a_mirror_shows_things_where_their_mirror_images_stand(make_mesh, make_l
     camera = Pinhole((0, -3, 2), (0, 0, 0), (0, 0, 1), 150, 160, 120)
     patch = rectangle(make_mesh, (-0.4, 0.3), (0.5, 1.1), 1.0)
     floor = rectangle(make_mesh, (-9, 9), (-9, 9), 0.0)
-    scene = make_lit(camera, (floor, sum_of(mirror=Colour((0.9, 0.6, 0.3)))), (patch, glow(2)))
+    scene = make_lit(camera, (floor, sum_of(mirror=Color((0.9, 0.6, 0.3)))), (patch, glow(2)))
     picture = render(scene, "direct", 1, threads=1)["Combined"][..., :3]
     image = make_lit(camera, (rectangle(make_mesh, (-0.4, 0.3), (0.5, 1.1), -1.0), glow(2)))
     seen = render(image)["Object Index"][..., 0] == 1
@@ -51,7 +51,7 @@ def test_refraction_shows_things_where_snell_says(make_mesh, make_lit):
     2 tan a + tan b with sin a = 1.5 sin b."""
     camera = Pinhole((0, 0, 2), (0.7, 0, 0), (0, 1, 0), 1000, 400, 4)
     things = (
-        (rectangle(make_mesh, (-9, 9), (-9, 9), 0.0), sum_of(refraction=Colour((1.0, 0.5, 0.25)), ior=1.5)),
+        (rectangle(make_mesh, (-9, 9), (-9, 9), 0.0), sum_of(refraction=Color((1.0, 0.5, 0.25)), ior=1.5)),
         (rectangle(make_mesh, (0.8, 9), (-9, 9), -1.0), glow(1)),
     )
     picture = render(make_lit(camera, *things), "direct", 1, threads=1)["Combined"][..., :3]
@@ -69,7 +69,7 @@ def test_glass_shares_light_out_by_fresnel(make_mesh, make_lit):
     """Water, seen flat: F of the bright ceiling and 1 − F of the floor."""
     camera = Pinhole((0, 0, 1), (5, 0, 0), (0, 0, 1), 2000, 16, 12)
     things = (
-        (rectangle(make_mesh, (-90, 90), (-90, 90), 0.0), sum_of(glass=Colour(WHITE), ior=1.33)),
+        (rectangle(make_mesh, (-90, 90), (-90, 90), 0.0), sum_of(glass=Color(WHITE), ior=1.33)),
         (rectangle(make_mesh, (-900, 900), (-900, 900), 9.0), glow(5)),
         (rectangle(make_mesh, (-90, 90), (-90, 90), -1.0), glow(1)),
     )
@@ -89,7 +89,7 @@ def test_a_pane_of_clear_glass_shifts_what_is_behind_it(make_mesh, make_lit):
     camera = Pinhole((0, 0, 3), (1.5, 0, 0), (0, 1, 0), 1000, 400, 4)
     pane = [rectangle(make_mesh, (-9, 9), (-9, 9), 1.0), rectangle(make_mesh, (-9, 9), (-9, 9), 0.5)]
     below = make_mesh(pane[1].vertices, pane[1].triangles[:, ::-1])  # its front looks down, out of the glass
-    glass = sum_of(glass=Colour(WHITE), ior=1.5)
+    glass = sum_of(glass=Color(WHITE), ior=1.5)
     things = ((pane[0], glass), (below, glass), (rectangle(make_mesh, (1.2, 9), (-9, 9), -1.0), glow(1)))
     passes = render(make_lit(camera, *things, bounces=WITHOUT_END), "path", 128, threads=1)
     rows, columns = np.mgrid[:4, :400]
@@ -112,7 +112,7 @@ def test_a_pane_of_clear_glass_shifts_what_is_behind_it(make_mesh, make_lit):
 def test_between_two_mirrors_light_is_reflected_as_often_as_there_are_bounces(make_mesh, make_lit, component):
     """Two mirrors of 0.5 that glow by 1: with k bounces, k + 1 reflections; each kind is limited by its own number."""
     camera = Pinhole((0, 0, 1), (0, 0.1, 0), (0, 1, 0), 500, 8, 6)
-    shining = {component: Colour((0.5,) * 3), "emission": Colour(WHITE), "ior": 1e3 if component == "glass" else 1.45}
+    shining = {component: Color((0.5,) * 3), "emission": Color(WHITE), "ior": 1e3 if component == "glass" else 1.45}
     floor, ceiling = rectangle(make_mesh, (-99, 99), (-99, 99), 0.0), rectangle(make_mesh, (-99, 99), (-99, 99), 2.0)
     things = [(floor, sum_of(**shining)), (ceiling, sum_of(**shining))]
     for bounces, reflections in ((Bounces(0, 9, 9, 9), 1), (Bounces(3, 9, 9, 9), 4), (Bounces(9, 9, 2, 9), 3)):
@@ -128,7 +128,7 @@ def test_between_two_mirrors_light_is_reflected_as_often_as_there_are_bounces(ma
 def test_what_a_mirror_shows_is_of_no_pass_but_combined(make_mesh, make_lit):
     camera = Pinhole((0, 0, 1), (0, 0.1, 0), (0, 1, 0), 500, 8, 6)
     floor = rectangle(make_mesh, (-9, 9), (-9, 9), 0.0)
-    passes = render(make_lit(camera, (floor, sum_of(mirror=Colour(WHITE))), world=World((1, 2, 3))), "path", 1, threads=1)
+    passes = render(make_lit(camera, (floor, sum_of(mirror=Color(WHITE))), world=World((1, 2, 3))), "path", 1, threads=1)
     assert (passes["Combined"] == (1, 2, 3, 1)).all()
     for name in ("Emission", "Environment", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color", "Variance"):
         assert (passes[name] == 0).all(), name

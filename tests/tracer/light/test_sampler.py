@@ -63,7 +63,7 @@ def test_every_dimension_alone_is_stratified(seed, dimension):
 
 
 def test_any_two_dimensions_of_film_and_first_scattering_are_stratified_together_but_for_a_factor_of_16():
-    """Of 2ᵐ points, every elementary interval of 2⁻ᵐ⁺⁴ holds 16: t ≤ 4, for each two of the ten."""
+    """Every elementary interval of 2⁻ᵐ⁺⁴ holds 16 of 2ᵐ points: t ≤ 4, for each two of the ten."""
     numbers = sets(Sampler(3, 1024), np.arange(2), 1024, 0, FILM + SCATTERING)
     for a in range(len(numbers)):
         for b in range(a):
@@ -88,7 +88,7 @@ def test_numbers_lie_from_0_to_below_1_and_are_uniform():
 
 
 @pytest.mark.parametrize(("apart", "sample"), [(1, 0), (1, 37), (2, 1), (1920, 0), (65536, 1)])
-def test_pixels_are_independent_of_their_neighbours_and_dimensions_of_one_another(apart, sample):
+def test_pixels_are_independent_of_their_neighbors_and_dimensions_of_one_another(apart, sample):
     pixels = np.arange(1 << 16)
     numbers = Sampler(2, 64).numbers(pixels, sample, 0, 12)
     others = Sampler(2, 64).numbers(pixels + apart, sample, 0, 12)
@@ -97,7 +97,7 @@ def test_pixels_are_independent_of_their_neighbours_and_dimensions_of_one_anothe
         assert np.abs(values).max() < 4.5, f"correlated by {np.abs(values).max():.1f} standard errors"  # the largest of 144
 
 
-def test_the_error_of_one_pixel_says_nothing_about_that_of_its_neighbours():
+def test_the_error_of_one_pixel_says_nothing_about_that_of_its_neighbors():
     """Means of 16 samples of a function of the film, over 65,536 pixels: neighbors in a row of 256, and in a column."""
     x, y = sets(Sampler(8, 16), np.arange(65536), 16, 0, 2)
     errors = (x * 0.7 + y * 0.4 < 0.53).mean(axis=1).reshape(256, 256)
@@ -215,7 +215,7 @@ def test_these_tests_find_white_noise_equal_pixels_and_points_that_lack_their_pa
 
 
 def test_the_error_of_film_and_lamp_together_falls_faster_than_noise(errors_of):
-    """What padding from the start can't do: a product of both is as smooth as each."""
+    """Padding from the start can't do it: a product of both is as smooth as each."""
 
     def product(u):
         return np.exp(u[0] * u[3]) * (1 + u[1] * u[4]) - expected

@@ -10,7 +10,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene.film import Bounces, Film
 from viewcam_addon.tracer.scene.lamps import Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, sum_of
+from viewcam_addon.tracer.scene.materials import Color, sum_of
 
 CAMERA = Pinhole((0.3, -3.6, 1.2), (0, 0, 0.9), (0, 0, 1), 7, 8, 6)
 SUN = Sun("sun", towards=(0.3, -0.5, 1.0), irradiance=(2.0, 1.8, 1.5))
@@ -99,8 +99,8 @@ def traced(make_lit, make_mesh):
     def trace(bounces):
         things = []
         for triangles, albedo, emission in THINGS:
-            colours = {"diffuse": Colour(albedo), **({"emission": Colour(emission)} if any(emission) else {})}
-            things.append((make_mesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles))), sum_of(**colours)))
+            colors = {"diffuse": Color(albedo), **({"emission": Color(emission)} if any(emission) else {})}
+            things.append((make_mesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles))), sum_of(**colors)))
         light = {"lamps": (SUN,), "world": SKY, "film": Film(filter="BOX"), "bounces": Bounces(bounces, bounces, 0, 0)}
         passes = render(make_lit(CAMERA, *things, **light), "path", 1024, 1)
         return passes["Combined"][..., :3].astype(float), passes["Variance"].astype(float)

@@ -11,18 +11,18 @@ from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
-from viewcam_addon.tracer.scene.colours import RGBE
+from viewcam_addon.tracer.scene.colors import RGBE
 from viewcam_addon.tracer.scene.film import Film
-from viewcam_addon.tracer.scene.materials import PLAIN_COLOR, Colour, Picture, sum_of
+from viewcam_addon.tracer.scene.materials import PLAIN_COLOR, Color, Picture, sum_of
 
 CAMERA = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 10, 8, 8)
 SEEDS = st.integers(0, 2**32 - 1)
 COUNTS = st.integers(1, 9)
 BLENDED = 4e-7  # of pixels up to 3: some roundings of float32
-RED, GREEN = Colour((0.8, 0.0, 0.0)), Colour((0.0, 0.5, 0.0))
+RED, GREEN = Color((0.8, 0.0, 0.0)), Color((0.0, 0.5, 0.0))
 
 
-def grey(values):
+def gray(values):
     """A linear image of these values in each channel, rows from the bottom."""
     return Picture(np.repeat(np.array(values, np.float32)[:, :, None], 3, axis=2))
 
@@ -38,7 +38,7 @@ def decoded(codes):
 
 
 @given(SEEDS, COUNTS, COUNTS, st.booleans())
-def test_at_the_centres_of_pixels_an_image_shows_its_pixels_however_far_it_repeats(seed, width, height, closest):
+def test_at_the_centers_of_pixels_an_image_shows_its_pixels_however_far_it_repeats(seed, width, height, closest):
     rng = np.random.default_rng(seed)
     picture = Picture(rng.random((height, width, 3)).astype(np.float32))
     row, column = np.mgrid[:height, :width].reshape(2, -1)
@@ -49,13 +49,13 @@ def test_at_the_centres_of_pixels_an_image_shows_its_pixels_however_far_it_repea
 
 
 def test_rows_count_from_the_bottom_and_columns_from_the_left():
-    picture = grey([[0.1, 0.2], [0.3, 0.4]])
+    picture = gray([[0.1, 0.2], [0.3, 0.4]])
     hits = looked_up(picture, at([0.1, 0.9, 0.1, 0.9], [0.1, 0.1, 0.9, 0.9]), closest=True)
     np.testing.assert_allclose(hits[0], [0.1, 0.2, 0.3, 0.4], atol=1e-7)
 
 
-def test_a_ramp_of_four_pixels_is_straight_between_their_centres_and_falls_back_over_the_border():
-    picture = grey([[0.0, 1.0, 2.0, 3.0]])
+def test_a_ramp_of_four_pixels_is_straight_between_their_centers_and_falls_back_over_the_border():
+    picture = gray([[0.0, 1.0, 2.0, 3.0]])
     u = np.array([1, 2, 3, 4, 5, 6, 7]) / 8
     np.testing.assert_allclose(looked_up(picture, at(u, 0 * u), False)[1], [0, 0.5, 1, 1.5, 2, 2.5, 3], atol=BLENDED)
     # From the last center, 7/8, to the first of the next repetition, 9/8, it falls from 3 to 0.
@@ -63,12 +63,12 @@ def test_a_ramp_of_four_pixels_is_straight_between_their_centres_and_falls_back_
 
 
 def test_between_four_pixels_of_a_checkerboard_an_image_is_their_mean():
-    picture = grey([[0.0, 1.0], [1.0, 0.0]])
+    picture = gray([[0.0, 1.0], [1.0, 0.0]])
     np.testing.assert_allclose(looked_up(picture, at([0.5, 0.0, 0.5], [0.5, 0.0, 0.0]), False), 0.5, atol=BLENDED)
 
 
-def test_the_closest_pixel_changes_half_way_between_centres():
-    picture = grey([[0.0, 1.0]])
+def test_the_closest_pixel_changes_half_way_between_centers():
+    picture = gray([[0.0, 1.0]])
     colors = looked_up(picture, at([0.499999, 0.5, 0.999999, 1.0, -1e-9, -1e-20], 0.5), True)[0]
     np.testing.assert_array_equal(colors, [0, 1, 1, 0, 1, 1])
 
@@ -122,18 +122,18 @@ def test_each_byte_pair_of_bytes_and_half_float_is_the_number_that_it_stands_for
 
 
 @given(st.integers(0, 2**24 - 1), st.integers(0, 187))
-def test_whatever_radiances_files_can_say_is_kept_in_four_bytes_and_shown_to_the_bit(colours, exponent):
+def test_whatever_radiances_files_can_say_is_kept_in_four_bytes_and_shown_to_the_bit(colors, exponent):
     """187: colors up to the most that light can have."""
-    written = Picture(np.full((1, 1, 1), colours | exponent << 24, RGBE))
+    written = Picture(np.full((1, 1, 1), colors | exponent << 24, RGBE))
     kept = Picture.compact(np.concatenate([written.values, np.full((1, 1, 3), 2.0**-100, np.float32)]))
     assert kept.pixels.dtype == RGBE
     hits = np.array([looked_up(picture, at(0.5, 0.25), closest=True)[:, 0] for picture in (written, kept)])
     np.testing.assert_array_equal(hits, 2 * [stood_for(written.pixels)[0, 0].astype(np.float64)])
-    assert colours == 0 or (hits[0] != stood_for(written.pixels + np.uint32(1 << 24))[0, 0]).any(), "an exponent is seen"
+    assert colors == 0 or (hits[0] != stood_for(written.pixels + np.uint32(1 << 24))[0, 0]).any(), "an exponent is seen"
 
 
 @pytest.mark.parametrize("value", [-1.0, 257.0, np.nextafter(np.float32(1), np.float32(2)), 2.0**-137, 2.0**-149])
-def test_a_colour_that_needs_a_sign_or_more_than_its_byte_is_not_kept_in_four(value):
+def test_a_color_that_needs_a_sign_or_more_than_its_byte_is_not_kept_in_four(value):
     values = np.array([[[2.0**-100, 0, 0], [1.0, 1.0, value]]], np.float32)
     assert Picture.compact(values).pixels.dtype != RGBE
     assert Picture.compact(values[:, :1]).pixels.dtype == RGBE
@@ -192,7 +192,7 @@ def test_an_interpolated_image_is_continuous_and_stays_between_its_pixels(seed, 
 
 def test_srgb_is_decoded_after_pixels_are_blended():
     """Half-way between 0 and 1 is the sRGB value ½, 0.2140; blending light would give ½."""
-    pixels = grey([[0.0, 1.0]]).pixels
+    pixels = gray([[0.0, 1.0]]).pixels
     colors = looked_up(Picture(pixels, srgb=True), at([0.25, 0.5, 0.75], 0.5), False)[0]
     np.testing.assert_allclose(colors, [0, 0.21404114, 1], atol=1e-7)
     assert looked_up(Picture(pixels), at(0.5, 0.5), False)[0, 0] == 0.5
@@ -208,22 +208,22 @@ def test_srgb_is_the_standards_curve_to_float32s_rounding():
     assert above - below == pytest.approx(0, abs=1e-7)
 
 
-def test_colours_that_are_not_finite_nowhere_come_from_uv_that_is_not():
-    picture = grey([[0.25, 1.0], [1.0, 1.0]])
+def test_colors_that_are_not_finite_nowhere_come_from_uv_that_is_not():
+    picture = gray([[0.25, 1.0], [1.0, 1.0]])
     uv = at([np.nan, np.inf, -np.inf, 1e30, -1e300], [0.3, np.nan, 0.3, 1e30, 0.25])
     for closest in (False, True):
         hits = looked_up(picture, uv, closest)
         assert np.isfinite(hits).all() and hits.min() >= 0.25
 
 
-def shown(*materials, pass_name="Diffuse Color", images=None, uv=None, vertex_colours=None):
+def pixels_of(*materials, pass_name="Diffuse Color", images=None, uv=None, vertex_colors=None):
     """(3,) of each material, None being none: what a pass shows at a triangle of it, with one UV and one color all over."""
     triangle = Mesh(
         np.array([[-9.0, -9, 0], [9, -9, 0], [0, 9, 0]]),
         np.array([[0, 1, 2]], np.int32),
         np.zeros(1, np.int32),
         corner_uvs=None if uv is None else np.full((1, 3, 2), uv, np.float32),
-        corner_colours=None if vertex_colours is None else np.full((1, 3, 3), vertex_colours, np.float32),
+        corner_colors=None if vertex_colors is None else np.full((1, 3, 3), vertex_colors, np.float32),
     )
     result = []
     for number, material in enumerate(materials):
@@ -235,18 +235,18 @@ def shown(*materials, pass_name="Diffuse Color", images=None, uv=None, vertex_co
     return np.array(result)
 
 
-def test_each_surface_has_the_colour_of_its_material_and_black_where_its_material_has_none():
+def test_each_surface_has_the_color_of_its_material_and_black_where_its_material_has_none():
     materials = None, sum_of(diffuse=RED), sum_of(emission=GREEN)
-    np.testing.assert_allclose(shown(*materials), [PLAIN_COLOR.rgb, RED.rgb, (0, 0, 0)], rtol=1e-7)
-    np.testing.assert_allclose(shown(*materials, pass_name="Emission"), [(0, 0, 0), (0, 0, 0), GREEN.rgb], rtol=1e-7)
+    np.testing.assert_allclose(pixels_of(*materials), [PLAIN_COLOR.rgb, RED.rgb, (0, 0, 0)], rtol=1e-7)
+    np.testing.assert_allclose(pixels_of(*materials, pass_name="Emission"), [(0, 0, 0), (0, 0, 0), GREEN.rgb], rtol=1e-7)
 
 
-def test_images_and_vertex_colours_multiply_the_colour_where_their_material_is_and_nowhere_else():
-    images = {"ramp": grey([[0.5, 0.25]])}
-    textured = sum_of(diffuse=Colour((1.0, 0.5, 0.0), image="ramp", closest=True, vertex=True))
+def test_images_and_vertex_colors_multiply_the_color_where_their_material_is_and_nowhere_else():
+    images = {"ramp": gray([[0.5, 0.25]])}
+    textured = sum_of(diffuse=Color((1.0, 0.5, 0.0), image="ramp", closest=True, vertex=True))
     of_red = sum_of(diffuse=RED)
     for u, expected in ((0.1, (0.5, 0.125, 0)), (0.9, (0.25, 0.0625, 0))):
-        actual = shown(textured, of_red, images=images, uv=(u, 0.5), vertex_colours=(1.0, 0.5, 0.25))
+        actual = pixels_of(textured, of_red, images=images, uv=(u, 0.5), vertex_colors=(1.0, 0.5, 0.25))
         np.testing.assert_allclose(actual, [expected, RED.rgb], rtol=1e-6)
 
 
@@ -303,7 +303,7 @@ def test_a_box_is_one_pixel_wide_whatever_its_width(width, u):
 
 
 @given(st.sampled_from(["BLACKMAN_HARRIS", "GAUSSIAN"]), WIDTHS)
-def test_the_middle_of_the_numbers_is_the_pixels_centre(shape, width):
+def test_the_middle_of_the_numbers_is_the_pixels_center(shape, width):
     np.testing.assert_array_equal(offsets(Film(shape, width), np.full((2, 1), 0.5)), 0.5)
 
 
@@ -335,7 +335,7 @@ def test_places_keep_the_order_of_the_numbers():
     assert (np.diff(places(np.arange(1 << 20) / (1 << 20))) > 0).all()
 
 
-def test_the_filters_mean_is_the_centre_and_its_variance_is_on_paper():
+def test_the_filters_mean_is_the_center_and_its_variance_is_on_paper():
     """With y = x/f: the integral of y² cos(kπ(y + 1)) over −1 … 1 is 4 / (kπ)² for each cosine, 2/3 for the constant."""
     a, b, c, d = 0.35875, 0.48829, 0.14128, 0.01168
     variance = (a * 2 / 3 + 4 / np.pi**2 * (-b + c / 4 - d / 9)) / (2 * a)

@@ -7,7 +7,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene.film import Bounces, Film
 from viewcam_addon.tracer.scene.lamps import Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, Material, sum_of
+from viewcam_addon.tracer.scene.materials import Color, Material, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 DOWN = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 32, 24)
@@ -24,15 +24,15 @@ def surface(kind, **inputs):
     return Material(surface=node(kind, **inputs))
 
 
-def half(colour=(1.0, 1.0, 1.0), share=0.5):
-    return surface("mix", factor=share, first=node("transparent"), second=node("diffuse", color=colour))
+def half(color=(1.0, 1.0, 1.0), share=0.5):
+    return surface("mix", factor=share, first=node("transparent"), second=node("diffuse", color=color))
 
 
 @pytest.mark.parametrize("level", ["direct", "path"])
 @pytest.mark.parametrize("panes", [0, 1, 3])
-def test_panes_multiply_their_colours_on_the_way_to_the_eye_and_to_the_sun(make_mesh, make_lit, panes, level):
+def test_panes_multiply_their_colors_on_the_way_to_the_eye_and_to_the_sun(make_mesh, make_lit, panes, level):
     things = [(square(make_mesh, 0.5 + number / 4), surface("transparent", color=TINT)) for number in range(panes)]
-    scene = make_lit(DOWN, (square(make_mesh, 0.0), sum_of(diffuse=Colour((0.5, 0.5, 0.5)))), *things, lamps=(SUN,))
+    scene = make_lit(DOWN, (square(make_mesh, 0.0), sum_of(diffuse=Color((0.5, 0.5, 0.5)))), *things, lamps=(SUN,))
     expected = 0.5 * np.array(TINT) ** (2 * panes)
     rendered = render(scene, level, 2, threads=1)["Combined"][..., :3]
     assert np.abs(rendered - expected).max() <= ROUNDED, (rendered[0, 0], expected)
@@ -40,16 +40,16 @@ def test_panes_multiply_their_colours_on_the_way_to_the_eye_and_to_the_sun(make_
 
 def test_a_shadow_is_black_where_shadow_rays_do_not_go_through(make_mesh, make_lit):
     pane = Material(surface=node("transparent", color=TINT), transparent_shadow=False)
-    things = (square(make_mesh, 0.0), sum_of(diffuse=Colour((0.5, 0.5, 0.5)))), (square(make_mesh, 1.0), pane)
+    things = (square(make_mesh, 0.0), sum_of(diffuse=Color((0.5, 0.5, 0.5)))), (square(make_mesh, 1.0), pane)
     assert not render(make_lit(DOWN, *things, lamps=(SUN,)), "path", 2, threads=1)["Combined"][..., :3].any()
 
 
 @pytest.mark.parametrize("cycles", [(4, 2), (5, 2)])
 def test_beyond_the_limit_all_is_dark(make_mesh, make_lit, cycles):
-    """As Cycles counts: of three panes before a light the last must not be more than the limit, or one more before 5.0."""
+    """The last of three panes before a light must not be beyond the limit, as Cycles counts, or one more before 5.0."""
     things = [(square(make_mesh, 0.5 + number / 4), surface("transparent")) for number in range(3)]
     for most in (1, 2, 3):
-        glowing = (square(make_mesh, 0.0), sum_of(emission=Colour((1, 1, 1))))
+        glowing = (square(make_mesh, 0.0), sum_of(emission=Color((1, 1, 1))))
         scene = make_lit(DOWN, glowing, *things, bounces=Bounces(transparent=most), cycles=cycles)
         is_seen = most + (cycles < (5, 0)) >= 3
         assert render(scene, "path", 1, threads=1)["Combined"][..., :3].mean() == is_seen, most

@@ -14,7 +14,7 @@ from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import RAYS, Area, Point, Spot, Sun, World
 from viewcam_addon.tracer.scene.levels import least_level
-from viewcam_addon.tracer.scene.materials import Colour, simplified, sum_of
+from viewcam_addon.tracer.scene.materials import Color, simplified, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 
 CAMERA = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 4, 4)
@@ -80,7 +80,7 @@ def test_a_scene_that_is_right_is_taken():
 # --- The least level: no more than a scene needs, and a sentence that names why
 
 
-WHITE, BLACK = Colour((1.0, 1.0, 1.0)), Colour((0.0, 0.0, 0.0))
+WHITE, BLACK = Color((1.0, 1.0, 1.0)), Color((0.0, 0.0, 0.0))
 SUN = Sun("Sun", irradiance=(1.0, 1.0, 1.0))
 
 
@@ -165,9 +165,9 @@ def test_materials_that_nothing_shows_do_not_count(scene):
 # --- Trees of shaders that are sums of components, and those that are not
 
 
-RED, BLUE = Colour((0.5, 0.25, 0.125)), Colour((0.0, 0.25, 1.0))
-WOOD, BARK = Colour((1.0, 1.0, 1.0), "wood"), Colour((1.0, 1.0, 1.0), "bark")
-COLOURS = st.builds(Colour, st.tuples(*[st.floats(0.01, 1.0)] * 3))
+RED, BLUE = Color((0.5, 0.25, 0.125)), Color((0.0, 0.25, 1.0))
+WOOD, BARK = Color((1.0, 1.0, 1.0), "wood"), Color((1.0, 1.0, 1.0), "bark")
+COLORS = st.builds(Color, st.tuples(*[st.floats(0.01, 1.0)] * 3))
 
 
 def added(*shaders):
@@ -178,17 +178,17 @@ def mixed(factor, first, second):
     return node("mix", factor=factor, first=first, second=second)
 
 
-@given(st.dictionaries(st.sampled_from(["diffuse", "emission", "mirror", "glass", "refraction"]), COLOURS))
+@given(st.dictionaries(st.sampled_from(["diffuse", "emission", "mirror", "glass", "refraction"]), COLORS))
 def test_the_components_of_what_a_material_adds_up_are_its_own(stated):
     material = sum_of(**stated, ior=1.3)
     tree = added(*(closure.node for closure in reversed(material.closures))) if stated else None
     assert simplified(tree) == material.surface
 
 
-def test_a_mixture_shares_out_colours_and_adds_those_that_are_alike():
+def test_a_mixture_shares_out_colors_and_adds_those_that_are_alike():
     red, blue = node("diffuse", color=RED), node("diffuse", color=BLUE)
-    assert simplified(mixed(0.25, red, None)) == sum_of(diffuse=Colour((0.375, 0.1875, 0.09375))).surface
-    assert simplified(mixed(0.5, red, blue)) == sum_of(diffuse=Colour((0.25, 0.25, 0.5625))).surface
+    assert simplified(mixed(0.25, red, None)) == sum_of(diffuse=Color((0.375, 0.1875, 0.09375))).surface
+    assert simplified(mixed(0.5, red, blue)) == sum_of(diffuse=Color((0.25, 0.25, 0.5625))).surface
     assert simplified(mixed(0.0, red, node("sheen"))) == sum_of(diffuse=RED).surface
     wood = node("diffuse", color=WOOD)
     assert simplified(mixed(0.25, wood, wood)) == sum_of(diffuse=WOOD).surface
@@ -199,7 +199,7 @@ def test_a_principled_surface_without_gloss_is_diffuse_and_may_shine():
     assert simplified(node("principled", **plain)) == sum_of(diffuse=RED).surface
     assert simplified(node("principled", base_color=RED, ior=1.0)) == sum_of(diffuse=RED).surface
     shining = node("principled", **plain, emission_color=BLUE, emission_strength=2.0)
-    assert simplified(shining) == sum_of(diffuse=RED, emission=Colour((0.0, 0.5, 2.0))).surface
+    assert simplified(shining) == sum_of(diffuse=RED, emission=Color((0.0, 0.5, 2.0))).surface
     for name in ("metallic", "transmission_weight", "coat_weight", "sheen_weight", "diffuse_roughness", "specular_ior_level"):
         glossy = node("principled", **(plain | {name: 0.1}))
         assert simplified(glossy) is glossy, name
@@ -215,7 +215,7 @@ def test_a_principled_surface_without_gloss_is_diffuse_and_may_shine():
         node("diffuse", color=node("noise")),
         node("diffuse", color=RED, normal=node("geometry", output="normal")),
         node("emission", color=RED, strength=node("noise")),
-        node("emission", color=Colour((1e18, 0.0, 0.0)), strength=2.0),
+        node("emission", color=Color((1e18, 0.0, 0.0)), strength=2.0),
         node("glass", color=RED, roughness=0.0, ior=node("noise")),
         added(node("glass", roughness=0.0, ior=1.3), node("refraction", roughness=0.0, ior=1.4)),
         added(node("diffuse", color=WOOD), node("diffuse", color=BARK)),

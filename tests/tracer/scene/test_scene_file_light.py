@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from viewcam_addon.tracer.scene import scene_file
 from viewcam_addon.tracer.scene.film import FILTERS, Bounces, Film
 from viewcam_addon.tracer.scene.lamps import RAYS, Area, Point, Spot, Sun, World
-from viewcam_addon.tracer.scene.materials import COMPONENTS, Colour, Material, Picture, sum_of
+from viewcam_addon.tracer.scene.materials import COMPONENTS, Color, Material, Picture, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import DISTRIBUTIONS, node
 
 DOCUMENTATION = Path(__file__).parents[3] / "docs" / "scene-file.md"
@@ -57,7 +57,7 @@ matrices = st.lists(st.floats(-1e6, 1e6), min_size=12, max_size=12).map(
     lambda numbers: np.vstack([np.reshape(numbers, (3, 4)), (0.0, 0.0, 0.0, 1.0)])
 )
 links = st.none() | st.just(frozenset())
-made = st.none() | st.deferred(lambda: nodes)
+value_nodes = st.none() | st.deferred(lambda: nodes)
 common = {
     "name": names,
     "hidden_from": rays,
@@ -66,7 +66,7 @@ common = {
     "receivers": links,
     "blockers": links,
 }
-common |= {"emission": made}
+common |= {"emission": value_nodes}
 round_lamps = common | {"power": rgb, "radius": st.floats(0, 1e6), "soft_falloff": st.booleans()}
 lamps = st.one_of(
     st.builds(Sun, **common, towards=vectors.filter(any), irradiance=rgb, angle=st.floats(0, math.pi)),
@@ -74,17 +74,15 @@ lamps = st.one_of(
     st.builds(Spot, **round_lamps, matrix=matrices, angle=st.floats(0, math.pi), blend=st.floats(0, 1)),
     st.builds(Area, **common, matrix=matrices, size=st.tuples(*[st.floats(0, 1e6)] * 2), power=rgb, ellipse=st.booleans()),
 )
-colours = st.builds(
-    Colour, rgb=rgb, image=st.sampled_from([None, "small", "large"]), closest=st.booleans(), vertex=st.booleans()
-)
+colors = st.builds(Color, rgb=rgb, image=st.sampled_from([None, "small", "large"]), closest=st.booleans(), vertex=st.booleans())
 values = st.recursive(
     st.one_of(
         vectors,
-        colours,
+        colors,
         st.builds(partial(node, "layer_weight"), blend=st.floats(-9, 9), output=st.sampled_from(("fresnel", "facing"))),
         st.builds(
             partial(node, "image"),
-            image=st.builds(partial(Colour, (1.0, 1.0, 1.0)), st.sampled_from(["small", "large"])),
+            image=st.builds(partial(Color, (1.0, 1.0, 1.0)), st.sampled_from(["small", "large"])),
             interpolation=st.sampled_from(("linear", "closest", "cubic")),
             straight=st.booleans(),
         ),
@@ -101,23 +99,23 @@ shaders = st.recursive(
     st.one_of(
         st.builds(
             partial(node, "principled"),
-            base_color=colours | nodes,
+            base_color=colors | nodes,
             roughness=amounts,
-            coat_weight=colours,
+            coat_weight=colors,
             coat_normal=bumps,
         ),
-        st.builds(partial(node, "glossy"), color=rgb, roughness=colours, distribution=st.sampled_from(DISTRIBUTIONS)),
-        st.builds(partial(node, "emission"), color=colours, strength=amounts),
+        st.builds(partial(node, "glossy"), color=rgb, roughness=colors, distribution=st.sampled_from(DISTRIBUTIONS)),
+        st.builds(partial(node, "emission"), color=colors, strength=amounts),
     ),
     lambda inner: st.one_of(
-        st.builds(partial(node, "mix"), factor=colours | nodes, first=inner, second=st.none() | inner),
+        st.builds(partial(node, "mix"), factor=colors | nodes, first=inner, second=st.none() | inner),
         st.builds(partial(node, "add"), first=inner, second=inner),
     ),
     max_leaves=4,
 )
-materials = st.builds(Material, surface=shaders, displacement=made) | st.builds(
+materials = st.builds(Material, surface=shaders, displacement=value_nodes) | st.builds(
     sum_of,
-    **{name: st.none() | colours for name in ("diffuse", "emission", "mirror", "glass", "refraction")},
+    **{name: st.none() | colors for name in ("diffuse", "emission", "mirror", "glass", "refraction")},
     ior=st.floats(1e-3, 1e3),
 )
 films = st.builds(
@@ -130,9 +128,9 @@ films = st.builds(
 bounces = st.builds(Bounces, *[st.integers(0, 1024)] * 4)
 
 
-def test_a_constant_colour_that_a_value_is_made_from_is_three_numbers_and_the_default_none():
-    assert dict(node("separate", color=Colour((1.0, 0.5, 0.0))).inputs) == {"color": (1.0, 0.5, 0.0)}
-    assert node("separate", color=Colour((0.0, 0.0, 0.0))) == node("separate")
+def test_a_constant_color_that_a_value_is_made_from_is_three_numbers_and_the_default_none():
+    assert dict(node("separate", color=Color((1.0, 0.5, 0.0))).inputs) == {"color": (1.0, 0.5, 0.0)}
+    assert node("separate", color=Color((0.0, 0.0, 0.0))) == node("separate")
 
 
 @settings(max_examples=30)
@@ -141,7 +139,7 @@ def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mes
     rng = np.random.default_rng(0)
     mesh = replace(
         make_mesh(np.eye(3), [[0, 1, 2]]),
-        corner_colours=rng.random((1, 3, 3), np.float32),
+        corner_colors=rng.random((1, 3, 3), np.float32),
         attributes={"Weight": rng.random((1, 3, 1), np.float32)},
     )
     scene = make_scene(random_scene(0).camera, mesh)
@@ -217,9 +215,9 @@ def test_a_scene_without_light_has_no_key_of_it(random_scene, tmp_path):
 def test_the_documented_light_is_what_it_says(example, read_document):
     scene = read_document(example)
     wall, board = scene.materials["wall"], scene.materials["board"]
-    assert wall == sum_of(diffuse=Colour((0.7, 0.7, 0.7)))
-    assert board == sum_of(diffuse=Colour((1.0, 1.0, 1.0), "checks", closest=True)) and scene.images["checks"].srgb
-    assert scene.materials["pane"] == sum_of(glass=Colour((1.0, 1.0, 1.0)), ior=1.5)
+    assert wall == sum_of(diffuse=Color((0.7, 0.7, 0.7)))
+    assert board == sum_of(diffuse=Color((1.0, 1.0, 1.0), "checks", closest=True)) and scene.images["checks"].srgb
+    assert scene.materials["pane"] == sum_of(glass=Color((1.0, 1.0, 1.0)), ior=1.5)
     sun, lamp, panel = scene.lamps
     assert isinstance(sun, Sun) and sun.angle == 0.00918 and np.linalg.norm(sun.towards) == pytest.approx(1, abs=1e-15)
     assert isinstance(lamp, Point) and (lamp.position, lamp.radius) == ((1.0, -2.0, 3.0), 0.1)
@@ -232,7 +230,7 @@ def test_the_documented_light_is_what_it_says(example, read_document):
 
 def test_every_key_of_light_is_documented():
     text = DOCUMENTATION.read_text(encoding="utf-8")
-    kinds = (Sun, Point, Spot, Area, World, Film, Bounces, Material, Colour, Picture)
+    kinds = (Sun, Point, Spot, Area, World, Film, Bounces, Material, Color, Picture)
     keys = {*COMPONENTS, "ior", *(each.name for kind in kinds for each in fields(kind))}
     missing = [key for key in sorted(keys) if f"`{key}`" not in text]
     assert not missing, missing

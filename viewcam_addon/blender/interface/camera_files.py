@@ -32,7 +32,7 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, file_menu.IntoScene, bpy.types.O
 
     directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
-    made: bpy.props.EnumProperty(
+    import_as: bpy.props.EnumProperty(
         name="As",
         description="What becomes of several cameras",
         items=[
@@ -77,10 +77,10 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, file_menu.IntoScene, bpy.types.O
             paths = self._paths()
             read_cameras, notes, kinds = [], [], set()
             for path in paths:
-                kinds.add(formats.recognised(path))
+                kinds.add(formats.recognized(path))
                 more, more_notes = read(path, context.scene, self.distance, self)
                 read_cameras, notes = read_cameras + more, notes + more_notes
-            as_flight = self.made == "FLIGHT" or (self.made == "BY_FILE" and kinds == {"trajectories"})
+            as_flight = self.import_as == "FLIGHT" or (self.import_as == "BY_FILE" and kinds == {"trajectories"})
             folder = paths[0] if paths[0].is_dir() else paths[0].parent
             imported = import_cameras.import_cameras(
                 read_cameras,
@@ -141,7 +141,7 @@ def read(
     base = None
     if distance > 0:
         plane = ViewPlane((distance, distance * aspect), (width / 2, height / 2), width, height)
-    elif formats.recognised(path) == "trajectories":
+    elif formats.recognized(path) == "trajectories":
         camera_object = datablocks.render_camera(scene)
         if camera_object is None:
             raise InputError(f"{path.name} says where the camera is but not how it sees: give the Distance in pixels")

@@ -38,7 +38,7 @@ from ...tracer.scene.film import LEVELS, SAMPLES, seeds
 from .. import camera as cameras
 from .. import datablocks, preferences
 
-_RESULT, _SAID, _REPORT = "result.json", "said.txt", "report"
+_RESULT, _OUTPUT, _REPORT = "result.json", "output.txt", "report"
 _PICTURES = {"cycles": SIDES["test"], "tracer": SIDES["reference"], "difference": SIDES["difference"]}
 _COMPRESSED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 
@@ -50,7 +50,7 @@ class Outcome:
     what : of what it was: camera, frame and level. camera : the camera's name. seen : the camera then, None if it was none.
     answer : one of comparison/answer.py's, None where there is none. verdict : one sentence. headline : a few words of it.
     rows : (label, text) of the figures. lacking : (object, sentence) of what is not modeled as it is.
-    folder : that of the report. colours : what those of the difference say. scale : their ends, as difference.write has them.
+    folder : that of the report. colors : what those of the difference say. scale : their ends, as difference.write has them.
     temporary : what `discard` removes.
     """
 
@@ -63,7 +63,7 @@ class Outcome:
     rows: tuple[tuple[str, str], ...] = ()
     lacking: tuple[tuple[str, str], ...] = ()
     folder: Path | None = None
-    colours: str = ""
+    colors: str = ""
     scale: dict[str, Any] = field(default_factory=dict)
     temporary: Path | None = None
 
@@ -145,13 +145,13 @@ class RunningComparison:
         difference = str(self.folder / _REPORT / _PICTURES["difference"])
         command = f"viewcam {dataclasses.replace(job, blend=copy).check_words()}"
         files = {"report": report, "difference": difference, "sides": report, "command": command}
-        return start(copy, scene, [job], self.folder / _SAID, files=files)
+        return start(copy, scene, [job], self.folder / _OUTPUT, files=files)
 
     def progress(self) -> tuple[float, str]:
         """The progress, from 0 to 1 in steps of unequal length, and the name of the step."""
         done, words = _step({"name": "rendering", "number": 1}, self._pictures)
         traced, taken, expected, left = 0.0, 0, 1, ""
-        for event in child_process.events_in(self._said().splitlines()):
+        for event in child_process.events_in(self._output().splitlines()):
             if event["event"] == "step":
                 done, words = _step(event, self._pictures)
             elif event["event"] == "progress":
@@ -197,7 +197,7 @@ class RunningComparison:
         of = (self._what, self._camera, self._seen)
         result = _read(self.folder / _RESULT)
         if "answer" not in result:
-            return Outcome(*of, None, failure(self._said(), status))
+            return Outcome(*of, None, failure(self._output(), status))
         folder, temporary = self.folder / _REPORT, self.folder
         if self._keep_in:
             try:
@@ -213,10 +213,10 @@ class RunningComparison:
             tuple(figures(result)),
             tuple(lacking(result["ledger"])),
         )
-        return Outcome(*of, *verdict, folder, drawn.get("colours", ""), drawn.get("scale", {}), temporary)
+        return Outcome(*of, *verdict, folder, drawn.get("colors", ""), drawn.get("scale", {}), temporary)
 
-    def _said(self) -> str:
-        return (self.folder / _SAID).read_text(encoding="utf-8", errors="replace")
+    def _output(self) -> str:
+        return (self.folder / _OUTPUT).read_text(encoding="utf-8", errors="replace")
 
 
 def _step(event: Mapping[str, Any], pictures: int) -> tuple[int, str]:
@@ -271,7 +271,7 @@ def headline(result: dict[str, Any]) -> str:
     if result["answer"] == DIFFERENT:
         return "Cycles renders another picture"
     words = _agreement(result)
-    return f"{words}, {but_for(result['not_modelled'])}" if result["answer"] == SAME_BUT else words
+    return f"{words}, {but_for(result['not_modeled'])}" if result["answer"] == SAME_BUT else words
 
 
 def _agreement(result: dict[str, Any]) -> str:

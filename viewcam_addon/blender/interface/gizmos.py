@@ -2,7 +2,7 @@
 
 Each is one of Blender's own move gizmos on a property that is got and set here (`Handles`, one for the window manager, not in
 any file), so that Blender drags, snaps with Ctrl and shows the tooltip by itself. A drag starts with the first value that
-Blender sets; the values and the camera as they were until then are kept. Cancelling sets the first value again, upon which all
+Blender sets; the values and the camera as they were until then are kept. Canceling sets the first value again, upon which all
 of it comes back to the bit. A drag ends when none of Blender's modal operators drags a gizmo any more: then it becomes one step
 of undo, and a keyframe where a value has a curve and auto keying is on.
 
@@ -11,7 +11,7 @@ Eye and up would carry the view along, and what the mouse points at; these are d
 
 Behind each handle lies a wider dark one that the mouse does not take: a halo, with which it reads on light and on dark.
 
-Rejected: custom gizmos (Python's do not react to the mouse), `eye` itself as the gizmo's property (cancelling would leave the
+Rejected: custom gizmos (Python's do not react to the mouse), `eye` itself as the gizmo's property (canceling would leave the
 camera where the values put it, not where it was), `Gizmo.use_undo` (from 5.2 on alone), and watching `is_modal` when the
 viewport is drawn (a quick drag is over before it is drawn, and in a quad view each view has its own handles).
 """

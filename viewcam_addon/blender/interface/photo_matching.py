@@ -49,8 +49,8 @@ class Drawing:
     like : the camera as it was, whose picture it is. kind : EDGES, RECTANGLE or POINTS. axes : of the rectangle's sides.
     sides : their lengths. origin : of the rectangle, world space. places : of the points, world space.
     ends : pixels, two an edge, or one a corner or point. along : the axis of each edge. axis : of the next. exact : the largest
-    error of what is drawn, pixels of the picture. is_lens_known : it stays as it was. length : world units, of the first edge,
-    which begins at the origin then; 0 where that is not known.
+    error of what is drawn, pixels of the picture. is_lens_known : it stays as it was. is_principal_point_free : edges say where
+    it is. length : world units, of the first edge, which begins at the origin then; 0 where that is not known.
     """
 
     like: Pinhole
@@ -64,6 +64,7 @@ class Drawing:
     axis: str = "X"
     exact: float = 1.0
     is_lens_known: bool = False
+    is_principal_point_free: bool = False
     length: float = 0.0
     taken: int | None = None
 
@@ -114,7 +115,7 @@ class Drawing:
             edges = [(axis, *self.ends[2 * i : 2 * i + 2]) for i, axis in enumerate(self.along)]
             whole = [edge for edge in edges if np.hypot(*np.subtract(edge[2], edge[1])) >= 1.0]
             known = photo_match.KnownEdge(0, self.length, self.origin) if self.length > 0 else None
-            return photo_match.from_edges(whole, self.like, self.exact, distance, known)
+            return photo_match.from_edges(whole, self.like, self.exact, distance, known, self.is_principal_point_free)
         if self.kind == RECTANGLE:
             if len(self.ends) < 4:
                 raise InputError(f"the rectangle has {len(self.ends)} of 4 corners: click the next")
@@ -129,7 +130,12 @@ def summary_of(match: photo_match.Match, lens: float) -> list[str]:
     share = (high - low) / 2 / d
     size = f"{lens:.4g} mm ± {100 * share:.2g} %,  d = {d:.5g} px ± {(high - low) / 2:.2g} px"
     lines = [size if high > low else f"{lens:.4g} mm as it was,  d = {d:.5g} px"]
-    names = {"look_at": "look-at", "up": "roll", "distance": "lens", "eye": "eye"}
+    if match.principal_point_error:
+        middle = match.pinhole.width / 2, match.pinhole.height / 2
+        off = zip(np.subtract(match.pinhole.principal_point, middle), match.principal_point_error, strict=True)
+        right, up = (f"{value:+.4g} ± {error:.2g} px" for value, error in off)
+        lines.append(f"Principal point: {right} to the right of the middle, {up} above it")
+    names = {"look_at": "look-at", "up": "roll", "distance": "lens", "eye": "eye", "principal_point": "principal point"}
     lines.append("In the picture: " + ",  ".join(f"{names[name]} ± {value:.2g} px" for name, value in match.pixels.items()))
     if match.error:
         lines.append(f"What is drawn misses by {match.error:.2g} px")
@@ -169,6 +175,11 @@ class MatchSettings(bpy.types.PropertyGroup):
     )
     is_lens_known: bpy.props.BoolProperty(
         name="Keep the Lens", description="The camera has the photo's lens already, from its EXIF data: only the pose is asked"
+    )
+    is_principal_point_free: bpy.props.BoolProperty(
+        name="Free Principal Point",
+        description="Find the camera's Shift as well, as of a photo that was cropped or taken with a shift lens: it takes "
+        "edges along all three axes, which converge. Else the camera keeps its own",
     )
     length: bpy.props.FloatProperty(
         name="First Edge",
@@ -225,11 +236,11 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         drawing = self.drawing
         if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
-            return self._leave(context, cancelled=True)
+            return self._leave(context, canceled=True)
         if event.type in ("RET", "NUMPAD_ENTER") and event.value == "PRESS":
-            return self._leave(context, cancelled=self.result is None)
+            return self._leave(context, canceled=self.result is None)
         if context.region_data is None or context.region_data.view_perspective != "CAMERA":
-            return self._leave(context, cancelled=True)
+            return self._leave(context, canceled=True)
         if event.type in ("WHEELUPMOUSE", "WHEELDOWNMOUSE") or (event.type == "MIDDLEMOUSE" and (event.shift or event.ctrl)):
             return {"PASS_THROUGH"}
         if self.frame is None:  # nothing has been drawn yet
@@ -254,7 +265,7 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender closes the window or the file."""
-        self._leave(context, cancelled=True)
+        self._leave(context, canceled=True)
 
     def _in_picture(self, event: bpy.types.Event) -> tuple[Pair, float]:
         """The mouse's place in the picture, and how many of its pixels one of the screen shows."""
@@ -279,13 +290,13 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
         context.workspace.status_text_set(f"{_HELP[self.drawing.kind]}{axis}   Enter: confirm   Esc: cancel")
         context.area.tag_redraw()
 
-    def _leave(self, context: bpy.types.Context, cancelled: bool) -> set[str]:
+    def _leave(self, context: bpy.types.Context, canceled: bool) -> set[str]:
         global _drawn
         _drawn = None
         context.workspace.status_text_set(None)
         if context.area:
             context.area.tag_redraw()
-        if cancelled:
+        if canceled:
             kept.restore(self.camera_object, self.before)
             return {"CANCELLED"}
         self.report({"INFO"}, summary_of(self.result, self.camera_object.data.lens)[0])
@@ -316,6 +327,7 @@ def begun(camera_object: bpy.types.Object | None, context: bpy.types.Context) ->
         raise InputError("the picture is mirrored or its pixels are not square: a photo's are neither")
     drawing = Drawing(like, settings.kind, settings.axes, tuple(settings.sides), tuple(scene.cursor.location))
     drawing.is_lens_known, drawing.length = settings.is_lens_known, settings.length
+    drawing.is_principal_point_free = settings.is_principal_point_free
     if drawing.kind == POINTS:
         chosen = [each for each in context.selected_objects if each != camera_object]
         drawing.places = tuple(tuple(each.matrix_world.translation) for each in chosen)
@@ -361,20 +373,20 @@ def _draw() -> None:
     elif drawing.kind == RECTANGLE:
         closed = [*ends, ends[0]] if len(ends) == 4 else ends
         along = [theme[drawing.axes[i % 2]] for i in range(4)]
-        lines = [(a, b, colour) for a, b, colour in zip(closed, closed[1:], along, strict=False)]
+        lines = [(a, b, color) for a, b, color in zip(closed, closed[1:], along, strict=False)]
     else:
         lines = []
     gpu.state.blend_set("ALPHA")
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     for width, dark in ((5.0, True), (2.5, False)):
-        for start, end, colour in lines:
+        for start, end, color in lines:
             shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
             shader.uniform_float("lineWidth", width * scale)
-            shader.uniform_float("color", (0.0, 0.0, 0.0, 0.5) if dark else colour)
+            shader.uniform_float("color", (0.0, 0.0, 0.0, 0.5) if dark else color)
             batch_for_shader(shader, "LINES", {"pos": [(*start, 0.0), (*end, 0.0)]}).draw(shader)
     flat = gpu.shader.from_builtin("UNIFORM_COLOR")
-    for half, colour in ((_HANDLE + 1.5, (0.0, 0.0, 0.0, 0.6)), (_HANDLE, (1.0, 1.0, 1.0, 1.0))):
-        flat.uniform_float("color", colour)
+    for half, color in ((_HANDLE + 1.5, (0.0, 0.0, 0.0, 0.6)), (_HANDLE, (1.0, 1.0, 1.0, 1.0))):
+        flat.uniform_float("color", color)
         for x, y in ends:
             r = half * scale
             square = [(x - r, y - r), (x + r, y - r), (x - r, y + r), (x + r, y + r)]
@@ -408,6 +420,7 @@ class VIEWCAM_PT_sidebar_match(SubPanel, BelowSidebar, bpy.types.Panel):
             panel_rows.field(column, settings, "axes")
         elif settings.kind == EDGES:
             column.prop(settings, "length")
+            column.prop(settings, "is_principal_point_free")
         column.prop(settings, "is_lens_known")
         column.prop(settings, "precision")
         layout.operator("viewcam.match_photo", icon="CAMERA_DATA")

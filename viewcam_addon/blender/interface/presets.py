@@ -21,9 +21,9 @@ from . import clipboard
 FOLDER = "virtual_pinhole"
 
 
-def _lens(millimetres: float) -> str:
+def _lens(millimeters: float) -> str:
     """The angle of 36 mm, the longer side of a full frame."""
-    return f"fov={math.degrees(2 * math.atan(18 / millimetres))!r} axis=larger"
+    return f"fov={math.degrees(2 * math.atan(18 / millimeters))!r} axis=larger"
 
 
 SHIPPED = {

@@ -38,7 +38,7 @@ _MARGIN, _LETTERS, _STRIP = 10, 12, (240, 12)  # points: around a label, its siz
 _SECONDS = 0.3  # from a picture to its packing, and from a new editor to its size
 _BELOW = 64  # points below the picture, for the legend
 
-_handlers = []
+_handlers: list[object] = []
 _loaded: Outcome | None = None
 
 
@@ -204,14 +204,14 @@ def _draw_labels() -> None:
 
 def _draw_legend(x: float, y: float, scale: float) -> None:
     """The strip of the difference's colors, with the ends of its scale below."""
-    legend = _loaded.scale
+    legend = _loaded.scale if _loaded else {}
     if not legend:
         return
-    colours = (pictures.signed_scale() if legend["kind"] == "signed" else pictures.colour_scale()) / 255.0
+    colors = (pictures.signed_scale() if legend["kind"] == "signed" else pictures.color_scale()) / 255.0
     width, height = (size * scale for size in _STRIP)
     x = max(_MARGIN * scale, min(x, bpy.context.region.width - width - 2 * _MARGIN * scale))  # whole, where there is room
-    for number, colour in enumerate(colours):
-        fill(x + width * number / len(colours), y, width / len(colours) + 1, height, (*colour, 1.0))
+    for number, color in enumerate(colors):
+        fill(x + width * number / len(colors), y, width / len(colors) + 1, height, (*color, 1.0))
     signed = legend["kind"] == "signed"
     low = f"−{plain(-legend['low'])}: tracer brighter" if signed else f"{plain(legend['low'])} {legend['unit']}"
     high = f"{plain(legend['high'])}: Cycles brighter" if signed else f"{plain(legend['high'])} {legend['unit']}"
@@ -233,7 +233,7 @@ def write(text: str, x: float, y: float, scale: float, before: bool = False) -> 
     blf.draw(0, text)
 
 
-def fill(x: float, y: float, width: float, height: float, colour: tuple[float, ...]) -> None:
+def fill(x: float, y: float, width: float, height: float, color: tuple[float, ...]) -> None:
     """A rectangle in the pixels of what is drawn."""
     import gpu
     from gpu_extras.batch import batch_for_shader
@@ -241,7 +241,7 @@ def fill(x: float, y: float, width: float, height: float, colour: tuple[float, .
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     corners = [(x, y), (x + width, y), (x, y + height), (x + width, y + height)]
     gpu.state.blend_set("ALPHA")
-    shader.uniform_float("color", colour)
+    shader.uniform_float("color", color)
     batch_for_shader(shader, "TRI_STRIP", {"pos": corners}).draw(shader)
     gpu.state.blend_set("NONE")
 

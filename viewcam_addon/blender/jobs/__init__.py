@@ -7,7 +7,7 @@ persistent_data.py     what Blender keeps from job to job, and where it must not
 pictures.py    a render as files: EXR and preview, the same bytes each time
 origins.py     what the pictures are made from: hashes of the .blend and all it links
 checking.py    both sides of a check, and the question to the tracer's process
-labelling.py   ground truth of a shot, by the tracer
+labeling.py   ground truth of a shot, by the tracer
 scene_files.py the scene for these two, kept from job to job
 obstacles.py   why a job can't be had, known before anything is
 """

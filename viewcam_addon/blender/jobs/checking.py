@@ -40,6 +40,7 @@ from .scene_files import SceneFiles
 from .stage import Stage, staged
 
 _MOST_TOLD = 5
+_AS_THE_SCENE_STANDS: dict[str, Any] = {"width": None, "height": None, "principal_point": None}
 
 
 class Checker:
@@ -68,7 +69,7 @@ class Checker:
         pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from. Of the scene's
         own camera Blender chooses once more which that is: a picture of another one is a difference.
 
-        Returns `passed`, `answer`, `verdict`, `not_modelled` and `figures` as Tracing.compare has them, and in `ledger` what
+        Returns `passed`, `answer`, `verdict`, `not_modeled` and `figures` as Tracing.compare has them, and in `ledger` what
         both sides leave out or replace, a sentence for each of the first few.
 
         Raises
@@ -77,7 +78,7 @@ class Checker:
             if the scene can't be exported or rendered by Cycles, or if the two can't be compared.
         """
         of = dataclasses.replace(
-            job, engine="CYCLES", level=LEVELS[0], recenter=False, clay=False, device="CPU", error=None, width=None, height=None
+            job, engine="CYCLES", level=LEVELS[0], recenter=False, clay=False, device="CPU", error=None, **_AS_THE_SCENE_STANDS
         )
         image = self._files.folder / "cycles.exr"
         with numbered_indices(), staged(of, scene, camera_object, whole=True) as stage:
@@ -85,7 +86,7 @@ class Checker:
             camera = None if job.is_of_scenes_camera else camera_object
             ledger, render = export.ledger, functools.partial(cycles.render, scene, stage.view_layer, camera)
             render(image, ledger.remedies.values(), job.threads, keep=True)
-            everything = self._files.folder / "everything.exr" if export.scene.not_modelled else None
+            everything = self._files.folder / "everything.exr" if export.scene.not_modeled else None
             if everything:
                 render(everything, ledger.remedies_of_everything, job.threads, keep=True, everything=True)
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
@@ -185,7 +186,7 @@ class Checker:
                 self._events.tell("step", name="rendering", number=number, of=max(number, len(paths)))
 
         lighting = Lighting(exported.lamps, exported.world, exported.film, exported.bounces)
-        has_more = exported.not_modelled and job.engine not in ("EEVEE", "WORKBENCH") and not job.recenter
+        has_more = exported.not_modeled and job.engine not in ("EEVEE", "WORKBENCH") and not job.recenter
         stage.render(job, paths, lighting, rendering, keep=True, everything=everything if has_more else None)
 
     def _forecast(self, undecided: dict[str, Any], taken: int, latest: int, seconds: float) -> None:
@@ -226,7 +227,7 @@ def _numbered(scene_path: str | None) -> tuple[str, ...]:
 
 def _brief(comparison: dict[str, Any], ledger: Sequence[LedgerEntry]) -> dict[str, Any]:
     """The part of a comparison that a sidecar keeps."""
-    lacking = [f"{entry.object}: {entry.reason}" for entry in ledger if not entry.is_modelled]
+    lacking = [f"{entry.object}: {entry.reason}" for entry in ledger if not entry.is_modeled]
     more = [f"and {len(lacking) - _MOST_TOLD} more, which viewcam check tells"] if len(lacking) > _MOST_TOLD else []
-    result = {key: comparison[key] for key in ("passed", "answer", "not_modelled", "figures")}
+    result = {key: comparison[key] for key in ("passed", "answer", "not_modeled", "figures")}
     return {**result, "verdict": comparison["sentence"], "ledger": lacking[:_MOST_TOLD] + more}

@@ -40,8 +40,8 @@ _MOST_BYTES = 256 * 2**30
 _USD = (".usd", ".usda", ".usdc")
 _USD_BINARY = b"PXR-USDC"
 _USD_ASSET = re.compile(rb"@@@(.+?)@@@|@([^@\n]+)@")
-_COLOURS_FOLDERS = re.compile(r"^search_path:[ \t]*(.*(?:\n[ \t]*-.*)*)", re.MULTILINE)
-_COLOURS_FILE = re.compile(r"\bsrc:\s*(?:\"([^\"]+)\"|'([^']+)'|([^\s,}]+))")
+_COLORS_FOLDERS = re.compile(r"^search_path:[ \t]*(.*(?:\n[ \t]*-.*)*)", re.MULTILINE)
+_COLORS_FILE = re.compile(r"\bsrc:\s*(?:\"([^\"]+)\"|'([^']+)'|([^\s,}]+))")
 _POINT_CACHE = re.compile(r"(.*)_\d+_(\d+)\.bphys")
 
 
@@ -64,7 +64,7 @@ def made_from() -> dict[str, Any]:
     return {
         "blend": blend,
         "linked": _hashes(_linked(), Path(bpy.data.filepath).parent),
-        "colours": _digest(_hashes(*_colours())),
+        "colors": _digest(_hashes(*_colors())),
         "versions": versions(),
         **({"unknown": list(lacking)} if lacking else {}),
     }
@@ -219,7 +219,7 @@ def _caches_of_unbaked() -> set[tuple[str, int]]:
 
 def _is_cache_of(path: Path, caches: set[tuple[str, int]]) -> bool:
     match = _POINT_CACHE.fullmatch(path.name)
-    return bool(match) and (match[1], int(match[2])) in caches
+    return match is not None and (match[1], int(match[2])) in caches
 
 
 def _imports() -> Iterator[tuple[str, str]]:
@@ -292,23 +292,23 @@ def _usd_layers(path: Path) -> list[Path] | None:
     return [file for name in names for file in _files(str(path.parent / name))]
 
 
-def _colours() -> tuple[list[Path], Path]:
+def _colors() -> tuple[list[Path], Path]:
     """The files of the colors' configuration that Blender takes, and their folder."""
     chosen = os.environ.get("OCIO")
-    config = Path(chosen) if chosen else _own_colours()
+    config = Path(chosen) if chosen else _own_colors()
     try:
         text = config.read_text(encoding="utf-8", errors="replace") if config.is_file() else ""
     except OSError:
         text = ""
-    stated = _COLOURS_FOLDERS.search(text)
-    folders = re.split(r"[:\n]", stated[1]) if stated else []
-    folders = [config.parent / os.path.expandvars(folder.strip(" \t-\"'")) for folder in ["", *folders]]
-    names = [os.path.expandvars("".join(match)) for match in _COLOURS_FILE.findall(text)]
+    stated = _COLORS_FOLDERS.search(text)
+    names_of_folders = re.split(r"[:\n]", stated[1]) if stated else []
+    folders = [config.parent / os.path.expandvars(folder.strip(" \t-\"'")) for folder in ["", *names_of_folders]]
+    names = [os.path.expandvars("".join(match)) for match in _COLORS_FILE.findall(text)]
     tables = (folder / name for name in dict.fromkeys(names) for folder in dict.fromkeys(folders))
     return [config, *(table for table in tables if table.is_file())], config.parent
 
 
-def _own_colours() -> Path:
+def _own_colors() -> Path:
     """The configuration that comes with Blender, or that the user has put in its place."""
     folders = (find("DATAFILES", path="colormanagement") for find in (bpy.utils.user_resource, bpy.utils.system_resource))
     return Path(next(filter(os.path.isdir, folders), "")) / "config.ocio"

@@ -51,7 +51,7 @@ class Stage:
         return self.level != LEVELS[0]
 
     def entries(self, strict: bool) -> tuple[LedgerEntry, ...]:
-        """The ledger's entries of the file; NotModelledError if `strict` and anything is approximated or left out."""
+        """The ledger's entries of the file; NotModeledError if `strict` and anything is approximated or left out."""
         ledger = self.ledger
         if self.file_ledger:
             self.file_ledger.add(self.ledger, self.names)
@@ -61,7 +61,7 @@ class Stage:
         return ledger.entries()
 
     def export(self, strict: bool = False) -> Scene:
-        """The tracer's scene. Raises as export_scene does, and NotModelledError as `entries` does."""
+        """The tracer's scene. Raises as export_scene does, and NotModeledError as `entries` does."""
         scene = export_scene(self.scene, self.view_layer, self.camera, self.ledger, self.is_lit)
         objects = recentering.as_in_file(scene.objects, self.names) if self.names else scene.objects
         return replace(scene, objects=objects, origin=self.origin, ledger=self.entries(strict))

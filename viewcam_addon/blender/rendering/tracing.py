@@ -28,13 +28,13 @@ class _Watcher:
 
     def __init__(self) -> None:
         self.bands: queue.SimpleQueue[tuple[Passes, range] | None] = queue.SimpleQueue()
-        self.cancelled = threading.Event()
+        self.canceled = threading.Event()
 
     def tile(self, passes: Passes, rows: range) -> None:
         self.bands.put((passes, rows))
 
     def stop(self) -> bool:
-        return self.cancelled.is_set()
+        return self.canceled.is_set()
 
 
 def keeper() -> "Keeper":
@@ -50,13 +50,13 @@ def bands(
     samples: int,
     seed: int,
     threads: int,
-    is_cancelled: Callable[[], bool],
+    is_canceled: Callable[[], bool],
     keeper: "Keeper | None" = None,
     steps: Sequence[int] = (),
 ) -> Iterator[tuple[Passes, range]]:
     """Trace a scene, and give what is finished: the passes of the whole picture, and the rows of them that are new.
 
-    is_cancelled : asked in the caller's thread. When it says so, or when the caller takes no more, tracing ends at once.
+    is_canceled : asked in the caller's thread. When it says so, or when the caller takes no more, tracing ends at once.
     keeper, steps : as in tracer.render.render; with steps, all rows come again at each.
 
     Raises
@@ -71,7 +71,7 @@ def bands(
         tracing = pool.submit(render, scene, level, samples, seed, threads, watcher, keeper=keeper, steps=steps)
         tracing.add_done_callback(lambda _: watcher.bands.put(None))
         try:
-            while not is_cancelled():
+            while not is_canceled():
                 with contextlib.suppress(queue.Empty):
                     band = watcher.bands.get(timeout=_PATIENCE)
                     if band is None:
@@ -80,7 +80,7 @@ def bands(
             else:
                 return
         finally:
-            watcher.cancelled.set()
+            watcher.canceled.set()
             # An error's frames hold the tracer, in a circle; where Python 3.14 broke it by itself, Blender 5.2 crashed.
             if error := tracing.exception():
                 traceback.clear_frames(error.__traceback__)

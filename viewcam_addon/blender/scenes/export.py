@@ -1,6 +1,6 @@
 """Blender's scene as the tracer's scene: what Cycles would render, frozen at the current frame.
 
-Everything comes from the depsgraph of a render (depsgraph.py) through its object instances, as in Cycles' own synchronisation
+Everything comes from the depsgraph of a render (depsgraph.py) through its object instances, as in Cycles' own synchronization
 (intern/cycles/blender/object.cpp and geometry.cpp): modifiers, shape keys, armatures and drivers are evaluated; curves, text,
 surfaces and metaballs arrive as meshes; collections, geometry nodes and particles as instances that share their data. A
 geometry is stored once for each evaluated mesh, and an object once for all the places where an instance of it stands: a million
@@ -439,10 +439,10 @@ def _source(
 def _geometry(source: Surface, evaluated: bpy.types.Object, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
     if not source.is_mesh:
         return export_geometry.spheres_of(evaluated.data)
-    has_colours = shading is not None and shading.asks_for_colours(source.slots)
+    has_colors = shading is not None and shading.asks_for_colors(source.slots)
     attributes = shading.attributes(source.slots) if shading else ()
     with export_geometry.mesh_shown(evaluated, split=True) as data:
-        mesh = export_geometry.mesh_of(data, len(source.materials), has_colours, attributes)
+        mesh = export_geometry.mesh_of(data, len(source.materials), has_colors, attributes)
         nowhere = len(data.loop_triangles) - len(mesh.triangles)
     if nowhere:
         ledger.note(

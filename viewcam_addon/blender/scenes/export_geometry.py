@@ -41,10 +41,10 @@ DEFAULT_RADIUS = 0.01
 Array = NDArray[np.generic]
 
 
-def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colours: bool = False, attributes: Collection[str] = ()) -> Mesh:
+def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colors: bool = False, attributes: Collection[str] = ()) -> Mesh:
     """The triangles of an evaluated mesh, object space; of one that `is_split`, once it has been.
 
-    slot_count : the object's material slots, which material indices are clamped to. has_colours : whether to bring along the
+    slot_count : the object's material slots, which material indices are clamped to. has_colors : whether to bring along the
     color attribute that is active for rendering, black where there is none. attributes : those to bring along by name, as in
     `Mesh`; of those that the mesh has not, nothing comes.
     """
@@ -64,7 +64,7 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colours: bool = False, at
         materials=materials_of(mesh, slot_count)[faces],
         corner_normals=_corner_normals(mesh, vertices, corner_vertices, corners, faces),
         corner_uvs=_corner_uvs(mesh, corners),
-        corner_colours=_corner_colours(mesh, triangles, corners, faces) if has_colours else None,
+        corner_colors=_corner_colors(mesh, triangles, corners, faces) if has_colors else None,
         attributes={
             name: values
             for name in sorted(attributes)
@@ -106,7 +106,7 @@ def of_slots(mesh: Mesh, slots: Collection[int]) -> Mesh:
     kept = np.isin(mesh.materials, list(slots))
     if kept.all():
         return mesh
-    of_corners = ("triangles", "materials", "corner_normals", "corner_uvs", "corner_colours")
+    of_corners = ("triangles", "materials", "corner_normals", "corner_uvs", "corner_colors")
     arrays = {name: values[kept] for name in of_corners if (values := getattr(mesh, name)) is not None}
     return replace(mesh, attributes={name: values[kept] for name, values in mesh.attributes.items()}, **arrays)
 
@@ -169,10 +169,10 @@ def _corner_uvs(mesh: bpy.types.Mesh, corners: Array) -> Array | None:
     return None if layer is None else read(layer.uv, "vector", np.float32, 2)[corners]
 
 
-def _corner_colours(mesh: bpy.types.Mesh, triangles: Array, corners: Array, faces: Array) -> Array:
+def _corner_colors(mesh: bpy.types.Mesh, triangles: Array, corners: Array, faces: Array) -> Array:
     """(triangles, 3, 3) float32, linear: the colors that are active for rendering; black, as in Cycles, where none are."""
-    colours = _corner_values(mesh, VERTEX_COLOR, triangles, corners, faces)
-    return np.zeros((*corners.shape, 3), np.float32) if colours is None else np.ascontiguousarray(colours[:, :, :3])
+    colors = _corner_values(mesh, VERTEX_COLOR, triangles, corners, faces)
+    return np.zeros((*corners.shape, 3), np.float32) if colors is None else np.ascontiguousarray(colors[:, :, :3])
 
 
 def _corner_values(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: Array, faces: Array) -> Array | None:

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ...errors import InputError
-from ...tracer.scene.materials import Colour
+from ...tracer.scene.materials import Color
 from ...tracer.scene.shader_nodes import Node, closures, node
 from ...tracer.scene.value_nodes import GENERATED, INCOMING, UV
 from .. import versions
@@ -32,7 +32,7 @@ class LampReader(shaders.Tree):
     """Follows the nodes of a light. matrix : (4, 4), the light's space to the world's. uv : makes what its UV is."""
 
     def __init__(self, light: bpy.types.Light, matrix: np.ndarray, uv: UVMaker) -> None:
-        super().__init__(Colour(_WHITE))
+        super().__init__(Color(_WHITE))
         self._light, self._matrix, self._uv = light, matrix, uv
 
     def emission(self, of: Input) -> RGB | Node:
@@ -42,17 +42,17 @@ class LampReader(shaders.Tree):
             if closure.node.type != "emission":
                 self.reading.reasons.append("has nodes that scatter light")
                 return _WHITE
-            shone = _scaled(_colour(closure.node["color"]), _number(closure.node["strength"]))
+            shone = _scaled(_color(closure.node["color"]), _number(closure.node["strength"]))
             for factor, rest in closure.factors:
                 shone = _scaled(shone, _share(_number(factor), rest))
             total = shone if total == _BLACK else _sum(total, shone)
         return total if isinstance(total, Node) else tuple(max(value, 0.0) for value in total)
 
-    def _image(self, output: Output) -> Colour:
+    def _image(self, output: Output) -> Color:
         self._reason(output, "is no color alone")  # its place is the light's to say
         return self.viewport
 
-    def _value(self, output: Output) -> Colour | Node | None:
+    def _value(self, output: Output) -> Color | Node | None:
         source, name = output.node, output.socket.name
         if source.type == "UVMAP" or (source.type, name) in (("TEX_COORD", "UV"), ("NEW_GEOMETRY", "Parametric")):
             return self._of_itself(output, UV)
@@ -68,7 +68,7 @@ class LampReader(shaders.Tree):
             return None
         return super()._value(output)
 
-    def _falloff(self, output: Output) -> Colour | Node | None:
+    def _falloff(self, output: Output) -> Color | Node | None:
         if self._light.type != "SUN":
             return super()._falloff(output)
         if output.socket.name != "Quadratic" and not versions.SUNS_HAVE_NO_FALLOFF:
@@ -108,7 +108,7 @@ def emission(
         return _WHITE, reader.reading
 
 
-def _constant(value: Colour | Node) -> tuple[RGB, float] | None:
+def _constant(value: Color | Node) -> tuple[RGB, float] | None:
     """The color that a value is everywhere, and its number; None where it varies."""
     if isinstance(value, Node):
         from ...tracer import native  # here: ctypes keeps its structures, and enabling the add-on needs none
@@ -117,12 +117,12 @@ def _constant(value: Colour | Node) -> tuple[RGB, float] | None:
     return value.rgb, value.rgb[0]
 
 
-def _colour(value: Colour | Node) -> RGB | Node:
+def _color(value: Color | Node) -> RGB | Node:
     constant = _constant(value)
     return tuple(max(each, 0.0) for each in constant[0]) if constant else value
 
 
-def _number(value: Colour | Node) -> float | Node:
+def _number(value: Color | Node) -> float | Node:
     constant = _constant(value)
     return constant[1] if constant else value
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 
 import bpy
 
-from ...errors import NotModelledError
+from ...errors import NotModeledError
 from ...tracer.scene import LedgerEntry
 from ..temporary_settings import Overrides
 
@@ -68,11 +68,11 @@ class Ledger:
         return tuple(sorted(entries, key=lambda entry: -_WORSE.index(entry.status)))
 
     def check_strict(self) -> None:
-        """Raise NotModelledError, naming the first of them, if anything is approximated or skipped."""
-        lacking = [entry for entry in self.entries() if not entry.is_modelled]
+        """Raise NotModeledError, naming the first of them, if anything is approximated or skipped."""
+        lacking = [entry for entry in self.entries() if not entry.is_modeled]
         if lacking:
             others = f" (and {len(lacking) - 1} more)" if len(lacking) > 1 else ""
-            raise NotModelledError(
+            raise NotModeledError(
                 f"{lacking[0].object!r} can't be modeled{others}, {lacking[0].reason}: take it out, or leave --strict out"
             )
 

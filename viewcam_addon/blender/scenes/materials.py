@@ -13,7 +13,7 @@ from dataclasses import replace
 import bpy
 
 from ...errors import InputError
-from ...tracer.scene.materials import PLAIN, Colour
+from ...tracer.scene.materials import PLAIN, Color
 from ...tracer.scene.shader_nodes import KINDS, SHADERS, Node, word_of
 from ...tracer.scene.shader_nodes import node as _node
 from ...tracer.scene.value_nodes import GENERATED, OWN, POSITION, UV
@@ -84,10 +84,10 @@ def stand_in(overrides: Overrides, material: bpy.types.Material, reading: shader
     _add_surface(adder, output, reading)
 
 
-def _texts_of(made: Iterable[Node], overrides: Overrides) -> dict[str, bpy.types.Text]:
+def _texts_of(shader_nodes: Iterable[Node], overrides: Overrides) -> dict[str, bpy.types.Text]:
     """The texts that nodes ask for, in Blender, until the overrides end."""
     result = {}
-    for text in dict.fromkeys(node["text"] for node in made if "text" in KINDS[node.type].inputs):
+    for text in dict.fromkeys(node["text"] for node in shader_nodes if "text" in KINDS[node.type].inputs):
         result[text] = bpy.data.texts.new("IES")
         result[text].write(text)
         overrides.afterwards(bpy.data.batch_remove, [result[text]])
@@ -96,14 +96,14 @@ def _texts_of(made: Iterable[Node], overrides: Overrides) -> dict[str, bpy.types
 
 def _add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Reading) -> None:
     """Add the nodes that shaders.read would read so, and link them to a material's output."""
-    made = reading.material
-    if made.displacement is not None:
+    material = reading.material
+    if material.displacement is not None:
         raised = adder.add("ShaderNodeDisplacement", Midlevel=0.0, Scale=1.0)
         raised.space = "WORLD"
-        _colour(adder, raised.inputs["Height"], made.displacement, reading)
+        _color(adder, raised.inputs["Height"], material.displacement, reading)
         adder.link(raised.outputs[0], output.inputs["Displacement"])
     # Without any light Cycles would draw nothing: not even the depth.
-    surface = made.surface or _node("diffuse", color=Colour((0.0, 0.0, 0.0)))
+    surface = material.surface or _node("diffuse", color=Color((0.0, 0.0, 0.0)))
     adder.link(_shader(adder, surface, reading).outputs[0], output.inputs["Surface"])
 
 
@@ -118,7 +118,7 @@ def _shader(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.typ
         if isinstance(value, Node) and not value.is_value:
             adder.link(_shader(adder, value, reading).outputs[0], added.inputs[theirs])
         elif value is not None and (isinstance(theirs, int) or theirs in added.inputs):
-            _colour(adder, added.inputs[theirs], value, reading)
+            _color(adder, added.inputs[theirs], value, reading)
     return added
 
 
@@ -153,10 +153,10 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             if socket is None:
                 _want_as_before(added, theirs, node[name], row.before[name])
             elif KINDS[node.type].inputs[name] not in (UV, GENERATED, POSITION, *OWN) or name in dict(node.inputs):
-                _colour(adder, socket, node[name], reading)
+                _color(adder, socket, node[name], reading)
     word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
-    found = [socket for socket in added.outputs if row.outputs.get(socket.identifier, "") == word]
-    return next((socket for socket in found if socket.enabled), found[0])
+    sockets = [socket for socket in added.outputs if row.outputs.get(socket.identifier, "") == word]
+    return next((socket for socket in sockets if socket.enabled), sockets[0])
 
 
 def _choose(node: bpy.types.Node, name: str, word: str) -> None:
@@ -171,34 +171,34 @@ def _want_as_before(node: bpy.types.Node, name: str, value: object, before: floa
         raise InputError(f"this Blender has no {node.bl_label} with a {name} but {before:g}: open the scene in a newer one")
 
 
-def _colour(
-    adder: nodes.Adder, socket: bpy.types.NodeSocket, colour: Colour | Node | tuple[float, ...], reading: shaders.Reading
+def _color(
+    adder: nodes.Adder, socket: bpy.types.NodeSocket, color: Color | Node | tuple[float, ...], reading: shaders.Reading
 ) -> None:
     """The color of an input: a value, or the product that a color is."""
-    if isinstance(colour, Node):
-        adder.link(_value(adder, colour, reading), socket)
+    if isinstance(color, Node):
+        adder.link(_value(adder, color, reading), socket)
         return
-    if isinstance(colour, tuple):
-        socket.default_value = {"VALUE": colour[0], "VECTOR": colour}.get(socket.type, (*colour, 1.0))
+    if isinstance(color, tuple):
+        socket.default_value = {"VALUE": color[0], "VECTOR": color}.get(socket.type, (*color, 1.0))
         return
-    if colour.image is None and not colour.vertex:
-        values = {"VALUE": colour.rgb[0], "VECTOR": colour.rgb}
-        socket.default_value = values.get(socket.type, (*colour.rgb, 1.0))
+    if color.image is None and not color.vertex:
+        values = {"VALUE": color.rgb[0], "VECTOR": color.rgb}
+        socket.default_value = values.get(socket.type, (*color.rgb, 1.0))
         return
     factors = []
-    if colour.image is not None:
+    if color.image is not None:
         texture = adder.add("ShaderNodeTexImage")
-        texture.image = reading.images[colour.image]
-        texture.interpolation = "Closest" if colour.closest else "Linear"
+        texture.image = reading.images[color.image]
+        texture.interpolation = "Closest" if color.closest else "Linear"
         factors.append(texture.outputs["Color"])
-    if colour.vertex:
+    if color.vertex:
         factors.append(adder.add("ShaderNodeVertexColor").outputs["Color"])
     product = factors[0]
     for other in factors[1:]:
         product = _times(adder, product, other).outputs[0]
-    if colour.rgb != _WHITE:
+    if color.rgb != _WHITE:
         multiply = _times(adder, product)
-        multiply.inputs[1].default_value = colour.rgb
+        multiply.inputs[1].default_value = color.rgb
         product = multiply.outputs[0]
     adder.link(product, socket)
 

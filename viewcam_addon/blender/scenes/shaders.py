@@ -19,7 +19,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...tracer.scene import ies
-from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, PLAIN_COLOR, Colour, Material, Picture, simplified, sum_of
+from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, PLAIN_COLOR, Color, Material, Picture, simplified, sum_of
 from ...tracer.scene.shader_nodes import KINDS, MOST_NODES, SHADERS, Node, closures, word_of
 from ...tracer.scene.shader_nodes import node as _node
 from ...tracer.scene.value_nodes import GENERATED, INCOMING, NORMAL, OWN, POSITION, TANGENT, UV
@@ -73,7 +73,7 @@ _MOST_DEEP = 100
 class Reading:
     """A Blender material as the tracer has it.
 
-    images : key in `Colour.image` → the image.
+    images : key in `Color.image` → the image.
     texts : of IES files, where nodes are made that show them.
     reasons : why it is approximated, one clause each, about the material.
     """
@@ -143,8 +143,8 @@ def in_the_viewport(material: bpy.types.Material) -> Reading:
     return Reading(sum_of(diffuse=_viewport_color(material)))
 
 
-def _viewport_color(material: bpy.types.Material) -> Colour:
-    return Colour(possible(material.diffuse_color[:3]) or PLAIN_COLOR.rgb)
+def _viewport_color(material: bpy.types.Material) -> Color:
+    return Color(possible(material.diffuse_color[:3]) or PLAIN_COLOR.rgb)
 
 
 class Tree:
@@ -153,7 +153,7 @@ class Tree:
     viewport : what stands in for a color that is not modeled. shines : whether it gives off light.
     """
 
-    def __init__(self, viewport: Colour, shines: bool = False) -> None:
+    def __init__(self, viewport: Color, shines: bool = False) -> None:
         self.reading = Reading()
         self.viewport = viewport
         self._shines = shines
@@ -166,64 +166,64 @@ class Tree:
         if not isinstance(source, Output) or source.node.type in _VOLUMES:
             return None
         if source.socket.type != "SHADER":
-            return Node("emission", (("color", self._shown(of)),))
+            return Node("emission", (("color", self._emission(of)),))
         kind = _AS.get(source.node.type, source.node.type)
-        found = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == kind), None)
-        if found is None:
+        row = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == kind), None)
+        if row is None:
             self._reason(source, "is not modeled")
             name = next((name for name in ("Base Color", "Color") if name in source.node.inputs), None)
-            return Node("diffuse", (("color", self._colour(source, name) if name else self.viewport),))
-        ours, shader = found
+            return Node("diffuse", (("color", self._color(source, name) if name else self.viewport),))
+        ours, shader = row
         for name, neutral in shader.neutral.items():
             if _counts(source, ours, name):
                 self._want(source, name, neutral)
         known = KINDS[ours].inputs
-        given: dict[str, object] = {}
+        inputs: dict[str, object] = {}
         for name, theirs in shader.inputs.items():
-            if not _counts(source, ours, theirs) and constant_colour(source, theirs) is None:
+            if not _counts(source, ours, theirs) and constant_color(source, theirs) is None:
                 continue
-            if known[name] is TANGENT and not Node(ours, tuple(given.items())).is_stretched:
+            if known[name] is TANGENT and not Node(ours, tuple(inputs.items())).is_stretched:
                 continue
             if known[name] in OWN:
-                given |= self._normal(source, name, theirs)
+                inputs |= self._normal(source, name, theirs)
             elif known[name] is not None and source.input(theirs) is not None:
-                given[name] = self._input(source, theirs, known[name] if isinstance(known[name], float) else None)
-        if "rotation" in given and (constant_number(source, "Anisotropy") or 0.0) < 0.0:
-            given["rotation"] = _quarter_further(given["rotation"])
+                inputs[name] = self._input(source, theirs, known[name] if isinstance(known[name], float) else None)
+        if "rotation" in inputs and (constant_number(source, "Anisotropy") or 0.0) < 0.0:
+            inputs["rotation"] = _quarter_further(inputs["rotation"])
         for name in (name for name, default in known.items() if default is None):
             if (
                 ours == "add"
-                or given["factor"].varies
-                or given["factor"].rgb[0] not in {"first": (1.0,), "second": (0.0,)}[name]
+                or inputs["factor"].varies
+                or inputs["factor"].rgb[0] not in {"first": (1.0,), "second": (0.0,)}[name]
             ):
-                given[name] = self.surface(source.input(shader.inputs[name]))
-        return Node(ours, tuple((given | self._words(source, ours)).items()))
+                inputs[name] = self.surface(source.input(shader.inputs[name]))
+        return Node(ours, tuple((inputs | self._words(source, ours)).items()))
 
-    def _shown(self, of: Input) -> Colour | Node:
+    def _emission(self, of: Input) -> Color | Node:
         """The emission of a surface whose shader is a color or a number."""
-        made = self._value_input(of, None)
-        return made if isinstance(made, Colour | Node) else Colour(made) if made and possible(made) else self.viewport
+        value = self._value_input(of, None)
+        return value if isinstance(value, Color | Node) else Color(value) if value and possible(value) else self.viewport
 
-    def _colour(self, output: Output, name: str | int) -> Colour:
-        rgb = constant_colour(output, name)
+    def _color(self, output: Output, name: str | int) -> Color:
+        rgb = constant_color(output, name)
         if rgb is not None:
             if possible(rgb) is None:
                 self._reason(output, f"has the {output.node.inputs[name].name} {', '.join(f'{value:g}' for value in rgb)}")
-            return Colour(rgb) if possible(rgb) else self.viewport
+            return Color(rgb) if possible(rgb) else self.viewport
         source = nodes.source(output.input(name))
         node = source.node
         if node.type == "TEX_IMAGE" and source.socket.name == "Color":
             return self._image(source)
-        if _is_vertex_colour(source):
-            return Colour(_WHITE, vertex=True)
+        if _is_vertex_color(source):
+            return Color(_WHITE, vertex=True)
         if node.type == "VECT_MATH" and node.operation == "MULTIPLY":
             return self._product(source)
         self._reason(source, "is not modeled")
         return self.viewport
 
-    def _product(self, output: Output) -> Colour:
+    def _product(self, output: Output) -> Color:
         """The product that a Vector Math node makes of two colors."""
-        first, second = self._colour(output, 0), self._colour(output, 1)
+        first, second = self._color(output, 0), self._color(output, 1)
         if (first.image and second.image) or (first.vertex and second.vertex):
             self._reason(output, "multiplies two colors that vary alike")
             return first
@@ -232,9 +232,9 @@ class Tree:
             self._reason(output, "multiplies colors beyond what light can have")
             return self.viewport
         textured = first if first.image else second
-        return Colour(rgb, textured.image, textured.closest, first.vertex or second.vertex)
+        return Color(rgb, textured.image, textured.closest, first.vertex or second.vertex)
 
-    def _image(self, output: Output) -> Colour:
+    def _image(self, output: Output) -> Color:
         """An image that is a color alone: laid out by UV, repeated."""
         node = output.node
         if node.extension != "REPEAT":
@@ -248,7 +248,7 @@ class Tree:
         vector = nodes.source(output.input("Vector"))
         if isinstance(vector, Output) and not self._is_uv(vector):
             self._reason(vector, "is not modeled")
-        return Colour(_WHITE, node.image.original.name_full, node.interpolation == "Closest")
+        return Color(_WHITE, node.image.original.name_full, node.interpolation == "Closest")
 
     def _shows(self, output: Output) -> bool:
         """True if an Image Texture's image is one that we can have, which is noted then."""
@@ -305,10 +305,10 @@ class Tree:
                 height = _node("math", operation=operation, a=height, b=by)
         if not isinstance(height, Node):  # an image as it is, or the same everywhere
             height = _node("math", operation="multiply", a=height, b=1.0)
-        given = self._normal(output, "normal", "Normal").get("normal")
-        if given is None and output.node.space == "WORLD":
+        normal = self._normal(output, "normal", "Normal").get("normal")
+        if normal is None and output.node.space == "WORLD":
             return height
-        way = given or _node("geometry", output="normal")
+        way = normal or _node("geometry", output="normal")
         if output.node.space == "OBJECT":
             inwards = _node("vector_transform", vector=way, kind="normal", **{"from": "world", "to": "object"})
             way = _node("vector_transform", vector=inwards, **{"from": "object", "to": "world"})
@@ -335,8 +335,8 @@ class Tree:
         source = of and nodes.source(of)
         if isinstance(source, Output) and source.node.type == "BUMP" and _constant(source.input("Height")) is not None:
             return self._normal(source, name, "Normal")
-        made = self._value(source) if isinstance(source, Output) else None
-        return {name: made} if isinstance(made, Node) else {}
+        value = self._value(source) if isinstance(source, Output) else None
+        return {name: value} if isinstance(value, Node) else {}
 
     def _words(self, output: Output, ours: str) -> dict[str, str]:
         result = {}
@@ -349,21 +349,21 @@ class Tree:
             result |= dict.fromkeys([name] if known else [], *known)
         return result
 
-    def _input(self, output: Output, name: str | int, otherwise: float | None) -> Colour | Node:
+    def _input(self, output: Output, name: str | int, otherwise: float | None) -> Color | Node:
         """The value of an input. otherwise : the number where that is not modeled, or None of a color."""
         value = None if otherwise is None else constant_number(output, name)
         if value is None:
             source = nodes.source(output.input(name))
-            told, self.reading.reasons = self.reading.reasons, []
-            result: Colour | Node | None = self._colour(output, name)
+            before, self.reading.reasons = self.reading.reasons, []
+            result: Color | Node | None = self._color(output, name)
             if self.reading.reasons and isinstance(source, Output):
                 self.reading.reasons = []
                 result = self._value(source)
-            why, self.reading.reasons = self.reading.reasons, told
+            why, self.reading.reasons = self.reading.reasons, before
             if result is not None and not why:
                 return result
-            told += [reason for reason in why if reason not in told]
-            return self.viewport if otherwise is None else Colour((otherwise,) * 3)
+            before += [reason for reason in why if reason not in before]
+            return self.viewport if otherwise is None else Color((otherwise,) * 3)
         if isinstance(name, str) and name.endswith("Rotation"):
             value %= 1.0
         if name == "Anisotropy":
@@ -372,26 +372,26 @@ class Tree:
         if not math.isfinite(value) or value > LARGEST_RADIANCE or (value < 0 and name == "Strength"):
             self._reason(output, f"has a {output.node.inputs[name].name} of {value:g}")
             value = 0.0
-        return Colour((min(max(value, 0.0), most),) * 3)
+        return Color((min(max(value, 0.0), most),) * 3)
 
-    def _value(self, output: Output) -> Colour | Node | None:
+    def _value(self, output: Output) -> Color | Node | None:
         """The nodes that make a value; None where a reason says that it is not modeled."""
         if self._deep == _MOST_DEEP:
             self._reason(output, f"feeds {_MOST_DEEP} others in a row")
             return None
         self._deep += 1
         try:
-            return self._made(output)
+            return self._value_of_node(output)
         finally:
             self._deep -= 1
 
-    def _made(self, output: Output) -> Colour | Node | None:
+    def _value_of_node(self, output: Output) -> Color | Node | None:
         node = output.node
         if self._is_beside and {node.type, (node.type, output.socket.name)} & _FIXED:
             self._reason(output, "makes a height of what it says here alone")
             return None
-        if _is_vertex_colour(output):
-            return Colour(_WHITE, vertex=True)
+        if _is_vertex_color(output):
+            return Color(_WHITE, vertex=True)
         if node.type == "UVMAP" and self._is_uv(output):
             return Node("texture_coordinate")
         if node.type == "TEX_COORD" and output.socket.name == "Object" and node.object is not None:
@@ -406,31 +406,31 @@ class Tree:
             return self._ramp(output)
         if node.type == "NORMAL":
             return self._along(output)
-        found = value_nodes.row_of(output)
-        if found is None:
+        entry = value_nodes.row_of(output)
+        if entry is None:
             self._reason(output, "is not modeled")
             return None
-        told = len(self.reading.reasons)
-        ours, row = found
+        reasons_before = len(self.reading.reasons)
+        ours, row = entry
         words = value_nodes.given_words(output, ours, row)
         why = words if isinstance(words, str) else self._departure(output, ours)
         if why:
             self._reason(output, why)
             return None
-        given = dict(words)
+        inputs = dict(words)
         if "image" in KINDS[ours].inputs:
             if not self._shows(output):
                 return None
             image = node.image.original
-            given["image"] = Colour(_WHITE, image.name_full)
+            inputs["image"] = Color(_WHITE, image.name_full)
             if ours == "image" and node.outputs["Alpha"].is_linked:
                 if why := images.alpha_obstacle(image):
                     self._reason(output, why)
                     return None
-                given["straight"] = images.is_multiplied(image)
+                inputs["straight"] = images.is_multiplied(image)
                 self.reading.alphas.add(image.name_full)
         if "table" in KINDS[ours].inputs:
-            given |= self._curves(output)
+            inputs |= self._curves(output)
         if ours == "ies":
             text = value_nodes.ies_text(node)
             try:
@@ -438,38 +438,38 @@ class Tree:
             except InputError as error:
                 self._reason(output, f"shows what {str(error).partition(': ')[0].removeprefix('it ')}")
                 return None
-            given["text"] = text
+            inputs["text"] = text
         for name, theirs in row.inputs.items():
             known = KINDS[ours].inputs[name]
             if known in OWN:
-                given |= self._normal(output, name, theirs)
+                inputs |= self._normal(output, name, theirs)
                 continue
             socket = value_nodes.input_of(node, theirs)
             if socket is None:
-                given[name] = (row.before[name],) * 3
+                inputs[name] = (row.before[name],) * 3
                 continue
             is_beside, self._is_beside = self._is_beside, self._is_beside or name == "height"
             read = self._value_input(Input(socket, output.groups), known)
             self._is_beside = is_beside
             if read is None:
                 return None
-            if known not in (UV, GENERATED, POSITION, INCOMING) or isinstance(read, Colour | Node):
-                given[name] = read
+            if known not in (UV, GENERATED, POSITION, INCOMING) or isinstance(read, Color | Node):
+                inputs[name] = read
             elif (of_itself := self._of_itself(output, known)) is not None:
-                given[name] = of_itself
-            elif len(self.reading.reasons) > told:
+                inputs[name] = of_itself
+            elif len(self.reading.reasons) > reasons_before:
                 return None
         try:
-            result = Node(ours, tuple(given.items()))
+            result = Node(ours, tuple(inputs.items()))
         except InputError:
             self._reason(output, f"is computed by more than {MOST_NODES} others")
             return None
         plain = Node("image", tuple((name, result[name]) for name in ("image", "interpolation"))) if ours == "image" else None
         if result == plain and result["interpolation"] != "cubic":
-            return Colour(_WHITE, result["image"].image, result["interpolation"] == "closest")
+            return Color(_WHITE, result["image"].image, result["interpolation"] == "closest")
         return result
 
-    def _value_input(self, of: Input, known: object) -> Colour | Node | tuple[float, ...] | None:
+    def _value_input(self, of: Input, known: object) -> Color | Node | tuple[float, ...] | None:
         """The value of an input of a node that makes values. known : its default, a number where it is one."""
         constant = constant_number_of(of) if isinstance(known, float) else _constant(of)
         if constant is not None:
@@ -499,7 +499,7 @@ class Tree:
             return _node("vector_transform", vector=_node("geometry", output="incoming"), kind="normal")
         return None
 
-    def _falloff(self, output: Output) -> Colour | Node | None:
+    def _falloff(self, output: Output) -> Color | Node | None:
         """The strength that a Light Falloff node makes of light that falls off with the square of its way."""
         strength, smooth = (self._value_input(output.input(name), 0.0) for name in ("Strength", "Smooth"))
         if strength is None or smooth is None:
@@ -507,11 +507,11 @@ class Tree:
         way = _node("light_path", output="ray_length")
         squared = _node("math", operation="multiply", a=way, b=way)
         by: Node | None = {"Linear": way, "Constant": squared}.get(output.socket.name)
-        made = strength if by is None else _node("math", operation="multiply", a=strength, b=by)
+        value = strength if by is None else _node("math", operation="multiply", a=strength, b=by)
         if smooth != _ZERO:
             slower = _node("math", operation="add", a=squared, b=_node("math", operation="maximum", a=smooth, b=0.0))
-            made = _node("math", operation="multiply", a=made, b=_node("math", operation="divide", a=squared, b=slower))
-        return made if isinstance(made, Colour | Node) else _node("math", operation="add", a=made, b=0.0)
+            value = _node("math", operation="multiply", a=value, b=_node("math", operation="divide", a=squared, b=slower))
+        return value if isinstance(value, Color | Node) else _node("math", operation="add", a=value, b=0.0)
 
     def _curves(self, output: Output) -> dict[str, object]:
         """The table that Cycles makes of a node's curves."""
@@ -520,7 +520,7 @@ class Tree:
         key = f"Curves {zlib.crc32(pixels.tobytes()):08x}"
         self.reading.tables[key] = Picture(pixels)
         ends = {"least": (least,) * 3, "most": (most,) * 3}
-        return ends | {"table": Colour(_WHITE, key), "extrapolate": mapping.extend == "EXTRAPOLATED"}
+        return ends | {"table": Color(_WHITE, key), "extrapolate": mapping.extend == "EXTRAPOLATED"}
 
     def _along(self, output: Output) -> Node | None:
         """The value of a Normal node: its direction, and how far another one goes along it."""
@@ -549,7 +549,7 @@ class Tree:
         place = _node("math", operation="multiply_add", a=factor, b=_RAMP / steps, c=first / steps, clamp=False)
         return _node(
             "image",
-            image=Colour(_WHITE, key),
+            image=Color(_WHITE, key),
             vector=place,
             interpolation="closest" if closest else "linear",
             extension="extend",
@@ -569,20 +569,20 @@ def _is_zero(output: Output, name: str) -> bool:
     return constant_number(output, name) == 0.0
 
 
-def _is_vertex_colour(output: Output) -> bool:
-    """True if an output is the mesh's color that is active for rendering, as `Colour.vertex` is; others are attributes."""
+def _is_vertex_color(output: Output) -> bool:
+    """True if an output is the mesh's color that is active for rendering, as `Color.vertex` is; others are attributes."""
     return output.node.type == "VERTEX_COLOR" and output.socket.name == "Color" and not output.node.layer_name
 
 
-def _along_normal(vector: Colour | Node) -> Node:
+def _along_normal(vector: Color | Node) -> Node:
     return _node("vector_math", operation="dot_product", a=vector, b=_node("geometry", output="normal"))
 
 
-def _quarter_further(rotation: Colour | Node) -> Colour | Node:
+def _quarter_further(rotation: Color | Node) -> Color | Node:
     """A rotation in turns and a quarter, as stretched across a tangent is along another."""
     if rotation.varies:
         return _node("math", operation="add", a=rotation, b=(0.25,) * 3)
-    return Colour(((rotation.rgb[0] + 0.25) % 1.0,) * 3)
+    return Color(((rotation.rgb[0] + 0.25) % 1.0,) * 3)
 
 
 def in_space_of(matrix: object) -> Node:
@@ -607,13 +607,13 @@ def _from_camera(output: str) -> Node:
 
 def maps_plainly(node: bpy.types.Node) -> bool:
     """True if a texture node has no mapping of its own."""
-    mapping, colours = node.texture_mapping, node.color_mapping
+    mapping, colors = node.texture_mapping, node.color_mapping
     return (
         tuple(mapping.translation) == tuple(mapping.rotation) == (0.0, 0.0, 0.0)
         and tuple(mapping.scale) == _WHITE
         and (mapping.mapping_x, mapping.mapping_y, mapping.mapping_z) == ("X", "Y", "Z")
-        and not (mapping.use_min or mapping.use_max or colours.use_color_ramp)
-        and (colours.brightness, colours.contrast, colours.saturation, colours.blend_factor) == (1.0, 1.0, 1.0, 0.0)
+        and not (mapping.use_min or mapping.use_max or colors.use_color_ramp)
+        and (colors.brightness, colors.contrast, colors.saturation, colors.blend_factor) == (1.0, 1.0, 1.0, 0.0)
     )
 
 
@@ -636,13 +636,13 @@ def constant_number_of(of: Input) -> float | None:
     return sum(factor * each for factor, each in zip(_LUMINANCE, _rgb(value), strict=True))
 
 
-def constant_colour(output: Output, name: str | int) -> RGB | None:
+def constant_color(output: Output, name: str | int) -> RGB | None:
     """The constant color that a node's input is given, or None where it varies."""
     of = output.input(name)
-    return of and constant_colour_of(of)
+    return of and constant_color_of(of)
 
 
-def constant_colour_of(of: Input) -> RGB | None:
+def constant_color_of(of: Input) -> RGB | None:
     """The constant of an input as a color, or None where it varies."""
     value = _constant(of)
     return None if value is None else _rgb(value)

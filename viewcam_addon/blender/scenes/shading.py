@@ -67,7 +67,7 @@ class Shading:
         """True if one of these materials gives light."""
         return any(self.reading(material).material.shines for material in filter(None, slots))
 
-    def asks_for_colours(self, slots: tuple[bpy.types.Material | None, ...]) -> bool:
+    def asks_for_colors(self, slots: tuple[bpy.types.Material | None, ...]) -> bool:
         """True if a mesh of these materials is colored by its color attribute that is active for rendering."""
         materials = [self.reading(material).material for material in filter(None, slots)]
-        return any(colour.vertex for material in materials for _, colour in material.inputs)
+        return any(color.vertex for material in materials for _, color in material.inputs)

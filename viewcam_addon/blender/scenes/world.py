@@ -66,8 +66,8 @@ def world_of(
         ledger.call_for_cycles(original, _make_constant, radiance)
     if reasons:
         return World(radiance, hidden_from), ()
-    seen = None if (radiance, wrapped) == (backdrop, wrapped_there) else _made(backdrop, wrapped_there, pictures)
-    return replace(_made(radiance, wrapped, pictures), hidden_from=hidden_from, backdrop=seen), ()
+    seen = None if (radiance, wrapped) == (backdrop, wrapped_there) else _world(backdrop, wrapped_there, pictures)
+    return replace(_world(radiance, wrapped, pictures), hidden_from=hidden_from, backdrop=seen), ()
 
 
 def _rendered(
@@ -106,7 +106,7 @@ def _rendered(
     return result
 
 
-def _made(radiance: RGB, wrapped: "_Wrapped | None", pictures: dict[str, Picture] | None) -> World:
+def _world(radiance: RGB, wrapped: "_Wrapped | None", pictures: dict[str, Picture] | None) -> World:
     if wrapped is None:
         return World(radiance)
     if pictures is not None and wrapped.image.name_full not in pictures:
@@ -183,7 +183,7 @@ def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, l
     if surface.node.type not in ("BACKGROUND", "EMISSION"):
         return tuple(world.color), None, [*reasons, f"has a node {surface.node.name!r} that is not modeled"]
     color = _unmixed(surface.input("Color"), camera)
-    rgb = shaders.constant_colour_of(color)
+    rgb = shaders.constant_color_of(color)
     strength = shaders.constant_number_of(_unmixed(surface.input("Strength"), camera))
     wrapped = None
     if rgb is None:
@@ -206,7 +206,7 @@ def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, l
 def _factored(source: Output) -> tuple[Output | Input, RGB]:
     """The factor that a Vector Math node multiplies by a constant, and that constant."""
     if source.node.type == "VECT_MATH" and source.node.operation == "MULTIPLY":
-        factor = shaders.constant_colour(source, 1)
+        factor = shaders.constant_color(source, 1)
         if factor is not None:
             return nodes.source(source.input(0)), factor
     return source, (1.0, 1.0, 1.0)
@@ -239,7 +239,7 @@ def _rotation(vector: Output | Input) -> tuple[float, float, float] | None:
     if vector.node.type != "MAPPING" or vector.node.vector_type not in ("POINT", "VECTOR"):
         return None
     turns = [
-        shaders.constant_colour(vector, name)
+        shaders.constant_color(vector, name)
         for name in ("Location", "Rotation", "Scale")[vector.node.vector_type == "VECTOR" :]
     ]
     inner = _rotation(nodes.source(vector.input("Vector")))

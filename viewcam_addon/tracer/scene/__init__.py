@@ -33,10 +33,10 @@ class Mesh:
     corner_normals : (m, 3, 3) float32, object space, unit length, or None where every face is flat. On a flat face of a mesh
         that has smooth ones, the three corners hold the face's own normal.
     corner_uvs : (m, 3, 2) float32, or None where the mesh has no UV map.
-    corner_colours : (m, 3, 3) float32, linear, what `Colour.vertex` stands for, or None.
+    corner_colors : (m, 3, 3) float32, linear, what `Color.vertex` stands for, or None.
     attributes : name → (m, 3, k) float32, k from 1 to 4, what nodes ask for by name. Those that Cycles makes have its names:
         "generated", where each corner is in the mesh's texture space; "pointiness"; "random_per_island"; "vertex_color",
-        `corner_colours` with their alpha.
+        `corner_colors` with their alpha.
     materials : (m,) int32, the index of each triangle's material in `Object.material_indices`.
     """
 
@@ -45,7 +45,7 @@ class Mesh:
     materials: NDArray[np.int32]
     corner_normals: NDArray[np.float32] | None = None
     corner_uvs: NDArray[np.float32] | None = None
-    corner_colours: NDArray[np.float32] | None = None
+    corner_colors: NDArray[np.float32] | None = None
     attributes: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -57,8 +57,8 @@ class Mesh:
             _check_shape("corner_normals", self.corner_normals, (count, 3, 3))
         if self.corner_uvs is not None:
             _check_shape("corner_uvs", self.corner_uvs, (count, 3, 2))
-        if self.corner_colours is not None:
-            _check_shape("corner_colours", self.corner_colours, (count, 3, 3))
+        if self.corner_colors is not None:
+            _check_shape("corner_colors", self.corner_colors, (count, 3, 3))
         for name, values in self.attributes.items():
             _check_shape(f"attribute {quoted(name)}", values, (count, 3, None))
             if not 1 <= values.shape[2] <= 4:
@@ -158,7 +158,7 @@ class LedgerEntry:
     reason: str = ""
 
     @property
-    def is_modelled(self) -> bool:
+    def is_modeled(self) -> bool:
         """True if it was exported whole, as it is."""
         return self.status == "exported"
 
@@ -188,7 +188,7 @@ class Scene:
     clip : nearest and farthest planar depth z = −w·(P − e) that is visible.
     origin : the point of the world from which all coordinates of the scene are counted: (0, 0, 0), or that of a recentered
         export.
-    images : what `Colour.image` names.
+    images : what `Color.image` names.
     cycles : the version of Blender whose Cycles' materials are meant.
     """
 
@@ -208,9 +208,9 @@ class Scene:
     cycles: tuple[int, int] = (5, 2)
 
     @property
-    def not_modelled(self) -> tuple[str, ...]:
+    def not_modeled(self) -> tuple[str, ...]:
         """The names of what its ledger has as approximated or skipped."""
-        return tuple(entry.object for entry in self.ledger if not entry.is_modelled)
+        return tuple(entry.object for entry in self.ledger if not entry.is_modeled)
 
     def __post_init__(self) -> None:
         if len(self.origin) != 3 or not np.isfinite(self.origin).all():
@@ -246,19 +246,19 @@ class Scene:
             if image not in self.images:
                 raise InputError(f"the world names the image {quoted(image)}, which the scene does not have")
         named = [
-            (f"{component} of material {quoted(name)}", colour)
+            (f"{component} of material {quoted(name)}", color)
             for name, material in self.materials.items()
-            for component, colour in material.inputs
+            for component, color in material.inputs
         ]
         named += [
-            (f"the emission of light {quoted(lamp.name)}", colour)
+            (f"the emission of light {quoted(lamp.name)}", color)
             for lamp in self.lamps
             if lamp.emission
-            for colour in lamp.emission.colours
+            for color in lamp.emission.colors
         ]
-        for what, colour in named:
-            if colour.image is not None and colour.image not in self.images:
-                raise InputError(f"{what} names the image {quoted(colour.image)}, which the scene does not have")
+        for what, color in named:
+            if color.image is not None and color.image not in self.images:
+                raise InputError(f"{what} names the image {quoted(color.image)}, which the scene does not have")
 
 
 def _check_links(lamps: tuple[Lamp, ...], objects: tuple[Object, ...]) -> None:

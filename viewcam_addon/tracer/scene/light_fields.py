@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from ...checks import quoted
 from ...errors import InputError
 from . import Scene, lamps, placing, value_nodes
-from .colours import RGBE, TEXELS
+from .colors import RGBE, TEXELS
 from .fields import Arrays, Field
 from .film import Bounces, Film
 from .geometry_fields import LARGEST_INLINE, array_document
 from .lamps import Lamp, World
-from .materials import COMPONENTS, Colour, Material, Picture, sum_of
+from .materials import COMPONENTS, Color, Material, Picture, sum_of
 from .shader_nodes import KINDS, MOST_DEEP, Node
 
 KEYS = ("images", "materials", "lamps", "world", "film", "bounces", "cycles")
@@ -106,20 +106,20 @@ def _node_document(node: Node) -> dict[str, Any]:
         known = KINDS[node.type].inputs[name]
         if isinstance(value, Node):
             return _node_document(value)
-        three = value.rgb if isinstance(value, Colour) and value == Colour(value.rgb) else value
+        three = value.rgb if isinstance(value, Color) and value == Color(value.rgb) else value
         if isinstance(known, float) and isinstance(three, tuple) and three == (three[0],) * 3:
             return three[0]
         if known is value_nodes.IMAGE:
             return value.image
-        return _colour_document(value) if isinstance(value, Colour) else value
+        return _color_document(value) if isinstance(value, Color) else value
 
     return {"type": node.type} | {name: value_of(name, value) for name, value in node.inputs}
 
 
-def _colour_document(colour: Colour) -> list[float] | dict[str, Any]:
-    if colour == Colour(colour.rgb):
-        return list(colour.rgb)
-    document = {each.name: getattr(colour, each.name) for each in dataclasses.fields(colour)}
+def _color_document(color: Color) -> list[float] | dict[str, Any]:
+    if color == Color(color.rgb):
+        return list(color.rgb)
+    document = {each.name: getattr(color, each.name) for each in dataclasses.fields(color)}
     return {key: value for key, value in document.items() if value and (key, value) != ("rgb", _WHITE)}
 
 
@@ -137,8 +137,8 @@ def _picture(field: Field, arrays: Arrays) -> Picture:
 def _material(field: Field) -> Material:
     """A tree of nodes, or components, which are read as one."""
     keys = field.fields((), (*COMPONENTS, "ior", "surface", "transparent_shadow", "displacement"))
-    stated: dict[str, Any] = {name: _colour(keys[name]) for name in COMPONENTS if name in keys}
-    beside = [name for name, colour in stated.items() if not colour.is_black]
+    stated: dict[str, Any] = {name: _color(keys[name]) for name in COMPONENTS if name in keys}
+    beside = [name for name, color in stated.items() if not color.is_black]
     if "surface" in keys and beside:
         field.fail(f"has a surface beside {', '.join(beside)}: give one or the other")
     if "ior" in keys:
@@ -178,20 +178,20 @@ def _node_input(field: Field, default: object, of_value: bool, deep: int) -> Any
     if isinstance(default, bool):
         return field.truth()
     if default is value_nodes.IMAGE:
-        return Colour(_WHITE, field.text())
+        return Color(_WHITE, field.text())
     if default in (value_nodes.NAME, value_nodes.IES) or (isinstance(default, tuple) and isinstance(default[0], str)):
         return field.text()
     if isinstance(field.value, list) and of_value:
         return field.vector(3)
-    return _colour(field) if isinstance(field.value, list | dict) else field.number()
+    return _color(field) if isinstance(field.value, list | dict) else field.number()
 
 
-def _colour(field: Field) -> Colour:
+def _color(field: Field) -> Color:
     """Three numbers, or an object where an image or the mesh's own colors come in."""
     is_varied = isinstance(field.value, dict)
     keys = field.fields((), ("rgb", "image", "closest", "vertex")) if is_varied else {"rgb": field}
     try:
-        return Colour(
+        return Color(
             rgb=keys["rgb"].vector(3) if "rgb" in keys else _WHITE,
             image=keys["image"].text() if "image" in keys else None,
             closest=keys["closest"].truth() if "closest" in keys else False,

@@ -10,10 +10,10 @@ from typing import Any
 
 from ... import checks
 from ...errors import InputError
-from .colours import LARGEST_RADIANCE, WHITE, Colour, Picture, radiance
+from .colors import LARGEST_RADIANCE, WHITE, Color, Picture, radiance
 from .shader_nodes import Closure, Node, closures, node
 
-__all__ = ["LARGEST_RADIANCE", "PLAIN", "Colour", "Material", "Picture", "radiance", "simplified", "sum_of"]
+__all__ = ["LARGEST_RADIANCE", "PLAIN", "Color", "Material", "Picture", "radiance", "simplified", "sum_of"]
 
 LEAST_IOR, MOST_IOR = 1e-3, 1e3
 
@@ -52,14 +52,14 @@ class Material:
         return any(closure.node.is_shining for closure in self.closures)
 
     @property
-    def inputs(self) -> tuple[tuple[str, Colour], ...]:
+    def inputs(self) -> tuple[tuple[str, Color], ...]:
         """The inputs of all colors and numbers, each with its name in sentences."""
-        result = [("displacement", colour) for colour in self.displacement.colours] if self.displacement else []
+        result = [("displacement", color) for color in self.displacement.colors] if self.displacement else []
         for closure in self.closures:
             kind = closure.node.type
             for name, value in (*closure.node.inputs, *(("a factor", factor) for factor, _ in closure.factors)):
-                colours = value.colours if isinstance(value, Node) else [value] if isinstance(value, Colour) else []
-                result += [(f"{name} of {kind}", colour) for colour in colours]
+                colors = value.colors if isinstance(value, Node) else [value] if isinstance(value, Color) else []
+                result += [(f"{name} of {kind}", color) for color in colors]
         return tuple(result)
 
     @property
@@ -83,7 +83,7 @@ COMPONENTS = {"emission": "emission", "diffuse": "diffuse", "mirror": "glossy", 
 
 
 def sum_of(
-    ior: float = 1.45, transparent_shadow: bool = True, displacement: Node | None = None, **components: Colour
+    ior: float = 1.45, transparent_shadow: bool = True, displacement: Node | None = None, **components: Color
 ) -> Material:
     """The material whose light is the sum of components; without any it is black.
 
@@ -95,11 +95,11 @@ def sum_of(
     ior = checks.number("ior of a material", ior, LEAST_IOR, MOST_IOR)
     surface: Node | None = None
     for name, kind in COMPONENTS.items():
-        colour = components.pop(name, None)
-        if colour is None or colour.is_black:
+        color = components.pop(name, None)
+        if color is None or color.is_black:
             continue
         more = {} if name in ("emission", "diffuse") else {"roughness": 0.0, "distribution": "ggx"}
-        shader = node(kind, color=colour, **more, **({"ior": ior} if name in ("glass", "refraction") else {}))
+        shader = node(kind, color=color, **more, **({"ior": ior} if name in ("glass", "refraction") else {}))
         surface = shader if surface is None else node("add", first=surface, second=shader)
     if components:
         raise TypeError(f"a material has no component {', '.join(components)}")
@@ -170,17 +170,18 @@ def _sum(total: dict[str, Any], added: dict[str, Any], weight: float) -> dict[st
     return result
 
 
-def _scaled(value: Colour | Node, factor: float | None) -> Colour | None:
+def _scaled(value: Color | Node, factor: float | None) -> Color | None:
     """None where light can't have that, or the core alone knows what it is."""
     if factor is None or isinstance(value, Node) or max(value.rgb) * factor > LARGEST_RADIANCE:
         return None
-    return replace(value, rgb=tuple(each * factor for each in value.rgb))
+    red, green, blue = value.rgb
+    return replace(value, rgb=(red * factor, green * factor, blue * factor))
 
 
-def _constant(value: Colour | Node) -> float | None:
+def _constant(value: Color | Node) -> float | None:
     return None if isinstance(value, Node) or value.varies or len(set(value.rgb)) > 1 else value.rgb[0]
 
 
-PLAIN_COLOR = Colour((0.8, 0.8, 0.8))
+PLAIN_COLOR = Color((0.8, 0.8, 0.8))
 PLAIN = sum_of(diffuse=PLAIN_COLOR)
 """The material of a surface that has none, in Blender as here."""

@@ -12,11 +12,11 @@ from typing import Any
 from ... import checks
 from ...errors import InputError
 from . import ies, value_nodes
-from .colours import LARGEST_RADIANCE, WHITE, Colour
+from .colors import LARGEST_RADIANCE, WHITE, Color
 
 RGB = tuple[float, float, float]
 
-GREY = (0.8, 0.8, 0.8)
+GRAY = (0.8, 0.8, 0.8)
 # How facets are stretched along a tangent.
 ANISOTROPY: dict[str, value_nodes.Default | None] = {"anisotropy": 0.0, "rotation": 0.0, "tangent": value_nodes.TANGENT}
 DISTRIBUTIONS = ("multiscatter_ggx", "ggx", "beckmann")
@@ -44,14 +44,14 @@ class Kind:
 
 
 KINDS: dict[str, Kind] = {
-    "diffuse": Kind({"color": GREY, "roughness": 0.0, "normal": value_nodes.NORMAL}, ("diffuse",)),
-    "translucent": Kind({"color": GREY, "normal": value_nodes.NORMAL}, ("transmission",)),
+    "diffuse": Kind({"color": GRAY, "roughness": 0.0, "normal": value_nodes.NORMAL}, ("diffuse",)),
+    "translucent": Kind({"color": GRAY, "normal": value_nodes.NORMAL}, ("transmission",)),
     "glossy": Kind(
-        {"color": GREY, "roughness": 0.5, **ANISOTROPY, "distribution": DISTRIBUTIONS, "normal": value_nodes.NORMAL},
+        {"color": GRAY, "roughness": 0.5, **ANISOTROPY, "distribution": DISTRIBUTIONS, "normal": value_nodes.NORMAL},
         ("glossy",),
     ),
     "sheen": Kind(
-        {"color": GREY, "roughness": 0.5, "distribution": ("microfiber", "ashikhmin"), "normal": value_nodes.NORMAL},
+        {"color": GRAY, "roughness": 0.5, "distribution": ("microfiber", "ashikhmin"), "normal": value_nodes.NORMAL},
         ("diffuse", "glossy"),
     ),
     "metallic": Kind(
@@ -83,7 +83,7 @@ KINDS: dict[str, Kind] = {
     "transparent": Kind({"color": WHITE}),
     "principled": Kind(
         {
-            "base_color": GREY,
+            "base_color": GRAY,
             "metallic": 0.0,
             "roughness": 0.5,
             "ior": 1.5,
@@ -168,7 +168,7 @@ MOST_DEEP = 250
 class Node:
     """A node, and through its inputs all that feed it.
 
-    type : one of `KINDS`. inputs : (name, value) of those that are not what they are by default. Of a shader a `Colour`, a
+    type : one of `KINDS`. inputs : (name, value) of those that are not what they are by default. Of a shader a `Color`, a
     word, or a `Node`: a shader where one belongs, else one that makes values. Of that also whether something holds, and in
     place of constant colors three numbers, which may be negative.
     """
@@ -200,7 +200,7 @@ class Node:
             raise InputError(f"an input is computed by more than {MOST_NODES} nodes: give it fewer")
 
     def __getitem__(self, name: str) -> Any:
-        """The value of an input: a `Colour`, a word, or a `Node` or None; of a node that makes values three numbers, too."""
+        """The value of an input: a `Color`, a word, or a `Node` or None; of a node that makes values three numbers, too."""
         return dict(self.inputs).get(name, self._default(name))
 
     def _default(self, name: str) -> Any:
@@ -219,7 +219,7 @@ class Node:
             return ""
         if isinstance(default, tuple) and isinstance(default[0], str):
             return default[0]
-        return _number_or_colour(default, self.is_value)
+        return _number_or_color(default, self.is_value)
 
     @property
     def is_value(self) -> bool:
@@ -236,13 +236,13 @@ class Node:
         return False
 
     @property
-    def colours(self) -> Iterator[Colour]:
+    def colors(self) -> Iterator[Color]:
         """All images and colors of the mesh that a value is made from."""
         for _, value in self.inputs:
-            if isinstance(value, Colour):
+            if isinstance(value, Color):
                 yield value
             elif isinstance(value, Node):
-                yield from value.colours
+                yield from value.colors
 
     @property
     def all(self) -> Iterator["Node"]:
@@ -295,10 +295,10 @@ class Closure:
     """A closure, and the factors of its weight: (a mixture's, whether it is what that leaves to the other side)."""
 
     node: Node
-    factors: tuple[tuple[Colour, bool], ...] = ()
+    factors: tuple[tuple[Color, bool], ...] = ()
 
 
-def closures(shader: Node | None, factors: tuple[tuple[Colour, bool], ...] = ()) -> Iterator[Closure]:
+def closures(shader: Node | None, factors: tuple[tuple[Color, bool], ...] = ()) -> Iterator[Closure]:
     """All closures of a tree, but for those that have no weight."""
     if shader is None:
         return
@@ -315,14 +315,14 @@ def closures(shader: Node | None, factors: tuple[tuple[Colour, bool], ...] = ())
         yield Closure(shader, factors)
 
 
-def _number_or_colour(value: Any, may_be_negative: bool) -> Any:
-    if may_be_negative and isinstance(value, Colour) and not value.varies:
+def _number_or_color(value: Any, may_be_negative: bool) -> Any:
+    if may_be_negative and isinstance(value, Color) and not value.varies:
         value = value.rgb
-    if isinstance(value, bool | Colour):
+    if isinstance(value, bool | Color):
         return value
     three = (float(value),) * 3 if isinstance(value, int | float) else value
     if not may_be_negative:
-        return Colour(three)
+        return Color(three)
     three = checks.vector("a value", three, 3)
     if any(abs(number) > LARGEST_RADIANCE for number in three):
         raise InputError(f"a value is {checks.quoted(three)}: give numbers up to {LARGEST_RADIANCE:g}")
@@ -352,7 +352,7 @@ def _checked(name: str, value: Any, known: Any, of_value: bool) -> Any:
         ies.read(name, value)
         return value
     if known is value_nodes.IMAGE:
-        if not isinstance(value, Colour) or value != Colour(WHITE, value.image):
+        if not isinstance(value, Color) or value != Color(WHITE, value.image):
             raise InputError(f"{name} is no image: give its name")
         return value
     if isinstance(value, Node):
@@ -360,6 +360,6 @@ def _checked(name: str, value: Any, known: Any, of_value: bool) -> Any:
     if known in value_nodes.OWN:
         raise InputError(f"{name} is no node: give one that makes a {known}, as {'normal_map' if known == 'normal' else known}")
     try:
-        return _number_or_colour(value, of_value)
+        return _number_or_color(value, of_value)
     except (InputError, TypeError, ValueError) as error:
         raise InputError(f"{name}: {error}") from error

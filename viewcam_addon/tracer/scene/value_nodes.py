@@ -41,7 +41,7 @@ GENERATED = "generated"
 
 Default = float | Vector | tuple[str, ...] | bool | str
 
-BLACK, GREY, WHITE = (0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (1.0, 1.0, 1.0)
+BLACK, GRAY, WHITE = (0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (1.0, 1.0, 1.0)
 
 DIMENSIONS = ("3d", "1d", "2d", "4d")
 MATH = (
@@ -222,7 +222,7 @@ KINDS: dict[str, ValueNode] = {
     ),
     "vector_transform": _row(
         {
-            "vector": GREY,
+            "vector": GRAY,
             "kind": ("vector", "point", "normal"),
             "from": ("world", "object", "camera"),
             "to": ("object", "world", "camera"),
@@ -383,8 +383,8 @@ KINDS: dict[str, ValueNode] = {
     "mix_color": _row(
         {
             "factor": 0.5,
-            "a": GREY,
-            "b": GREY,
+            "a": GRAY,
+            "b": GRAY,
             "blend": tuple(BLENDS.split()),
             "clamp_factor": True,
             "clamp_result": False,
@@ -430,7 +430,7 @@ KINDS: dict[str, ValueNode] = {
         ),
     ),
     "mix_components": _row(
-        {"factor": GREY, "a": BLACK, "b": BLACK, "clamp_factor": True},
+        {"factor": GRAY, "a": BLACK, "b": BLACK, "clamp_factor": True},
         BlenderNode(
             "MIX",
             "Mix",
@@ -456,7 +456,7 @@ KINDS: dict[str, ValueNode] = {
         BlenderNode("HUE_SAT", "HueSaturation", _COLOR, inputs={"factor": "Fac"}),
     ),
     "invert": _row({"factor": 1.0, "color": BLACK}, BlenderNode("INVERT", "Invert", _COLOR, inputs={"factor": "Fac"})),
-    "rgb_to_bw": _row({"color": GREY}, BlenderNode("RGBTOBW", "RGBToBW", {"Val": None})),
+    "rgb_to_bw": _row({"color": GRAY}, BlenderNode("RGBTOBW", "RGBToBW", {"Val": None})),
     "noise": _row(
         {
             "vector": GENERATED,

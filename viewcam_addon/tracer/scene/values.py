@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ... import checks
-from .colours import radiance
+from .colors import radiance
 
 LARGEST = 1e18
 """The largest coordinate and size, as of scenes: products of a few of them are float64's."""

@@ -10,7 +10,7 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.blender.scenes import recentering
-from viewcam_addon.errors import InputError, NotModelledError
+from viewcam_addon.errors import InputError, NotModeledError
 from viewcam_addon.jobs.job import Job
 
 UTM = (448262.25, 5411932.5, 42.0)
@@ -50,7 +50,7 @@ def test_the_ledger_is_that_of_the_file(crowd, scene, add, mesh_from, check):
     plain, sides = jobs.export(Job()), check()
     assert sorted(map(near_the_origin, sides.exported.ledger)) == sorted(map(near_the_origin, plain.ledger))
     assert {entry.status for entry in plain.ledger} == {"exported", "approximated", "skipped"}
-    with pytest.raises(NotModelledError, match="Hair"):
+    with pytest.raises(NotModeledError, match="Hair"):
         jobs.export(Job(strict=True, recenter=True))
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.scene.lamps import Area, Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, sum_of
+from viewcam_addon.tracer.scene.materials import Color, sum_of
 
 CAMERA = Pinhole((0, -6, 3), (0, 0, 0.6), (0, 0, 1), 84, 72, 48)
 SUN = Sun("sun", towards=(0.5, -0.6, 1), irradiance=(3, 3, 2.7))
@@ -26,10 +26,10 @@ def floor(make_mesh):
 def sunny(make_lit, floor, make_spheres):
     """sunny(**light) → Scene: spheres on a floor, under a sun of no size."""
     things = (
-        (floor(), sum_of(diffuse=Colour((0.6, 0.7, 0.8)))),
+        (floor(), sum_of(diffuse=Color((0.6, 0.7, 0.8)))),
         (
             make_spheres([(-1, 0, 0.8), (1, 0.5, 0.6)], [0.8, 0.6]),
-            sum_of(diffuse=Colour((0.8, 0.3, 0.2))),
+            sum_of(diffuse=Color((0.8, 0.3, 0.2))),
         ),
     )
 

@@ -1,4 +1,4 @@
-"""As many samples as a wanted error takes: where they go, that the error is met, and that means stay right."""
+"""Samples up to a wanted error: where they go, that the error is met, and that means stay right."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Area, Spot
-from viewcam_addon.tracer.scene.materials import Colour, sum_of
+from viewcam_addon.tracer.scene.materials import Color, sum_of
 
 pytestmark = pytest.mark.slow
 
@@ -18,9 +18,9 @@ def mirrored(make_lit, floor, make_spheres, soft):
     matrix = np.eye(4)
     matrix[:3, 3] = (0.5, 0, 3)
     things = (
-        (floor(), sum_of(diffuse=Colour((0.6, 0.7, 0.8)))),
-        (make_spheres([(-1, 0, 0.8)], 0.8), sum_of(mirror=Colour((0.9,) * 3))),
-        (make_spheres([(1, 0.5, 0.6)], 0.6), sum_of(diffuse=Colour((0.8, 0.3, 0.2)))),
+        (floor(), sum_of(diffuse=Color((0.6, 0.7, 0.8)))),
+        (make_spheres([(-1, 0, 0.8)], 0.8), sum_of(mirror=Color((0.9,) * 3))),
+        (make_spheres([(1, 0.5, 0.6)], 0.6), sum_of(diffuse=Color((0.8, 0.3, 0.2)))),
     )
     lamp = Area("area", matrix=matrix, size=(0.5, 0.5), power=(100,) * 3)
     return make_lit(camera, *things, lamps=(lamp,), bounces=Bounces(2, 2, 2, 2))
@@ -31,7 +31,7 @@ def reference(mirrored):
     return render(mirrored, "path", 1024, 99)
 
 
-def grey(passes):
+def gray(passes):
     return passes["Combined"][..., :3].astype(float).mean(axis=-1)
 
 
@@ -56,16 +56,16 @@ def off_by(pictures, truth, variance):
 
 def test_means_are_right_over_many_seeds_in_every_tile_and_in_all(mirrored, reference):
     """Pixels that went on for what they had met, and stopped for what they had missed, would be too dark: by some 16 errors."""
-    pictures = [grey(render(mirrored, "path", 128, seed, error=0.05)) for seed in range(24)]
-    by_tile, whole = off_by(pictures, grey(reference), reference["Variance"].astype(float).mean(axis=-1))
+    pictures = [gray(render(mirrored, "path", 128, seed, error=0.05)) for seed in range(24)]
+    by_tile, whole = off_by(pictures, gray(reference), reference["Variance"].astype(float).mean(axis=-1))
     assert abs(whole) < 4, f"the picture is off by {whole:+.1f} standard errors"
     # Student's t of 23 degrees of freedom exceeds 5 once in 40,000 times; there are 28 tiles.
     assert np.abs(by_tile).max() < 5, f"a tile is off by {np.abs(by_tile).max():.1f} standard errors"
 
 
 def test_pictures_that_lost_what_few_samples_met_would_be_told(mirrored, reference):
-    pictures = [np.minimum(grey(render(mirrored, "path", 16, seed)), 2 * grey(reference)) for seed in range(24)]
-    by_tile, whole = off_by(pictures, grey(reference), reference["Variance"].astype(float).mean(axis=-1))
+    pictures = [np.minimum(gray(render(mirrored, "path", 16, seed)), 2 * gray(reference)) for seed in range(24)]
+    by_tile, whole = off_by(pictures, gray(reference), reference["Variance"].astype(float).mean(axis=-1))
     assert abs(whole) > 4 or np.abs(by_tile).max() > 5
 
 
@@ -107,7 +107,7 @@ def test_without_noise_all_pixels_have_the_fewest_samples(make_lit, floor):
 
 WANTED = 0.02
 MOST = 12 * WANTED
-WHITE = sum_of(diffuse=Colour((0.9,) * 3))
+WHITE = sum_of(diffuse=Color((0.9,) * 3))
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def with_things(make_lit, floor, sunny):
 
     def build(geometry, material=WHITE, **light):
         light = {"lamps": scene.lamps, **light}
-        return make_lit(scene.camera, (floor(), sum_of(diffuse=Colour((0.05,) * 3))), (geometry, material), **light)
+        return make_lit(scene.camera, (floor(), sum_of(diffuse=Color((0.05,) * 3))), (geometry, material), **light)
 
     return build
 
@@ -187,7 +187,7 @@ def assert_no_light_is_lost(scene, seeds=48):
 def test_a_small_bright_window_that_few_samples_see(with_things, make_mesh):
     """It covers a hundredth of one pixel, and is forty times as bright as white."""
     window = make_mesh([(0.5, 0, 0.8), (0.508, 0, 0.8), (0.508, 0, 0.808), (0.5, 0, 0.808)], [(0, 1, 2), (0, 2, 3)])
-    assert_no_light_is_lost(with_things(window, sum_of(emission=Colour((40,) * 3))))
+    assert_no_light_is_lost(with_things(window, sum_of(emission=Color((40,) * 3))))
 
 
 def test_a_spot_whose_light_falls_within_a_pixel(with_things, make_spheres):

@@ -1,0 +1,66 @@
+"""NVISII's JSON beside each picture, in the manner of NDDS: RTMV, what DOPE is trained with, Isaac Sim's writers.
+
+`camera_data` has `camera_view_matrix`, world to camera. NVISII lists glm's matrix column after column, and USD has row vectors,
+so its rows are those of the transposed matrix, and the translation is the last one; where a program has transposed it, the last
+row is 0 0 0 1, and it is taken so. NVISII's camera has x right, y up, z away from the view, DOPE's x right, y down, z into it,
+under the same keys. Which it is, `camera_look_at` tells, or the objects, whose `location` counts from the camera; else it is
+NVISII's, unless `Options.pose` says otherwise. `intrinsics` are pixels of `width` × `height` from the picture's corner.
+
+Left out: NDDS's own files, whose intrinsics stand in another file and whose camera nothing describes.
+
+Source: NVISII's examples/21.ndds_export.py (export_to_ndds_file); Deep_Object_Pose's data_generation/nvisii_data_gen.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from . import axes
+from .camera import Camera, Options
+from .source import Record, Source
+
+TITLE = "NVISII, DOPE, RTMV (JSON)"
+SUFFIX = ".json"
+SEVERAL = "a folder"
+
+_LAST = [0.0, 0.0, 0.0, 1.0]
+_TAKEN = "Nothing says which way the camera looks along its z: it was taken as NVISII's, y up, z away from the view"
+
+
+def recognizes(source: Source) -> bool:
+    data = source.document.get("camera_data")
+    return isinstance(data, dict) and {"camera_view_matrix", "intrinsics"} <= data.keys()
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    data = Record(source.document["camera_data"], "camera_data")
+    stated = "width" in data and "height" in data
+    size = (data.size("width"), data.size("height")) if stated else options.size_or_refuse(source.name)
+    k = data.record("intrinsics")
+    f_x, f_y = (k.number(key, least=1e-9) for key in ("fx", "fy"))
+    plane = axes.view_plane(f_x, f_y, k.number("cx"), k.number("cy"), size)
+    matrix = np.array(data.numbers("camera_view_matrix", 16)).reshape(4, 4)
+    if matrix[3].tolist() != _LAST or matrix[:, 3].tolist() == _LAST:
+        matrix = matrix.T
+    forward = _forward(source, data, matrix[2, :3])
+    taken: tuple[str, ...] = ()
+    if forward == 0:
+        forward = 1.0 if options.pose == "w2c_opencv" else -1.0
+        taken = () if options.pose in ("w2c_opencv", "w2c_opengl") else (_TAKEN,)
+    rows = matrix[:3] * [[1.0], [forward], [forward]]
+    pose = axes.from_world_to_camera(rows[:, :3], rows[:, 3].tolist(), "camera_data")
+    pinhole, notes = axes.pinhole(pose, plane, "camera_data")
+    name = Path(source.name).stem if source.path else "camera"
+    return [Camera(name, pinhole, stated, (*taken, *notes), f"{name}.png" if source.path else None)]
+
+
+def _forward(source: Source, data: Record, z: np.ndarray) -> float:
+    """1 if the camera looks along its z, −1 if against it, 0 if nothing tells. z : (3) that axis in the world."""
+    if "camera_look_at" in data:
+        look = data.record("camera_look_at")
+        ahead = float(z @ np.subtract(look.numbers("at", 3), look.numbers("eye", 3)))
+        if ahead:
+            return float(np.sign(ahead))
+    objects = source.document.get("objects")
+    records = [Record(each, "an object") for each in objects if isinstance(each, dict)] if isinstance(objects, list) else []
+    return float(np.sign(sum(np.sign(each.numbers("location", 3)[2]) for each in records if "location" in each)))
