@@ -7,6 +7,7 @@
 
     camera.py       Camera and Options
     axes.py         the one place of conventions: axes, pixels, world
+    ground.py       the ground of a data set's points as z = 0; clouds.py finds these
     source.py       what is read from: text, file, folder; JSON and XML without their dangers
     distortion.py   lenses: what they do with a pinhole's picture
     undistortion.py photographs without their lens
@@ -64,6 +65,7 @@ from . import (
     fspy,
     gaussian_splatting,
     gltf,
+    ground,
     infinigen,
     instant_ngp,
     kubric,
@@ -204,6 +206,8 @@ def read(content: str | Path, *, format: str | None = None, options: Options | N
         if format and not _recognizes(module, source):
             raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
         read_cameras = _of_all(source, module, options)
+        if options.up_from == "ground":
+            return ground.leveled(read_cameras, source, options)
         return leveled(read_cameras) if options.up_from == "cameras" else read_cameras
 
 
