@@ -57,6 +57,8 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
             yield overrides, off
             return
         _check_files()
+        if bpy.app.background:
+            _leave_sculpt_mode()
         lacking = tuple(_without_cache(overrides.set))
         if not trust:
             off = (*lacking, *_without_trust(*_disarmed(overrides.set), *_unrun()))
@@ -103,6 +105,7 @@ def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, 
                     f"{path} can't be opened by Blender {bpy.app.version_string} ({reason}): save it again"
                 ) from error
             off.append(f"Blender {bpy.app.version_string} has read the file but for something: {reason}")
+    _leave_sculpt_mode()
     return (*off, *_without_trust(*_unrun()))
 
 
@@ -207,6 +210,21 @@ def _without_cache(put: _Put) -> Iterator[str]:
                     put(modifier, "show_render", False)
                     name = f"the modifier {modifier.name!r} of {each.name!r}"
                     yield f"{name} is off: its cache {folder} is missing, bake it again"
+
+
+def _leave_sculpt_mode() -> None:
+    """Put the objects of a file that was saved while they were sculpted into object mode.
+
+    Sculpting weighs the normals of a vertex's faces alike, a mesh by their angles, and the first render has the mesh's and each
+    further one the sculpture's: export and Cycles would see two of them. In a window the mode is the artist's, and stays.
+    """
+    objects = bpy.context.view_layer.objects
+    active = objects.active
+    for each in objects:
+        if each.mode == "SCULPT":
+            objects.active = each
+            bpy.ops.object.mode_set(mode="OBJECT")
+    objects.active = active
 
 
 def _unrun() -> Iterator[str]:

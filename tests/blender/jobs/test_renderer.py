@@ -179,6 +179,15 @@ def test_a_file_saved_in_edit_mode_is_seen_as_in_a_render(blend, both_sides):
     assert len(next(iter(sides.exported.geometries.values())).triangles) == 12
 
 
+def test_a_file_saved_in_sculpt_mode_has_the_normals_of_a_mesh_on_both_sides(blend, both_sides):
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    bpy.ops.mesh.primitive_cone_add(vertices=5, depth=1)  # around each vertex are angles of other sizes
+    bpy.ops.object.shade_smooth()
+    bpy.ops.object.mode_set(mode="SCULPT")
+    sides = both_sides(blend=blend())
+    sides.check()
+
+
 def test_linked_objects_are_exported_and_numbered(blend, scene, camera_object, both_sides):
     material = bpy.data.materials.new("Shared")
     bpy.data.objects["Cube"].data.materials.append(material)
