@@ -179,7 +179,7 @@ _Camera.property("zoom").setValue(2100.000000,);
 
 }else{alert ("Exit Import Blender animation data \\nNo Comp's name has been chosen","EXIT")};}
 """
-"""Of a script that somebody published, of Blender's add-on in 2012."""
+"""A script of Blender's add-on, as somebody published it in 2012."""
 
 
 def test_the_addons_script_is_the_camera_of_blender_that_it_was_made_of():

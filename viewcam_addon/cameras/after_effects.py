@@ -16,12 +16,11 @@ import re
 
 import numpy as np
 
-from .. import checks
 from ..errors import InputError
 from ..rotation import from_euler
 from . import axes
 from .camera import Camera, Options
-from .source import Source
+from .source import Source, flat, number
 
 TITLE = "After Effects' script of Blender's add-on (.jsx)"
 
@@ -29,6 +28,7 @@ _NUMBER = r"[-+]?[\d.]+(?:[eE][-+]?\d+)?"
 _COMPOSITION = re.compile(rf"\.addComp\([^;\n]{{0,200}}?,\s*(\d{{1,6}}),\s*(\d{{1,6}}),\s*({_NUMBER})\s*,")
 _CAMERA = re.compile(r"^\s*var (\w{1,200}) = \w{1,200}\.layers\.addCamera\(", re.MULTILINE)
 _PROPERTY = re.compile(r"^\s*(\w{1,200})\.property\(\"(\w{1,40})\"\)\.setValue(sAtTimes)?\(([^;\n]*)\);", re.MULTILINE)
+_BRACKETS = str.maketrans("[]", "  ")
 _SIZES = {"position": 3, "orientation": 3, "zoom": 1}
 _UNITS = "After Effects counts in pixels, y down: with the axes y_down and a scale of 0.01 they are Blender's as exported"
 
@@ -43,7 +43,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         raise InputError(f"{source.name} has no composition: export it again")
     width, height, aspect = composition.groups()
     size = int(width), int(height)
-    if float(aspect) != 1:
+    if number("the aspect of the composition's pixels", aspect) != 1:
         raise InputError(f"the composition's pixels have the aspect {aspect}: export it with square pixels")
     notes = () if options.axes == "y_down" else (_UNITS,)
     names = _CAMERA.findall(source.text)
@@ -60,10 +60,10 @@ def read(source: Source, options: Options) -> list[Camera]:
 def _values(what: str, arguments: str, animated: bool, count: int) -> tuple[np.ndarray, np.ndarray]:
     """The times (n) and values (n, count) of a call's arguments."""
     head, _, rest = arguments.partition("],") if animated else ("0", "", arguments)
-    times, numbers = (np.array([float(word) for word in re.findall(_NUMBER, part)]) for part in (head, rest))
+    times, numbers = (np.array(flat(what, part.translate(_BRACKETS).strip(" ,"))) for part in (head, rest))
     if not len(times) or len(numbers) != count * len(times):
         raise InputError(f"{what} has {len(times)} times and {len(numbers)} numbers: give {count} for each")
-    return checks.array(f"the times of {what}", times), checks.array(what, numbers).reshape(-1, count)
+    return times, numbers.reshape(-1, count)
 
 
 def _cameras(
@@ -74,7 +74,7 @@ def _cameras(
         raise InputError(f"{name} has no {missing[0]}: it can't be a camera without")
     times = sorted({time for keys, _ in keyed.values() for time in keys.tolist()})
     cameras = []
-    for number, time in enumerate(times):
+    for index, time in enumerate(times):
         place, angles, (zoom,) = (values[max(np.searchsorted(keys, time, "right") - 1, 0)] for keys, values in keyed.values())
         if not zoom > 0:
             raise InputError(f"the zoom of {name} is {zoom:g}: give one above 0")
@@ -83,6 +83,6 @@ def _cameras(
         plane = axes.view_plane(float(zoom), float(zoom), size[0] / 2, size[1] / 2, size)
         pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, name)
         flies = len(times) > 1
-        label = f"{name} {number:05d}" if flies else name
+        label = f"{name} {index:05d}" if flies else name
         cameras.append(Camera(label, pinhole, True, (*notes, *more), time=time if flies else None))
     return cameras

@@ -29,6 +29,7 @@ _VIEWS = ("cameras", "camera")
 _FILE = "document.json"
 _MOST_BYTES = 2**24  # of it in a project
 _FOV, _RATE = 60.0, 30.0  # SuperSplat's, where a file says none
+_FOVS = 1e-6, 180 - 1e-6  # degrees from which on and up to which it is one
 _TURNED = "SuperSplat shows a splat turned by 180° about z, and its y is up: the original world is that of the .ply"
 _SPLINE = "These are the path's keyframes: SuperSplat itself flies through them along a spline"
 
@@ -49,7 +50,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     cameras: list[Camera] = []
     for pose, time in poses or [(view, None) for view in _views(top)]:
         eye, target = (_turned(pose.numbers(key, 3), sign) for key in ("position", "target"))
-        d = max(size) / 2 / math.tan(math.radians(pose.number("fov", _fov(top), 1e-6, 180 - 1e-6)) / 2)
+        d = max(size) / 2 / math.tan(math.radians(pose.number("fov", _fov(top), *_FOVS)) / 2)
         pinhole = Pinhole(eye, target, (0.0, sign, 0.0), d, width, height)
         name = str(pose.get("name") or f"{len(cameras):05d}")
         cameras.append(Camera(name, pinhole, False, notes, time=time))
@@ -74,7 +75,7 @@ def _document(source: Source) -> Mapping[str, Any]:
 def _fov(top: Record) -> float:
     """The degrees of a pose that says none."""
     camera = top.get("camera")
-    return Record(camera, "camera").number("fov", _FOV) if isinstance(camera, dict) else _FOV
+    return Record(camera, "camera").number("fov", _FOV, *_FOVS) if isinstance(camera, dict) else _FOV
 
 
 def _keyframes(top: Record) -> Iterator[tuple[Record, float]]:
