@@ -23,7 +23,7 @@ import json
 import math
 import os
 from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -330,6 +330,32 @@ def write(path: str | os.PathLike[str], image: Image) -> None:
 def write_rgba(path: str | os.PathLike[str], pixels: NDArray[np.float32]) -> None:
     """Write a plain 32-bit EXR of one picture. pixels : (height, width, 4), rows from the **top**. Raises as `write` does."""
     _save(path, {}, {letter: np.ascontiguousarray(pixels[..., i]) for i, letter in enumerate("RGBA")})
+
+
+_DATA = ("Vector", "Denoising Depth", "Denoising Normal", "Crypto")
+"""The beginnings of names of Blender's further passes that are no colors."""
+
+
+def rewrite(path: str | os.PathLike[str], change: Callable[[NDArray[Any], bool], NDArray[Any]]) -> None:
+    """Write an EXR anew, with other pixels in the same channels; its texts stay.
+
+    change : (height, width, channels), rows from the **top**, and whether these are data, of which nothing may be between →
+    the new ones. Raises InputError as `read` and `write` do.
+    """
+    channels, _, attributes = _pixels(Path(path))
+    result: dict[str, NDArray[Any]] = {}
+    for is_data in (False, True):
+        names = [name for name in channels if _is_data(name) == is_data]
+        if names:
+            pixels = change(np.stack([channels[name] for name in names], axis=-1), is_data)
+            result |= {name: np.ascontiguousarray(pixels[..., i]) for i, name in enumerate(names)}
+    _save(path, attributes, {name: result[name] for name in channels})
+
+
+def _is_data(channel: str) -> bool:
+    """True if what lies between two numbers of a channel is neither, as of depths and indices."""
+    *_, name, _ = ("", "", *channel.split("."))[-3:]
+    return OLDER_NAMES.get(name, name) in _GEOMETRY or name.startswith(_DATA)
 
 
 def _save(path: str | os.PathLike[str], attributes: Mapping[str, Any], channels: Mapping[str, NDArray[np.float32]]) -> None:

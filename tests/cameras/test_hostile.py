@@ -95,9 +95,9 @@ def places(value, path=()):
         yield from places(inner, (*path, key))
 
 
-def read_or_refused(given_, options=GIVEN):
+def read_or_refused(source, options=GIVEN):
     try:
-        return cameras.read(given_, options=options)
+        return cameras.read(source, options=options)
     except InputError as error:
         assert str(error) and "\n" not in str(error), str(error)
         return []
@@ -133,6 +133,8 @@ def texts():
         "1 1 2 3 0 0 0 1\n2 1 2 3 0 0 0 1\n",
         files.realitycapture_table(known, files.RC_HEADS[1], -0.1),
         files.visualsfm(known, term=-0.1),
+        files.mvsnet(known),
+        files.KITTI,
         '<x xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#" xcr:FocalLength35mm="30"><xcr:Rotation>1 0 0 0 1 0 0 0 1'
         "</xcr:Rotation><xcr:Position>1 2 3</xcr:Position></x>",
     ]

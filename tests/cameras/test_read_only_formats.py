@@ -490,7 +490,7 @@ def test_gaussian_splattings_principal_point_counts_where_it_is_said():
 
 
 def nerfstudio_path(*known, fov=None):
-    """As get_path_from_json takes it: the focal length is height / 2 / tan(fov / 2)."""
+    """A path as get_path_from_json takes it: the focal length is height / 2 / tan(fov / 2)."""
     path = [
         {
             "camera_to_world": [*each.opengl.ravel().tolist(), 0, 0, 0, 1],
@@ -586,8 +586,8 @@ def kubric(*known, **metadata):
     quaternions = [np.roll(rotation.from_matrix(each.opengl[:, :3]).as_quat(), 1).tolist() for each in known]
     camera = {"positions": [each.e.tolist() for each in known], "quaternions": quaternions, "sensor_width": 32.0}
     camera["focal_length"] = known[0].f_x / known[0].width * 32
-    said = {"resolution": [known[0].width, known[0].height], "frame_rate": 12, **metadata}
-    return {"camera": camera, "metadata": said, "instances": []}
+    metadata_of_views = {"resolution": [known[0].width, known[0].height], "frame_rate": 12, **metadata}
+    return {"camera": camera, "metadata": metadata_of_views, "instances": []}
 
 
 @pytest.mark.parametrize("name", CENTERED)
@@ -724,11 +724,11 @@ def test_open3d_has_column_after_column_and_counts_from_the_first_pixels_center(
 def opensfm(known, **camera):
     rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_matrix(known.opencv).as_rotvec().tolist()
     longer = max(known.width, known.height)
-    said = {"projection_type": "brown", "width": known.width, "height": known.height}
-    said |= {"focal_x": known.f_x / longer, "focal_y": known.f_y / longer}
-    said |= {"c_x": (known.c_x - known.width / 2) / longer, "c_y": (known.c_y - known.height / 2) / longer}
+    entry = {"projection_type": "brown", "width": known.width, "height": known.height}
+    entry |= {"focal_x": known.f_x / longer, "focal_y": known.f_y / longer}
+    entry |= {"c_x": (known.c_x - known.width / 2) / longer, "c_y": (known.c_y - known.height / 2) / longer}
     shot = {"rotation": rotation, "translation": (-known.opencv @ known.e).tolist(), "camera": "c"}
-    return [{"cameras": {"c": said | camera}, "shots": {"a.jpg": shot}, "points": {}}]
+    return [{"cameras": {"c": entry | camera}, "shots": {"a.jpg": shot}, "points": {}}]
 
 
 @pytest.mark.parametrize("name", UNMIRRORED)
@@ -1011,9 +1011,9 @@ def test_realitycaptures_table_without_a_focal_length_has_poses():
 
 def test_a_single_term_of_realitycaptures_table_is_divisions_and_several_are_browns():
     known = Known("plain")
-    given = Options(size=(known.width, known.height))
-    (division,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1), options=given)
-    (brown,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1, 0.02), options=given)
+    options = Options(size=(known.width, known.height))
+    (division,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1), options=options)
+    (brown,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1, 0.02), options=options)
     assert division.lens.projection == "division" and division.lens.parameters == (-0.1,)
     assert brown.lens.projection == "pinhole" and brown.lens.radial == (-0.1, 0.02)
     assert all(any("does not name the lens's model" in note for note in camera.notes) for camera in (division, brown))
@@ -1059,3 +1059,211 @@ def test_visualsfms_term_is_of_the_radius_in_the_photograph(term):
     if term < 0:  # turns back at 1 / √(3 · 0.2) = 1.29
         assert np.isnan(camera.lens.undistort([[1.3, 0.0]])).all() and not np.isnan(camera.lens.undistort([[1.28, 0.0]])).any()
     assert camera.pinhole.principal_point == (known.width / 2, known.height / 2)
+
+
+def mvsnet(known):
+    """E and K by MVSNet's README.md, with the depths that BlendedMVS adds."""
+    rows = [*np.column_stack([known.opencv, -known.opencv @ known.e]), [0, 0, 0, 1]]
+    k = [[known.f_x, 0, known.c_x], [0, known.f_y, known.c_y], [0, 0, 1]]
+    extrinsic, intrinsic = ("\n".join(map(text_of, each)) for each in (rows, k))
+    return f"extrinsic\n{extrinsic}\n\nintrinsic\n{intrinsic}\n\n425.0 2.5 192 935.0\n"
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_mvsnet_counts_from_the_corner(name):
+    known = Known(name)
+    the_same(cameras.read(mvsnet(known), options=Options(size=(known.width, known.height))), known)
+
+
+def png(width, height):
+    return b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + struct.pack(">II", width, height)
+
+
+def test_mvsnets_data_set_is_read_by_its_folder_with_its_pictures(tmp_path):
+    known = Known("shifted")
+    for name in ("cams", "blended_images"):
+        (tmp_path / name).mkdir()
+    for number in range(2):
+        (tmp_path / "cams" / f"{number:08d}_cam.txt").write_text(mvsnet(known))
+        (tmp_path / "blended_images" / f"{number:08d}.png").write_bytes(png(known.width, known.height))
+    (tmp_path / "cams" / "pair.txt").write_text("1\n0\n1 1 0.5\n")
+    for place in (tmp_path, tmp_path / "cams"):
+        read = cameras.read(place)
+        assert [(camera.name, camera.image) for camera in read] == [(f"0000000{i}", f"0000000{i}.png") for i in range(2)]
+        the_same(read[1:], known)
+    (tmp_path / "cams" / "00000001_cam.txt").write_text("extrinsic\n1 0 0 0\n")
+    with pytest.raises(InputError, match=r"00000001_cam\.txt"):
+        cameras.read(tmp_path)
+
+
+def test_middlebury_lists_k_r_and_t(tmp_path):
+    names = ("plain", "pixels_not_square")
+    lines = []
+    for name in names:
+        known = Known(name)
+        k = [known.f_x, 0, known.c_x - 0.5, 0, known.f_y, known.c_y - 0.5, 0, 0, 1]
+        lines.append(f"{name}.png {text_of(k)} {text_of(known.opencv)} {text_of(-known.opencv @ known.e)}")
+        (tmp_path / f"{name}.png").write_bytes(png(known.width, known.height))
+    (tmp_path / "temple_par.txt").write_text("\n".join(["2", *lines, ""]))
+    for camera, name in zip(cameras.read(tmp_path / "temple_par.txt"), names, strict=True):
+        assert the_same([camera], Known(name)).image == f"{name}.png" and camera.size_stated
+        assert any("half a pixel was added" in note for note in camera.notes)
+    (tmp_path / "temple_par.txt").write_text("\n".join(["3", *lines, "lost.png 1 2 3", ""]))
+    with pytest.raises(InputError, match=r"line 4 .* 21 numbers"):
+        cameras.read(tmp_path / "temple_par.txt")
+
+
+def test_the_right_camera_of_middleburys_pair_sees_a_point_further_left():
+    """A depth as scenes2014 has it: Z = baseline · f / (d + doffs). The numbers are Adirondack's."""
+    text = "cam0=[4161.221 0 1445.577; 0 4161.221 984.686; 0 0 1]\ncam1=[4161.221 0 1654.636; 0 4161.221 984.686; 0 0 1]\n"
+    left, right = cameras.read(text + "doffs=209.059\nbaseline=176.252\nwidth=2880\nheight=1988\nndisp=280\n")
+    assert (left.pinhole.width, left.pinhole.height) == (2880, 1988) and (left.name, right.image) == ("cam0", "im1.png")
+    point = np.array([[120.0, -80.0, 2500.0]])
+    seen = [camera.pinhole.project(point) for camera in (left, right)]
+    disparity = seen[0][0] - seen[1][0]
+    assert 176.252 * 4161.221 / (disparity[0] + 209.059) == pytest.approx(2500, rel=1e-12)
+    assert seen[0][0][0] == pytest.approx(4161.221 * 120 / 2500 + 1445.577 + 0.5, rel=1e-14)
+    assert 1988 - seen[0][1][0] == pytest.approx(4161.221 * -80 / 2500 + 984.686 + 0.5, rel=1e-13)
+
+
+def projection(known, half=0.5):
+    k = [[known.f_x, 0, known.c_x - half], [0, known.f_y, known.c_y - half], [0, 0, 1]]
+    return k @ np.column_stack([known.opencv, -known.opencv @ known.e])
+
+
+@pytest.mark.parametrize("scale", [1.0, -2.5e-3])
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_neus_has_one_matrix_for_k_and_the_pose(tmp_path, name, scale):
+    known = Known(name)
+    (tmp_path / "image").mkdir()
+    (tmp_path / "image" / "0042.png").write_bytes(png(known.width, known.height))
+    world = np.vstack([scale * projection(known), [0, 0, 0, 1]])
+    sphere = np.diag([3.0, 3, 3, 1])
+    sphere[:3, 3] = 7, 8, 9
+    np.savez(tmp_path / "cameras_sphere.npz", world_mat_0=world, scale_mat_0=sphere, world_mat_inv_0=np.linalg.inv(world))
+    for place in (tmp_path, tmp_path / "cameras_sphere.npz"):
+        read = the_same(cameras.read(place), known, 2.0**-45)
+        assert (read.name, read.image) == ("0042", "image/0042.png")
+        assert any("(7, 8, 9) with the radius 3" in note for note in read.notes)
+
+
+def test_neus_matrices_are_those_that_opencv_takes_apart(tmp_path):
+    cv2 = pytest.importorskip("cv2")
+    world = np.array(  # of DTU's scan 114, as its data set has it: float32
+        [
+            [-646.67957, -2440.9016, 1633.1099, -517707.4],
+            [677.9055, 1317.4757, 2549.6375, -1194084.2],
+            [-0.902711, 0.167153, 0.396449, 407.8815],
+            [0, 0, 0, 1],
+        ],
+        dtype=np.float32,
+    )
+    np.savez(tmp_path / "cameras.npz", world_mat_0=world)
+    (camera,) = cameras.read(tmp_path / "cameras.npz", options=Options(size=(1600, 1200)))
+    k, turn, center, *_ = cv2.decomposeProjectionMatrix(world[:3].astype(float))
+    k = k / k[2, 2]
+    u, v, w = camera.pinhole.axes()
+    assert np.abs(np.array([u, -np.array(v), -np.array(w)]) - turn).max() < 1e-6  # float32 has seven digits
+    assert camera.pinhole.eye == pytest.approx((center[:3] / center[3]).ravel(), rel=1e-9)
+    assert camera.pinhole.distance == pytest.approx((k[0, 0], k[1, 1]), rel=1e-6)
+    assert camera.pinhole.principal_point == pytest.approx((k[0, 2] + 0.5, 1200 - k[1, 2] - 0.5), abs=1e-3)
+
+
+KITTI = """P0: 7.188560e+02 0.0 6.071928e+02 0.0 0.0 7.188560e+02 1.852157e+02 0.0 0.0 0.0 1.0 0.0
+P1: 7.188560e+02 0.0 6.071928e+02 -3.861448e+02 0.0 7.188560e+02 1.852157e+02 0.0 0.0 0.0 1.0 0.0
+P2: 7.188560e+02 0.0 6.071928e+02 4.538225e+01 0.0 7.188560e+02 1.852157e+02 -1.130887e-01 0.0 0.0 1.0 3.779761e-03
+Tr: 4.2e-04 -9.9e-01 -8.0e-03 -1.1e-02 -7.2e-03 8.0e-03 -9.9e-01 -5.4e-02 9.9e-01 4.8e-04 -7.2e-03 -2.9e-01
+"""
+
+
+def test_kittis_cameras_stand_side_by_side(tmp_path):
+    (tmp_path / "image_1").mkdir()
+    (tmp_path / "image_1" / "000000.png").write_bytes(png(1241, 376))
+    (tmp_path / "calib.txt").write_text(KITTI)
+    with pytest.raises(InputError, match=r"P0 .* how many pixels"):
+        cameras.read(tmp_path / "calib.txt")
+    read = cameras.read(tmp_path / "calib.txt", options=Options(size=(1241, 376)))
+    assert [(camera.name, camera.size_stated) for camera in read] == [("P0", False), ("P1", True), ("P2", False)]
+    assert read[1].pinhole.eye == pytest.approx((3.861448e02 / 7.188560e02, 0, 0), abs=1e-12)
+    points = np.random.default_rng(3).uniform([-5, -2, 4], [5, 2, 40], (50, 3))
+    for camera, line in zip(read, KITTI.split("\n"), strict=False):
+        p = np.array(line.split()[1:], float).reshape(3, 4)
+        column, row, depth = p @ np.c_[points, np.ones(50)].T
+        ours = camera.pinhole.project(points)
+        assert (
+            np.abs(ours[0] - (column / depth + 0.5)).max() < 1e-9 and np.abs(376 - ours[1] - (row / depth + 0.5)).max() < 1e-9
+        )
+    (raw,) = cameras.read("S_rect_02: 1.242e+03 3.75e+02\n" + KITTI.split("\n")[2].replace("P2", "P_rect_02") + "\n")
+    assert (raw.name, raw.pinhole.width, raw.pinhole.height) == ("P_rect_02", 1242, 375)
+    with pytest.raises(InputError, match="widths"):
+        cameras.read("P0: 1 0 0 0 0 1 0 0 0 0 1 0\n", options=Options(size=(1242, 375)))
+
+
+def test_pmvs_counts_from_the_corner_and_dtu_from_the_first_pixels_center(tmp_path):
+    known = Known("shifted_and_not_square")
+    options = Options(size=(known.width, known.height))
+    the_same(cameras.read("CONTOUR\n" + "\n".join(map(text_of, projection(known, 0))) + "\n", options=options), known, 2.0**-48)
+    for number in range(2):
+        (tmp_path / f"pos_{number:03d}.txt").write_text("\n".join(map(text_of, projection(known))))
+    read = cameras.read(tmp_path, options=options)
+    assert [camera.name for camera in read] == ["pos_000", "pos_001"]
+    the_same(read[1:], known, 2.0**-48)
+    with pytest.raises(InputError, match="--pose"):  # a pose, in which K is missing
+        cameras.read("1 0 0 5\n0 1 0 6\n0 0 1 7\n", options=options)
+
+
+def test_bops_camera_json_is_k_alone():
+    """The numbers are those of LM's camera.json."""
+    sensor = {"cx": 325.2611, "cy": 242.04899, "depth_scale": 1.0, "fx": 572.4114, "fy": 573.57043, "height": 480, "width": 640}
+    (camera,) = cameras.read(json.dumps(sensor))
+    column, row, _ = camera.pinhole.project(np.array([[0.1, -0.2, 1.5]]))
+    assert column[0] == pytest.approx(572.4114 / 15 + 325.2611 + 0.5, rel=1e-14)
+    assert 480 - row[0] == pytest.approx(-573.57043 * 2 / 15 + 242.04899 + 0.5, rel=1e-13)
+    assert any("no world" in note for note in camera.notes)
+
+
+def pose_text(known):
+    return "\n".join(map(text_of, [*np.column_stack([known.opencv.T, known.e]), [0, 0, 0, 1]])) + "\n"
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_redwoods_log_has_five_lines_a_pose_and_replicas_trajectory_one(name):
+    known = Known(name)
+    plane = ViewPlane(known.pinhole.distance, known.pinhole.principal_point, known.width, known.height)
+    line = pose_text(known).replace("\n", " ")
+    for text in (f"0 0 1\n{pose_text(known)}1 1 2\n{pose_text(known)}", f"{line}\n{line}\n"):
+        first, second = cameras.read(text, options=Options(view_plane=plane))
+        the_same([first], known)
+        the_same([second], known)
+        assert second.time == pytest.approx(1 / 30) and any("whose poses" in note for note in first.notes)
+
+
+def test_scannets_folder_has_its_intrinsics_and_pictures(tmp_path):
+    known = Known("shifted")
+    for name in ("pose", "color", "intrinsic"):
+        (tmp_path / name).mkdir()
+    k = [[known.f_x, 0, known.c_x - 0.5, 0], [0, known.f_y, known.c_y - 0.5, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    (tmp_path / "intrinsic" / "intrinsic_color.txt").write_text("\n".join(map(text_of, k)))
+    (tmp_path / "color" / "0.jpg").write_bytes(png(known.width, known.height))
+    for number in (0, 2, 10):
+        (tmp_path / "pose" / f"{number}.txt").write_text(pose_text(known))
+    (tmp_path / "pose" / "3.txt").write_text("-inf -inf -inf -inf\n" * 4)
+    for place in (tmp_path, tmp_path / "pose"):
+        read = cameras.read(place)
+        assert [(camera.name, camera.image) for camera in read] == [(f"{i}", f"{i}.jpg") for i in (0, 2, 10)]
+        assert the_same(read[2:], known).size_stated and any(
+            "1 pictures that were not placed" in note for note in read[0].notes
+        )
+    the_same(cameras.read(tmp_path / "pose" / "2.txt", options=Options(size=(known.width, known.height))), known)
+
+
+def test_seven_scenes_frames_go_to_the_world_and_a_pose_of_nobody_knows_is_asked_for(tmp_path):
+    known = Known("plain")
+    (tmp_path / "frame-000001.pose.txt").write_text(pose_text(known))
+    options = Options(base=known.pinhole)
+    assert the_same(cameras.read(tmp_path, options=options), known).name == "frame-000001"
+    with pytest.raises(InputError, match="--pose"):
+        cameras.read(pose_text(known), options=options)
+    the_same(cameras.read(pose_text(known), options=Options(base=known.pinhole, pose="c2w_opencv")), known)
+    with pytest.raises(InputError, match="how it sees"):
+        cameras.read(tmp_path)

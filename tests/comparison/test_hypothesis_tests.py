@@ -92,7 +92,7 @@ def sides_of(kind, rng, samples, each, seeds, claimed=1.0):
 
 
 def run(sides, samples, seeds):
-    """As radiance.compare asks, which takes the reference's variance to be that of batches."""
+    """The tests, run as by radiance.compare, which takes the reference's variance to be that of batches."""
     return hypothesis_tests.run(sides, NO_ROUNDING, (min(samples, VARIANCE_BATCHES) - 1, max(seeds - 1, 1)), LEVEL)
 
 

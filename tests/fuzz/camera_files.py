@@ -36,6 +36,12 @@ def _npz() -> bytes:
     return packed.getvalue()
 
 
+def _neus(matrix: np.ndarray) -> bytes:
+    packed = io.BytesIO()
+    np.savez(packed, world_mat_0=np.vstack([matrix, [0, 0, 0, 1]]), scale_mat_0=np.diag([2.0, 2, 2, 1]))
+    return packed.getvalue()
+
+
 def _npy() -> bytes:
     saved = io.BytesIO()
     pose = np.column_stack([[[0, 1, 0], [-1, 0, 0], [0, 0, 1]], [1, 2, 3], [360, 640, 600]])  # down, right, back, eye, size
@@ -165,6 +171,20 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "realitycapture_table": {"a.csv": published.realitycapture_table(known, published.RC_HEADS[0], -0.1, 0.02)},
         "visualsfm": {"a.nvm": published.visualsfm(known, term=-0.1)},
         "bundler": {"a.out": f"# Bundle file v0.3\n2 0\n600 0 0\n{POSE}600 -0.2 0.1\n{POSE}", "list.txt": "a.jpg\nb.jpg\n"},
+        "mvsnet": {".": "", "cams/00000000_cam.txt": published.mvsnet(known)},
+        "middlebury": {"a_par.txt": f"1\na.png {'9 0 4 0 9 3 0 0 1'} 1 0 0 0 1 0 0 0 1 1 2 3\n"},
+        "middlebury_pair": {"calib.txt": "cam0=[400 0 32; 0 400 24; 0 0 1]\ncam1=[400 0 36; 0 400 24; 0 0 1]\nbaseline=176\n"},
+        "neus": {"cameras_sphere.npz": _neus(published.projection(known))},
+        "kitti_calibration": {"calib.txt": published.KITTI},
+        "pmvs": {"a.txt": "CONTOUR\n" + "\n".join(map(published.text_of, published.projection(known)))},
+        "pose_files": {
+            ".": "",
+            "intrinsic/intrinsic_color.txt": "500 0 32 0\n0 500 24 0\n0 0 1 0\n0 0 0 1\n",
+            **{f"pose/{number}.txt": published.pose_text(known) for number in range(2)},
+        },
+        "redwood": {"a.log": f"0 0 1\n{published.pose_text(known)}" * 2},
+        "replica": {"traj.txt": f"{published.pose_text(known).replace(chr(10), ' ')}\n" * 2},
+        "bop_sensor": {"camera.json": json.dumps(dict(fx=572, fy=573, cx=325, cy=242, width=640, height=480, depth_scale=1))},
         "llff": {"poses_bounds.npy": _npy()},
         "polycam": {"a.json": json.dumps(phone)},
         "scanner": {"a.json": json.dumps(scanner)},

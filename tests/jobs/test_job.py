@@ -16,14 +16,18 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from viewcam_addon import cli
+from viewcam_addon.cameras.calibration import Calibration
+from viewcam_addon.cameras.distortion import opencv
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import job, names
 from viewcam_addon.jobs.job import FIELDS, Job
 from viewcam_addon.jobs.problems import ShotsError
 from viewcam_addon.jobs.settings import settings_hash
 from viewcam_addon.jobs.shards import shard
+from viewcam_addon.pinhole import ViewPlane
 
 FOUR = {"eye": (1.0, 2.0, 3.0), "look_at": (0.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0), "d": 400.0}
+CALIBRATION = Calibration(ViewPlane((300.0, 301.0), (160.5, 90.0), 320, 180), opencv({"k1": 0.1, "p1": 0.0}))
 
 
 def test_a_shot_keeps_plain_numbers_whatever_it_is_given():
@@ -116,6 +120,7 @@ def test_every_field_has_a_check():
 
 OTHERS = {"blend": "a.blend", "trust": True, "seed": 7, "threads": 2, "error": 0.01, "device": "CUDA", "clay": True}
 OTHERS |= {"recenter": True, "strict": True, "scene": "b.json", "level": "path", "samples": 64, "width": 64, "height": 36}
+OTHERS |= {"calibration": CALIBRATION}
 
 
 def test_a_job_comes_back_from_json_as_it_was():
@@ -226,6 +231,8 @@ def test_hashes_are_equal_if_and_only_if_the_settings_are(first, second):
         {"strict": True},
         {"scene": "approved.json"},
         {"find": "1%"},
+        {"calibration": CALIBRATION},
+        {"calibration": dataclasses.replace(CALIBRATION, lens=opencv({"k1": 0.1, "p1": 5e-324}))},
     ],
     ids=lambda change: next(iter(change)),
 )
@@ -240,7 +247,7 @@ def test_what_does_not_decide_the_picture_changes_nothing(change):
 
 def test_every_field_of_a_job_decides_or_does_not():
     fields = {"eye", "look_at", "up", "d", "camera", "width", "height", "frame", "engine", "samples", "level", "trust", "seed"}
-    fields |= {"error", "find", "device", "clay", "recenter", "strict", "scene", "name", "blend", "threads"}
+    fields |= {"error", "find", "device", "clay", "recenter", "strict", "scene", "name", "blend", "threads", "calibration"}
     assert fields | {"principal_point", "pixel_aspect", "mirrored"} == {field.name for field in dataclasses.fields(SHOT)}
 
 

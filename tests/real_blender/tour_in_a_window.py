@@ -84,12 +84,12 @@ def take_the_picture(step, path):
     yield from step.pose_for_the_picture()
     move(*MOUSE_AWAY)
     yield from draw_finely()
-    part, share = _shown(step.shows)
+    part, share = _area_and_share(step.shows)
     photograph(part, path, share)
     yield from step.after_the_picture()
 
 
-def _shown(name):
+def _area_and_share(name):
     """(left, bottom, width, height) of what a picture shows, and in how many percent of its size."""
     if name == "sidebar":
         _, sidebar = region("VIEW_3D", "UI")

@@ -7,6 +7,7 @@
 
     camera.py       Camera and Options
     axes.py         the one place of conventions: axes, pixels, world
+    ground.py       the ground of a data set's points as z = 0; clouds.py finds these
     source.py       what is read from: text, file, folder; JSON and XML without their dangers
     distortion.py   lenses: what they do with a pinhole's picture
     undistortion.py photographs without their lens
@@ -64,6 +65,7 @@ from . import (
     fspy,
     gaussian_splatting,
     gltf,
+    ground,
     infinigen,
     instant_ngp,
     kubric,
@@ -72,8 +74,10 @@ from . import (
     matrices,
     meshroom,
     metashape,
+    middlebury,
     mitsuba,
     mujoco,
+    mvsnet,
     nerfstudio_path,
     nvisii,
     open3d,
@@ -82,7 +86,9 @@ from . import (
     opensfm,
     own,
     pbrt,
+    pose_files,
     pov_ray,
+    projections,
     ray_tracer_challenge,
     realitycapture,
     ros,
@@ -135,6 +141,10 @@ FORMATS: dict[str, ModuleType] = {
     "bundler": bundler,
     "visualsfm": visualsfm,
     "llff": llff,
+    "mvsnet": mvsnet,
+    "middlebury": middlebury,
+    "projections": projections,
+    "pose_files": pose_files,
     "arkit": arkit,
     "gaussian_splatting": gaussian_splatting,
     "nerfstudio_path": nerfstudio_path,
@@ -179,10 +189,10 @@ def writable() -> list[str]:
     return [name for name, module in FORMATS.items() if hasattr(module, "write")]
 
 
-def read(given: str | Path, *, format: str | None = None, options: Options | None = None) -> list[Camera]:
+def read(content: str | Path, *, format: str | None = None, options: Options | None = None) -> list[Camera]:
     """The cameras of a text, a file or a folder.
 
-    given : a text, or the Path of a file or folder. format : one of `readable()`; None to recognize it by its content.
+    content : a text, or the Path of a file or folder. format : one of `readable()`; None to recognize it by its content.
 
     Raises
     ------
@@ -190,12 +200,14 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
         if there is no camera in it, or one that is no pinhole, lacks something, or is not what it should be.
     """
     options = options or Options()
-    source = Source(given)
+    source = Source(content)
     module = _module(format or recognized(source), "read")
     with _told_of_damage(source, module.TITLE), np.errstate(all="ignore"):  # anything may stand in a file
         if format and not _recognizes(module, source):
             raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
         read_cameras = _of_all(source, module, options)
+        if options.up_from == "ground":
+            return ground.leveled(read_cameras, source, options)
         return leveled(read_cameras) if options.up_from == "cameras" else read_cameras
 
 

@@ -1,8 +1,9 @@
-"""BOP's scene_camera.json: K for each image of a scene and, where the scene has a world, its pose.
+"""BOP's scene_camera.json: K for each image of a scene and, where the scene has a world, its pose; and camera.json, K alone.
 
 World to camera, x right, y down, z into the view, in **millimeters**, whose numbers stay unless a scale is chosen (0.001 makes
 meters). BOP's toolkit puts (0, 0) at the center of the first pixel. The size is that of the pictures in rgb/ or gray/, of the
-data set's camera.json, or given. Without a pose the camera stands at the origin: BOP's objects are posed to the camera then.
+data set's camera.json, or given; those of scene_camera_cam1.json are in rgb_cam1/, gray_cam1/ or cam1/. Without a pose the
+camera stands at the origin: BOP's objects are posed to the camera then.
 
 Source: bop_toolkit's docs/bop_datasets_format.md and bop_toolkit_lib/misc.py (depth_im_to_dist_im).
 """
@@ -16,19 +17,23 @@ from . import axes, naming, opencv, own
 from .camera import Camera, Options
 from .source import Record, Source, image_size, pixels
 
-TITLE = "BOP scene_camera.json"
+TITLE = "BOP scene_camera.json and camera.json"
 SUFFIX = ".json"
 FILE = "scene_camera.json"
 
 _FOLDERS = ("rgb", "gray")
+_OF_SENSOR = {"fx", "fy", "cx", "cy", "width", "height", "depth_scale"}
 _UNITS = "BOP counts in millimeters: a scale of 0.001 makes them meters"
+_NO_WORLD = "The scene has no world: the camera stands at the origin and looks along z, y down"
 
 
 def recognizes(source: Source) -> bool:
-    return _document(source) is not None
+    return _document(source) is not None or source.document.keys() >= _OF_SENSOR
 
 
 def read(source: Source, options: Options) -> list[Camera]:
+    if source.document.keys() >= _OF_SENSOR:
+        return [_of_sensor(source, options)]
     source = _document(source)
     cameras = []
     for number, values in source.document.items():
@@ -40,14 +45,24 @@ def read(source: Source, options: Options) -> list[Camera]:
         if "cam_R_w2c" in image or "cam_t_w2c" in image:
             turn, translation = np.array(image.numbers("cam_R_w2c", 9)).reshape(3, 3), image.numbers("cam_t_w2c", 3)
         else:
-            notes += ("The scene has no world: the camera stands at the origin and looks along z, y down",)
+            notes += (_NO_WORLD,)
         pinhole, more = axes.pinhole(axes.from_world_to_camera(turn, translation, image.place), plane, image.place)
         cameras.append(Camera(str(number), pinhole, stated, (*notes, *more), name))
     return cameras
 
 
 def notes_in(source: Source) -> list[str]:
-    return [_document(source).text]
+    return [document.text] if (document := _document(source)) else []
+
+
+def _of_sensor(source: Source, options: Options) -> Camera:
+    values = Record(source.document, source.name)
+    k = [values.number(key) for key in ("fx", "fy", "cx", "cy")]
+    plane = opencv.plane_of_k(k, (values.size("width"), values.size("height")), opencv.half_pixel(options), source.name)
+    matrix = axes.from_world_to_camera(np.eye(3), (0.0, 0.0, 0.0), source.name)
+    pinhole, _ = axes.pinhole(matrix, plane, source.name)
+    notes = (*opencv.told_of_half_pixel(options, "BOP"), _NO_WORLD)
+    return Camera(source.path.stem if source.path else "camera", pinhole, True, notes)
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
@@ -76,7 +91,8 @@ def _document(source: Source) -> Source | None:
 
 def _picture(source: Source, number: str, image: Record, options: Options) -> tuple[str | None, tuple[int, int], bool]:
     if source.path and number.isdecimal():
-        for folder in _FOLDERS:
+        sensor = source.path.stem.removeprefix("scene_camera")
+        for folder in (*(f"{each}{sensor}" for each in _FOLDERS), sensor[1:] or _FOLDERS[0]):
             for suffix in ("png", "jpg", "tif"):
                 name = f"{folder}/{int(number):06d}.{suffix}"
                 if size := image_size(source.path.parent / name):

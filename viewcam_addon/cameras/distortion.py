@@ -9,15 +9,18 @@ src/colmap/sensor/models.h; Devernay and Faugeras 2001 (FOV), Fitzgibbon 2001 (d
 has no picture in a plane at all, as panoramas, is refused by name, in camera.py.
 """
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import checks
 from ..errors import InputError
-from ..pinhole import ViewPlane
+from ..pinhole import Pinhole, ViewPlane
 
 _UNSEEN = 1e-3  # pixels: what this project calls the same camera
 _STEPS = 100  # of Newton's method, which takes five or so where there is an answer
@@ -53,6 +56,31 @@ class Lens:
             while terms and not terms[-1]:
                 terms = terms[:-1]
             object.__setattr__(self, name, tuple(terms))
+
+    def to_json(self) -> dict[str, Any]:
+        """All of it, as JSON can hold it."""
+        return {**dataclasses.asdict(self), "terms": dict(self.terms)}
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
+        """The lens that `to_json` gave. Raises InputError for what is none."""
+        try:
+            values = {**document, "terms": tuple((str(name), float(value)) for name, value in document["terms"].items())}
+            for name, count in _COUNTS.items():
+                numbers = checks.array(name, values[name])
+                checks.finite(name, numbers)
+                if numbers.ndim != 1 or (count and len(numbers) != count):
+                    raise ValueError(f"no {name}")
+                values[name] = tuple(numbers.tolist())
+            values["skew"] = checks.number("skew", values["skew"])
+            checks.truth("radial_first", values["radial_first"])
+            if len(values["parameters"]) != PROJECTIONS[values["projection"]]:
+                raise ValueError("no parameters")
+            if values["projection"] in ("fov", "measured") and not all(values["parameters"]):
+                raise ValueError("a divisor of 0")
+            return cls(**values)
+        except (LookupError, TypeError, ValueError, AttributeError) as error:
+            raise InputError("the lens is none of this project's: write the file again") from error
 
     def distort(self, points: ArrayLike) -> np.ndarray:
         """The places in the photograph of a pinhole's points, (..., 2) → (..., 2); NaN where the model has none."""
@@ -150,8 +178,39 @@ class Lens:
         return np.where(is_right[..., None], inverse, np.nan)
 
 
-PROJECTIONS = ("pinhole", "equidistant", "fov", "division", "measured", "eucm")
-"""The laws by which a lens moves a point along its radius, but for its polynomial."""
+PROJECTIONS = {"pinhole": 0, "equidistant": 0, "fov": 1, "division": 1, "measured": 1, "eucm": 2}
+"""The laws by which a lens moves a point along its radius, but for its polynomial, and how many parameters each has."""
+
+_COUNTS = {"parameters": 0, "radial": 0, "divisor": 0, "tangential": 2, "prism": 4, "tilt": 2}
+"""The fields of `Lens` that are several numbers, and how many; 0 for any number of them."""
+
+
+def view_plane(pinhole: Pinhole, lens: Lens | None, columns: ArrayLike, rows: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """The view plane's points that places in the photograph show: as Pinhole.view_plane has them, x and y at distance 1.
+
+    pinhole : of the photograph's own plane. columns, rows : of the photograph, from its left and bottom edge; broadcast where
+    there is a lens. NaN where it shows nothing.
+    """
+    x, y = pinhole.view_plane(columns, rows)
+    if lens is None:
+        return x, y
+    x, down = np.moveaxis(lens.undistort(np.stack(np.broadcast_arrays(x, -y), axis=-1)), -1, 0)
+    return x, -down
+
+
+def project(pinhole: Pinhole, lens: Lens | None, points: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The places in the photograph at which points appear, and their depths, as Pinhole.project has them.
+
+    pinhole : of the photograph's own plane. points : (..., 3), world space. NaN where the lens folds: it shows no point there.
+    """
+    column, row, depth = pinhole.project(points)
+    if lens is None:
+        return column, row, depth
+    with np.errstate(invalid="ignore"):
+        straight = (np.stack([column, row], axis=-1) - pinhole.principal_point) / pinhole.distance * (1, -1)
+        bent = np.where(lens.folds(straight)[..., None], np.nan, lens.distort(straight))
+        column, row = np.moveaxis(bent * (1, -1) * pinhole.distance + pinhole.principal_point, -1, 0)
+    return column, row, depth
 
 
 def opencv(k: Mapping[str, float], terms: Mapping[str, float] | None = None, skew: float = 0.0) -> Lens:

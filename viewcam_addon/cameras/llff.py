@@ -26,7 +26,7 @@ def recognizes(source: Source) -> bool:
 
 def read(source: Source, _options: Options) -> list[Camera]:
     rows = _array(source)
-    images = _images(source, len(rows))
+    images = naming.in_order(source.path if source.is_folder or not source.path else source.path.parent, _FOLDERS, len(rows))
     cameras = []
     for index, row in enumerate(rows):
         what = f"picture {index}"
@@ -54,13 +54,3 @@ def _array(source: Source) -> np.ndarray | None:
     if array.ndim != 2 or array.shape[1] not in (15, 17) or not len(array):
         return None
     return array.astype(np.float64)
-
-
-def _images(source: Source, count: int) -> list[str]:
-    folder = source.path if source.is_folder else source.path.parent if source.path else None
-    for name in _FOLDERS if folder else ():
-        if (folder / name).is_dir():
-            names = sorted(each.name for each in (folder / name).iterdir() if naming.has_suffix(each.name))
-            if len(names) == count:
-                return [f"{name}/{each}" for each in names]
-    return []

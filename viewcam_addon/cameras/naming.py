@@ -81,6 +81,17 @@ def near(path: str, folder: Path) -> Path | None:
     return None
 
 
+def in_order(folder: Path | None, places: Sequence[str], count: int) -> list[str]:
+    """The paths of a data set's pictures in the order of their names, from the first of these folders that has so many of them;
+    none where there is no such folder."""
+    for place in places:
+        if folder and (folder / place).is_dir():
+            names = sorted(each.name for each in (folder / place).iterdir() if has_suffix(each.name))
+            if len(names) == count:
+                return [f"{place}/{each}" for each in names]
+    return []
+
+
 def check_image(file: object) -> None:
     """Refuse a path by which no dataset can name a picture.
 

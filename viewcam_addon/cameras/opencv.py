@@ -282,12 +282,17 @@ def plane_of_k(values: Sequence[float], size: tuple[int, int], half: float, what
         as `matrix_of_k` does, or if K can't count in pixels.
     """
     f_x, f_y, c_x, c_y = matrix_of_k(values, what)
+    refuse_widths(f_x, f_y, c_x, c_y, size, what)
+    return axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
+
+
+def refuse_widths(f_x: float, f_y: float, c_x: float, c_y: float, size: tuple[int, int], what: str) -> None:
+    """Raise InputError if K's numbers can't count in pixels."""
     if max(f_x, f_y) < max(size) / _WIDEST and max(abs(c_x), abs(c_y)) < 2:
         raise InputError(
             f"K of {what} has the focal length {f_x:g} and the principal point {c_x:g}, {c_y:g}, which seem to count in widths "
             "of the picture: multiply its rows by the width and the height"
         )
-    return axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
 
 
 def of_window(plane: ViewPlane, values: Mapping[str, Any], what: str) -> tuple[ViewPlane, tuple[str, ...]]:

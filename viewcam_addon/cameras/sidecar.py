@@ -17,10 +17,12 @@ from ..pinhole import Pinhole
 from . import naming
 from .axes import camera_to_world, intrinsics, world_to_camera
 from .camera import Camera, Options
+from .distortion import Lens, settle
 from .source import Record, Source
 
 TITLE = "the sidecars of a batch"
 SUFFIX = ".json"
+LENSES = True
 
 CONVENTION = (
     "K times the first three numbers of worldToCamera times (x, y, z, 1) is depth times (column, row, 1): column vectors; "
@@ -29,14 +31,14 @@ CONVENTION = (
 )
 
 
-def record(pinhole: Pinhole, camera_data: CameraData | None = None) -> dict[str, Any]:
+def record(pinhole: Pinhole, camera_data: CameraData | None = None, lens: Lens | None = None) -> dict[str, Any]:
     """The camera as JSON has it, every number a float64 to the bit.
 
-    camera_data : lens, sensor and shift, where it is a Blender camera.
+    camera_data : lens, sensor and shift, where it is a Blender camera. lens : what bends the picture.
 
     Returns `camera` (the keys and conventions of a scene file: `Pinhole(**record["camera"])` is the pinhole), `cameraToWorld`
     and `worldToCamera` (4 × 4), `K` (3 × 3), `convention` (what these mean, see axes.py), and `blender` (the fields of
-    `CameraData`) if that is given.
+    `CameraData`) and `lens` (those of `Lens`) if these are given.
 
     Raises
     ------
@@ -51,6 +53,7 @@ def record(pinhole: Pinhole, camera_data: CameraData | None = None) -> dict[str,
         "K": intrinsics(pinhole),
         "convention": CONVENTION,
         **({} if camera_data is None else {"blender": dataclasses.asdict(camera_data)}),
+        **({} if lens is None else {"lens": lens.to_json()}),
     }
 
 
@@ -58,15 +61,15 @@ def recognizes(source: Source) -> bool:
     return _is_ours(source) or any(map(_is_ours, source.files("*.json")))
 
 
-def read(source: Source, _options: Options) -> list[Camera]:
+def read(source: Source, options: Options) -> list[Camera]:
     files = [source] if not source.is_folder else [file for file in source.files("*.json") if _is_ours(file)]
-    return [_camera(file) for file in files]
+    return [_camera(file, options) for file in files]
 
 
 def write(cameras: Sequence[Camera], _options: Options) -> dict[str, str]:
     naming.refuse_taken([camera.name for camera in cameras])
     return {
-        f"{camera.name}.json": json.dumps({"image": camera.image, **record(camera.pinhole)}, indent=1) + "\n"
+        f"{camera.name}.json": json.dumps({"image": camera.image, **record(camera.pinhole, lens=camera.lens)}, indent=1) + "\n"
         for camera in cameras
     }
 
@@ -75,7 +78,7 @@ def _is_ours(source: Source) -> bool:
     return {"camera", "cameraToWorld", "worldToCamera", "K"} <= source.document.keys()
 
 
-def _camera(source: Source) -> Camera:
+def _camera(source: Source, options: Options) -> Camera:
     document = Record(source.document, source.name)
     camera = document.record("camera")
     fields = {field.name for field in dataclasses.fields(Pinhole)}
@@ -85,4 +88,10 @@ def _camera(source: Source) -> Camera:
         raise InputError(f"{camera.place} has no {min(missing)}: it can't be a camera without")
     preview = next((document.get(key) for key in ("preview", "image") if isinstance(document.get(key), str)), None)
     name = naming.stem(preview) if preview else source.path.stem if source.path else "camera"
-    return Camera(name, Pinhole(**camera.values), image=preview)
+    pinhole = Pinhole(**camera.values)
+    lens: Lens | None = None
+    notes: tuple[str, ...] = ()
+    if "lens" in document:
+        stated = Lens.from_json(document.record("lens").values)
+        lens, notes = settle(stated, pinhole.plane, camera.place, options.without_distortion)
+    return Camera(name, pinhole, notes=notes, image=preview, lens=lens)

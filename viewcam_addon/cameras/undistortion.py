@@ -34,6 +34,7 @@ from .source import Source
 FORMS = ("transforms", "colmap")
 _SCALES = (0.2, 2.0)  # of the picture's sides, at least and at most: COLMAP's
 _BAND = 2**20  # pixels that are computed at a time
+_IN_CACHE = 2**13  # of them, where each is computed again and again: twice as fast
 _FOLDERS = {"mask_path": "masks", "depth_file_path": "depths"}  # by the keys of a frame
 
 
@@ -94,8 +95,31 @@ def places(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> np.ndarray:
     return pixels
 
 
-def _bands(cut: ViewPlane) -> list[slice]:
-    step = max(1, _BAND // cut.width)
+@lru_cache(maxsize=1)
+def points(lens: Lens, plane: ViewPlane, place: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
+    """The pinhole's points that the centers of the photograph's pixels show, or another place in each.
+
+    plane : of the photograph. place : in a pixel, from its upper left corner. (rows, columns, 2), in the view plane at
+    distance 1, y down, rows from the top; NaN where none is.
+    """
+    middle = np.array([plane.principal_point[0], plane.height - plane.principal_point[1]])
+    result = np.empty((plane.height, plane.width, 2))
+    columns, down = np.arange(plane.width) + place[0], np.arange(plane.height) + place[1]
+    for rows in _bands(plane, _IN_CACHE):
+        result[rows] = lens.undistort((np.stack(np.meshgrid(columns, down[rows]), axis=-1) - middle) / plane.distance)
+    return result
+
+
+def places_back(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> np.ndarray:
+    """The places in the pinhole's picture at which the centers of the photograph's pixels are seen.
+
+    plane : of the photograph. cut : of the picture. (rows, columns, 2), from the corner, y down; NaN where none is.
+    """
+    return points(lens, plane) * cut.distance + (cut.principal_point[0], cut.height - cut.principal_point[1])
+
+
+def _bands(cut: ViewPlane, at_once: int = _BAND) -> list[slice]:
+    step = max(1, at_once // cut.width)
     return [slice(start, min(start + step, cut.height)) for start in range(0, cut.height, step)]
 
 
@@ -106,14 +130,7 @@ def st_maps(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> tuple[np.ndarray, n
     second the other way round. (rows, columns, 4) float32, rows from the top: s from the left and t from the **bottom**, 0 … 1
     from edge to edge, 0, and 1; all 0 where it is nothing of the other, a pixel around which counts: sizes are whole numbers.
     """
-    middle = np.array([plane.principal_point[0], plane.height - plane.principal_point[1]])
-    middle_of_cut = np.array([cut.principal_point[0], cut.height - cut.principal_point[1]])
-    back = np.empty((plane.height, plane.width, 2))
-    columns, down = np.arange(plane.width) + 0.5, np.arange(plane.height) + 0.5
-    for rows in _bands(plane):
-        points = (np.stack(np.meshgrid(columns, down[rows]), axis=-1) - middle) / plane.distance
-        back[rows] = lens.undistort(points) * cut.distance + middle_of_cut
-    return _st(places(lens, plane, cut), plane), _st(back, cut)
+    return _st(places(lens, plane, cut), plane), _st(places_back(lens, plane, cut), cut)
 
 
 def _st(pixels: np.ndarray, other: ViewPlane) -> np.ndarray:
@@ -170,22 +187,32 @@ def resampled(photograph: np.ndarray, lens: Lens, plane: ViewPlane, cut: ViewPla
     of masks and depths.
     """
     picture = np.zeros((cut.height, cut.width, *photograph.shape[2:]), photograph.dtype)
-    limits = np.array(photograph.shape[1::-1])
     pixels = places(lens, plane, cut)
     for rows in _bands(cut):
-        at = pixels[rows] if nearest else pixels[rows] - 0.5
-        with np.errstate(invalid="ignore"):
-            seen = ((at >= 0) & (at < limits if nearest else at <= limits - 1)).all(axis=-1)
-        x, y = at[seen].T
-        if nearest:
-            picture[rows][seen] = photograph[y.astype(int), x.astype(int)]
-            continue
-        left, top = (np.minimum(np.floor(each).astype(int), limit - 2) for each, limit in zip((x, y), limits, strict=True))
-        across, down = ((each - least).reshape(-1, *[1] * (photograph.ndim - 2)) for each, least in ((x, left), (y, top)))
-        upper, lower = ((1 - across) * photograph[row, left] + across * photograph[row, left + 1] for row in (top, top + 1))
-        mixed = (1 - down) * upper + down * lower
-        picture[rows][seen] = np.rint(mixed) if photograph.dtype.kind == "u" else mixed
+        picture[rows] = looked_up(photograph, pixels[rows], nearest)
     return picture
+
+
+def looked_up(photograph: np.ndarray, at: np.ndarray, nearest: bool = False) -> np.ndarray:
+    """The picture's colors at places in it, of its own type; black beside it.
+
+    photograph : as of `resampled`. at : (..., 2), from the corner, y down; NaN is beside it. nearest : as of `resampled`.
+    """
+    result = np.zeros((*at.shape[:-1], *photograph.shape[2:]), photograph.dtype)
+    limits = np.array(photograph.shape[1::-1])
+    at = at if nearest else at - 0.5
+    with np.errstate(invalid="ignore"):
+        seen = ((at >= 0) & (at < limits if nearest else at <= limits - 1)).all(axis=-1)
+    x, y = at[seen].T
+    if nearest:
+        result[seen] = photograph[y.astype(int), x.astype(int)]
+        return result
+    left, top = (np.minimum(np.floor(each).astype(int), limit - 2) for each, limit in zip((x, y), limits, strict=True))
+    across, down = ((each - least).reshape(-1, *[1] * (photograph.ndim - 2)) for each, least in ((x, left), (y, top)))
+    upper, lower = ((1 - across) * photograph[row, left] + across * photograph[row, left + 1] for row in (top, top + 1))
+    mixed = (1 - down) * upper + down * lower
+    result[seen] = np.rint(mixed) if photograph.dtype.kind == "u" else mixed
+    return result
 
 
 def save(cameras: Sequence[Camera], dataset: Path, out: Path, form: str, blank: float = 0.0) -> list[Camera]:

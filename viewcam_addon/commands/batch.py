@@ -7,11 +7,14 @@ import argparse
 import dataclasses
 import functools
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from .. import argument_types as types
 from .. import cameras
+from ..cameras import calibration as calibrations
 from ..cameras import distortion
+from ..cameras.calibration import Calibration
 from ..errors import InputError
 from ..jobs import lists, makers
 from ..jobs.folder import Outputs
@@ -81,6 +84,12 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     group.add_argument("--level", choices=LEVELS, help="how much VIEWCAM models (default: the scene's)")
     group.add_argument("--seed", type=types.seed, metavar="N", help="another noise for another number (default: the scene's)")
 
+    words = (
+        "a calibrated camera, by any file that viewcam camera reads, and of several its name: pictures and labels are as it "
+        "takes them, by its lens, focal length and size; a shot says where from"
+    )
+    group.add_argument("--distort", nargs="+", metavar=("FILE", "NAME"), help=words)
+
     written = added.add_argument_group("what is written")
     written.add_argument("--out", metavar="DIR", type=types.path, required=True, help="the folder of the pictures")
     kept = written.add_mutually_exclusive_group()
@@ -120,8 +129,10 @@ def run(options: argparse.Namespace) -> Result:
         workers=options.workers,
         scheduler=options.scheduler,
     )
-    complete = functools.partial(_completed, options=options)
-    summary = carry_out(plan, functools.partial(_shots, options), options.events, complete, str(options.shots or ""))
+    calibration = _calibration(options) if options.distort else None
+    complete = functools.partial(_completed, options=options, calibration=calibration)
+    shots_of = functools.partial(_shots, options, calibration)
+    summary = carry_out(plan, shots_of, options.events, complete, str(options.shots or ""))
     return summary.exit_status, summary.to_json()
 
 
@@ -154,20 +165,35 @@ def _outputs(options: argparse.Namespace) -> Outputs:
     return Outputs(not options.labels_only, options.check, kinds, options.depth_steps)
 
 
-def _shots(options: argparse.Namespace, renderer: Any) -> Sequence[Job]:
+def _calibration(options: argparse.Namespace) -> Calibration:
+    """The calibrated camera of --distort."""
+    file, *names = options.distort
+    if len(names) > 1:
+        raise InputError(f"--distort is of one camera, a file and its name, and {' '.join(names)} are more: name one")
+    how = dataclasses.replace(options_of(options), without_distortion=False)
+    result = calibrations.of_cameras(cameras.read(Path(file), options=how), file, *names)
+    size = result.plane.width, result.plane.height
+    if options.size not in (None, size):
+        sizes = "--size is {} × {} and the camera of --distort has {} × {} pixels".format(*options.size, *size)
+        raise InputError(f"{sizes}: leave --size out, or give the camera of such pictures")
+    return result
+
+
+def _shots(options: argparse.Namespace, calibration: Calibration | None, renderer: Any) -> Sequence[Job]:
     if options.shots is not None:
         if lists.is_list(options.shots):
             return lists.read(options.shots, renderer.cameras)
         read = cameras.read(options.shots, options=options_of(options))
         for note in dict.fromkeys(note for camera in read for note in camera.notes):
             options.events.tell("note", command=options.command, text=note)
-        for camera in read:
+        for camera in () if calibration else read:
             distortion.refuse(camera.lens, camera.pinhole.plane, camera.name, "a render")
         return makers.from_pinholes((camera.name, camera.pinhole) for camera in read)
     if options.cameras is not None:
         return makers.from_cameras(options.cameras, renderer.cameras, spaces=not options.transforms)
     if options.orbit is not None:
-        return makers.orbit(renderer.pinhole(options.camera, options.size, options.frame), options.orbit)
+        size = (calibration.plane.width, calibration.plane.height) if calibration else options.size
+        return makers.orbit(renderer.pinhole(options.camera, size, options.frame), options.orbit)
     camera = renderer.scene_camera if options.camera is None else options.camera
     if camera not in renderer.cameras:
         wrong = "the scene has no camera" if camera is None else f"the file has no camera {camera!r}"
@@ -175,10 +201,17 @@ def _shots(options: argparse.Namespace, renderer: Any) -> Sequence[Job]:
     return makers.frames(options.frames, options.camera)
 
 
-def _completed(job: Job, options: argparse.Namespace) -> Job:
-    """The job, with what the command line says where it says nothing itself."""
+def _completed(job: Job, options: argparse.Namespace, calibration: Calibration | None) -> Job:
+    """The job, with what the command line says where it says nothing itself. calibration : of --distort."""
     width, height = options.size or (None, None)
     stated = {field: getattr(options, field) for field in ("frame", "engine", "samples", "level", "seed", "threads")}
     stated |= {"width": width, "height": height}
     missing = {field: value for field, value in stated.items() if getattr(job, field) is None}
-    return dataclasses.replace(job, trust=options.trust, **missing)
+    job = dataclasses.replace(job, trust=options.trust, **missing)
+    if calibration is None:
+        return job
+    size = calibration.plane.width, calibration.plane.height
+    if job.size not in (None, size):
+        sizes = "{} × {} pixels and the camera of --distort {} × {}".format(*job.size, *size)
+        raise InputError(f"the shot {job.name} has {sizes}: leave its size out, or give the camera of such pictures")
+    return makers.calibrated(job, calibration)

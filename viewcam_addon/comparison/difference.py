@@ -59,7 +59,7 @@ def write_sides(
     InputError
         if a file can't be written.
     """
-    light = {} if everything is None else {"everything": everything["Combined"][..., :3]}
+    light: dict[str, NDArray] = {} if everything is None else {"everything": everything["Combined"][..., :3]}
     if isinstance(comparison, RadianceComparison):
         light |= {"reference": reference["Combined"][..., :3], "test": comparison.test}
     else:
@@ -76,8 +76,9 @@ def on_screen(
 ) -> tuple[pictures.Picture, pictures.Picture]:
     """Reference and test as an eye can compare them: light tone-mapped alike, geometry shaded."""
     if isinstance(comparison, RadianceComparison):
-        bright = pictures.brightness(reference["Combined"][..., :3])
-        return tuple(pictures.tone_mapped(side, bright) for side in (reference["Combined"][..., :3], comparison.test))
+        lit = reference["Combined"][..., :3]
+        bright = pictures.brightness(lit)
+        return pictures.tone_mapped(lit, bright), pictures.tone_mapped(comparison.test, bright)
     return pictures.shaded(reference), pictures.shaded(tests[0])
 
 

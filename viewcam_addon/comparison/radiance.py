@@ -190,7 +190,8 @@ def _noisy(
         scaled_passes = _factor(sides, lambda scaled: all(q.ok for q in hypothesis_tests.run(scaled, *settings)))
         row = replace(row, factor=scaled_passes)
     pixels, tiles = tests[0], tests[1]
-    spread = hypothesis_tests.over_pixels(hypothesis_tests.worst_channel(tiles.errors), sides.broken.shape, tiles.size)
+    height, width = sides.broken.shape
+    spread = hypothesis_tests.over_pixels(hypothesis_tests.worst_channel(tiles.errors), (height, width), tiles.size)
     drawn = {"difference": sides.difference.mean(axis=-1), "tiles": spread}
     if pixels.errors.any():
         drawn["standard errors"] = hypothesis_tests.worst_channel(pixels.errors)

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from .. import argument_types, checks
+from ..cameras.calibration import Calibration
 from ..errors import InputError
 from ..pinhole import Triple, check_distance
 from ..tracer.scene import film
@@ -77,6 +78,8 @@ class Job:
     trust : whether what is in the file may run and write.
     seed : of all noise.
     threads : to render and trace with, all where None.
+    calibration : the calibrated camera whose picture is made of this one's, which covers it (`cover` is its view plane), and
+        whose labels are traced.
 
     Of a check:
 
@@ -116,6 +119,7 @@ class Job:
     trust: bool = _option("let what is in the file run and write: Python, shaders, caches", False)
     seed: int | None = None
     threads: int | None = None
+    calibration: Calibration | None = None
     error: float | None = None
     find: str | None = _option(_FIND, type=argument_types.percentage, metavar="PERCENT")
     device: str = _option("what Cycles renders on, all of that kind (default: %(default)s)", "CPU", choices=DEVICES)
@@ -179,7 +183,8 @@ class Job:
     def to_json(self) -> dict[str, Any]:
         """The fields that are not as they are by default, as JSON can hold them."""
         stated = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return {name: value for name, value in stated.items() if value != type(self).__dataclass_fields__[name].default}
+        result = {name: value for name, value in stated.items() if value != type(self).__dataclass_fields__[name].default}
+        return result | ({"calibration": self.calibration.to_json()} if self.calibration else {})
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any]) -> Self:
@@ -226,6 +231,14 @@ def _path(place: str, value: object) -> str:
     if not isinstance(value, str | os.PathLike):
         raise InputError(f"{place} is {checks.quoted(value)}: give the path of a file")
     return os.fspath(value)
+
+
+def _calibration(place: str, value: object) -> Calibration:
+    if isinstance(value, Mapping):
+        return Calibration.from_json(value)
+    if not isinstance(value, Calibration):
+        raise InputError(f"{place} is {checks.quoted(value)}: give a Calibration")
+    return value
 
 
 def _above_zero(place: str, value: object) -> float:
@@ -320,6 +333,7 @@ _MORE: dict[str, Callable[[str, object], object]] = {
     "trust": checks.truth,
     "seed": partial(_whole, limits=_SEEDS),
     "threads": partial(_whole, limits=_THREADS),
+    "calibration": _calibration,
     "error": _above_zero,
     "find": _percentage,
     "device": partial(_choice, among=DEVICES),

@@ -1,5 +1,6 @@
 """Shots by rule: around a point, through an animation, one for each camera of the file."""
 
+import dataclasses
 import fnmatch
 import math
 import re
@@ -7,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from .. import checks, moves
+from ..cameras.calibration import Calibration
 from ..errors import InputError
 from ..pinhole import Pinhole
 from . import names
@@ -161,6 +163,20 @@ def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Job]:
             )
     problems.raise_any()
     return shots
+
+
+def calibrated(job: Job, calibration: Calibration, pose: Pinhole | None = None) -> Job:
+    """The job of a pinhole in the place of another job's, whose picture covers that of a calibrated camera.
+
+    pose : where it is, of a job whose camera is one of the file and whose values are wanted.
+    """
+    cover = calibration.cover
+    values: dict[str, Any] = {"calibration": calibration, "width": cover.width, "height": cover.height}
+    if pose is not None:
+        values |= {"camera": None, "eye": pose.eye, "look_at": pose.look_at, "up": pose.up, "mirrored": pose.mirrored or None}
+    if pose is not None or job.eye is not None:
+        values |= {"d": cover.distance[0], "principal_point": cover.principal_point, "pixel_aspect": 1.0}
+    return dataclasses.replace(job, **values)
 
 
 def _count(count: int) -> int:

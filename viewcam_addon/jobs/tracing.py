@@ -16,9 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import checks, child_process
+from ..cameras.calibration import Calibration
+from ..cameras.distortion import Lens
 from ..errors import InputError
 from ..events import Events
-from ..pinhole import Pinhole
+from ..files import written_whole
+from ..pinhole import Pinhole, ViewPlane
 from ..tracer.scene.film import LEVELS, SAMPLES
 from .job import Job
 
@@ -144,10 +147,12 @@ class Tracing(child_process.ServerOnDemand):
         kinds: Sequence[str],
         depth_steps: float,
         threads: int | None = None,
+        lens: Lens | None = None,
     ) -> list[str]:
         """Write the labels beside a picture (labels.files); the names of the files.
 
-        frames : "here", and of flow "previous" and "next" as well.
+        frames : "here", and of flow "previous" and "next" as well. lens : what bends the picture, whose own plane all cameras
+        have.
 
         Raises
         ------
@@ -155,7 +160,18 @@ class Tracing(child_process.ServerOnDemand):
             if scenes can't be read or labels not be written, there is no OpenEXR, or the process ended first.
         """
         request = {"frames": dict(frames), "picture": str(picture), "kinds": list(kinds), "depth_steps": depth_steps}
-        return self.ask({"label": {**request, "threads": threads}})
+        return self.ask({"label": {**request, "threads": threads, "lens": lens and lens.to_json()}})
+
+    def distort(self, image: Path, preview: Path, calibration: Calibration, cut: ViewPlane) -> None:
+        """Put a lens on a picture's two files, EXR and PNG. cut : the view plane of the pinhole that they show.
+
+        Raises
+        ------
+        InputError
+            if they can't be read or written, there is no OpenEXR, or the process ended first.
+        """
+        files = {"image": str(image), "preview": str(preview)}
+        self.ask({"distort": {**files, "calibration": calibration.to_json(), "cut": dataclasses.asdict(cut)}})
 
 
 def compare_files(
@@ -216,6 +232,8 @@ class _Server:
         ((name, arguments),) = request.items()
         if name == "label":
             return self._label(**arguments)
+        if name == "distort":
+            return _distort(**arguments)
         if name == "compare":
             return self._compare(**arguments, tell=tell)
         return compare_files(**{**arguments, "written": Written(**arguments.get("written", {}))})
@@ -297,6 +315,7 @@ class _Server:
         kinds: list[str],
         depth_steps: float,
         threads: int | None,
+        lens: dict[str, Any] | None,
     ) -> list[str]:
         from ..labels import files
         from ..labels.scene_labels import label
@@ -305,7 +324,8 @@ class _Server:
             name: dataclasses.replace(self._scene(frame["scene"]), camera=Pinhole(**frame["camera"]), clip=tuple(frame["clip"]))
             for name, frame in frames.items()
         }
-        labels = label(scenes.pop("here"), kinds, **scenes, threads=threads, keepers=self._keepers)
+        bent = Lens.from_json(lens) if lens else None
+        labels = label(scenes.pop("here"), kinds, **scenes, threads=threads, keepers=self._keepers, lens=bent)
         return [path.name for path in files.write(Path(picture), labels, depth_steps)]
 
     def _scene(self, path: str) -> "Scene":
@@ -317,6 +337,17 @@ class _Server:
             self._files = dict([*self._files.items()][1 - _MOST_SCENES :])
             self._files[path] = scene_file.read(path)
         return self._files[path]
+
+
+def _distort(image: str, preview: str, calibration: dict[str, Any], cut: dict[str, Any]) -> None:
+    from .. import image as images
+    from .. import png
+
+    of, plane = Calibration.from_json(calibration), ViewPlane(**cut)
+    images.rewrite(image, lambda pixels, is_data: of.distorted(pixels, plane, nearest=is_data))
+    pixels = of.distorted(png.decoded(Path(preview).read_bytes()), plane)
+    with written_whole(preview) as temporary:
+        temporary.write_bytes(png.encoded(pixels if pixels.shape[2] > 2 else pixels[..., 0]))
 
 
 def _to_json(

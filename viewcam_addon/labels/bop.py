@@ -207,7 +207,8 @@ def _box(mask: Document | None) -> list[int]:
 
 
 def _camera(document: Document) -> Document:
-    camera = cameras.Camera(document["picture"], Pinhole(**document["camera"]), image=document["picture"])
+    picture = document["picture"]
+    camera = cameras.Camera(picture, Pinhole(**document["camera"]), image=picture, lens=files.lens(document))
     return json.loads(cameras.write([camera], "bop", cameras.Options(scale=1 / _MILLIMETERS)))["0"]
 
 

@@ -25,11 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import cameras
-from ..cameras import colmap
+from ..cameras import colmap, distortion
 from ..errors import InputError
 from ..files import folder_written_whole
 from ..image import BACKGROUND_DEPTH
-from ..pinhole import Pinhole
 from ..png import decoded
 from . import files
 from .coco import Document, read_pictures
@@ -86,8 +85,7 @@ def write(folder: Path, output: Path, points: int = POINTS, overwrite: bool = Fa
         views = []
         for path, document in pictures:
             with files.understood(path):
-                name = files.picture(path, document)
-                views.append(cameras.Camera(name, Pinhole(**document["camera"]), image=name))
+                views.append(files.camera(path, document))
         tracks = tracks_of(pictures, views, points)
         for file, content in contents(views, tracks).items():
             (temporary / file).write_bytes(content)
@@ -111,10 +109,10 @@ def tracks_of(
     for number, (view, (path, document)) in enumerate(zip(views, pictures, strict=True)):
         with files.understood(path):
             depth, state, ids = _planes(path, document, states)
-            pieces.append(_sampled(number, view.pinhole, depth, state, _colors(path, document, ids), points))
+            pieces.append(_sampled(number, view, depth, state, _colors(path, document, ids), points))
     sampled = _Sampled(*map(np.concatenate, zip(*pieces, strict=True)))
     for number, (view, (path, document)) in enumerate(zip(views, pictures, strict=True)):
-        visible.append(_visible(sampled, number, view.pinhole, *_planes(path, document, states)[:2]))
+        visible.append(_visible(sampled, number, view, *_planes(path, document, states)[:2]))
     if longest is not None:
         visible = _shortened(visible, longest)
     often = np.bincount(np.concatenate([which for which, _ in visible]), minlength=len(sampled.source)) > 1
@@ -204,13 +202,14 @@ def _has_no_points(folder: Path) -> bool:
 
 
 def _sampled(
-    number: int, camera: Pinhole, depth: Array, state: NDArray[np.int64], colors: NDArray[np.uint8], points: int
+    number: int, view: cameras.Camera, depth: Array, state: NDArray[np.int64], colors: NDArray[np.uint8], points: int
 ) -> _Sampled:
     rows, columns = np.nonzero(state >= 0)
     rank = (columns * _EVENLY[0] + rows * _EVENLY[1]) % 1.0
     chosen = np.sort(np.argsort(rank, kind="stable")[:points])
     rows, columns = rows[chosen], columns[chosen]
-    x, y = camera.view_plane(columns + 0.5, camera.height - (rows + 0.5))
+    camera = view.pinhole
+    x, y = distortion.view_plane(camera, view.lens, columns + 0.5, camera.height - (rows + 0.5))
     u, v, w = camera.basis()
     z = depth[rows, columns]
     positions = np.array(camera.eye) + z[:, None] * (x[:, None] * u + y[:, None] * v - w)
@@ -218,10 +217,11 @@ def _sampled(
 
 
 def _visible(
-    sampled: _Sampled, number: int, camera: Pinhole, depth: Array, state: NDArray[np.int64]
+    sampled: _Sampled, number: int, view: cameras.Camera, depth: Array, state: NDArray[np.int64]
 ) -> tuple[NDArray[np.intp], Array]:
     """The points that a picture shows, and their places: (n, 2), x to the right and y **down** from the picture's corner."""
-    column, row, z = camera.project(sampled.positions)
+    camera = view.pinhole
+    column, row, z = distortion.project(camera, view.lens, sampled.positions)
     x, y = column - 0.5, camera.height - row - 0.5  # 0 at the first pixel's center
     with np.errstate(invalid="ignore"):
         inside = (x >= 1) & (x < camera.width - 2) & (y >= 1) & (y < camera.height - 2)

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import image
+from ..cameras import Camera
+from ..cameras.distortion import Lens
 from ..cameras.source import image_size
 from ..errors import InputError
 from ..files import check_writable, is_replaced, read_bytes, written_whole
@@ -27,7 +29,7 @@ from .scene_labels import Labels
 _FORMAT, _VERSION = "virtual-pinhole-labels", 1
 
 _LARGEST = 1e100
-"""Of a label file's numbers: with larger ones nobody can compute. It lies far beyond what Blender's float32 can hold."""
+"""The largest number of a label file: nobody can compute with larger ones, and float32 holds none."""
 
 _LARGEST_ID = 2**24 - 1
 
@@ -35,7 +37,7 @@ _ARE_VALUES: dict[str, Callable[[NDArray[np.float32]], NDArray[np.bool_]]] = {
     "Depth": lambda depth: depth > 0,
     "Instance": lambda ids: (ids >= 0) & (ids <= _LARGEST_ID) & (ids == np.rint(ids)),
 }
-"""Which numbers a pass may hold, of those that would be an index or a divisor; nan is none."""
+"""The numbers that a pass may hold, of those that would be an index or a divisor; nan is none."""
 
 _UNKNOWN_FLOW = 1e10
 """The mark of Middlebury's format where no flow is known; everything above 1e9 counts as that."""
@@ -120,7 +122,7 @@ def _check(document: dict[str, Any]) -> None:
 
     So that they ask for no more memory than the picture has pixels, and write no file that nobody can read.
     """
-    camera = Pinhole(**document["camera"])
+    camera, _ = Pinhole(**document["camera"]), lens(document)
     size = camera.height, camera.width
     texts = [document["picture"], *document.get("passes", ())]
     if len({each["id"] for each in document["instances"]}) < len(document["instances"]):
@@ -177,6 +179,17 @@ def name(path: Path) -> str:
     return path.name.removesuffix(".labels.json")
 
 
+def lens(document: dict[str, Any]) -> Lens | None:
+    """The lens that bends a label file's picture. Raises InputError for one that is none."""
+    return Lens.from_json(document["lens"]) if "lens" in document else None
+
+
+def camera(path: Path, document: dict[str, Any]) -> Camera:
+    """The camera that a label file tells of, called as its picture. Raises InputError as `photograph` does."""
+    picture_name = picture(path, document)
+    return Camera(picture_name, Pinhole(**document["camera"]), image=picture_name, lens=lens(document))
+
+
 def photograph(path: Path, document: dict[str, Any]) -> Path | None:
     """The PNG or JPEG of what a label file tells of, if one stands beside it.
 
@@ -225,6 +238,7 @@ def _document(path: Path, labels: Labels, names: list[str], depth_steps: float) 
         "version": _VERSION,
         "picture": path.name,
         "camera": asdict(labels.image.camera),
+        **({} if labels.lens is None else {"lens": labels.lens.to_json()}),
         "files": names,
         "passes": list(labels.image.passes),
         "depth_png_steps": depth_steps,

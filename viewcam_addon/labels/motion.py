@@ -57,7 +57,7 @@ def motion(here: Surfaces, there: Surfaces) -> Motion:
             continue
         moved[pixels], owners[pixels] = _carried(here, there, instance, other, pixels), number
     known = np.flatnonzero(owners >= 0)
-    column, row, _ = there.camera.project(moved[known])
+    column, row, _ = there.project(moved[known])
     flow, hidden = np.full((len(points), 2), np.nan), np.zeros(len(points), bool)
     flow[known, 0] = column - (known % here.camera.width + 0.5)
     flow[known, 1] = known // here.camera.width + 0.5 - row

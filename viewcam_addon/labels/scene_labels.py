@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cameras.distortion import Lens
 from ..errors import InputError
 from ..image import BACKGROUND_DEPTH, Image
 from ..tracer.scene import Scene
@@ -23,11 +24,13 @@ class Labels:
     instances : plain JSON values of each instance of which a pixel is shown or, with amodal masks, would be if it stood alone,
     or with coverage is shown in part.
     lost : of the other frames, "forward" and "backward": names of visible objects that have no counterpart there.
+    lens : what bends the picture.
     """
 
     image: Image
     instances: list[dict[str, Any]]
     lost: dict[str, list[str]]
+    lens: Lens | None = None
 
 
 def label(
@@ -37,8 +40,12 @@ def label(
     next: Scene | None = None,
     threads: int | None = None,
     keepers: Keepers | None = None,
+    lens: Lens | None = None,
 ) -> Labels:
-    """The labels of a scene's picture. keepers : of what other scenes share with it. The rest is as in api.label."""
+    """The labels of a scene's picture. keepers : of what other scenes share with it. The rest is as in api.label.
+
+    lens : what bends the picture of all frames, whose cameras have its own plane.
+    """
     if unknown := [kind for kind in kinds if kind not in KINDS]:
         raise InputError(f"there is no label {unknown[0]!r}: give some of {', '.join(KINDS)}")
     others = {"Forward": next, "Backward": previous}
@@ -46,7 +53,8 @@ def label(
         raise InputError("flow goes to another frame: give the scene of the next or of the previous one")
     keepers = keepers or Keepers(threads=threads)
     needed = {"normals": "Normal", "masks": "Material Index"}
-    surfaces = Surfaces(scene, threads, keepers.of(scene), [name for kind, name in needed.items() if kind in kinds])
+    names = [name for kind, name in needed.items() if kind in kinds]
+    surfaces = Surfaces(scene, threads, keepers.of(scene), names, lens)
     passes: dict[str, NDArray[Any]] = {}
     shape = surfaces.depth.shape  # traced now: of another frame with the same things the surfaces would use up this tracer
     if "depth" in kinds:
@@ -68,7 +76,7 @@ def label(
     if "flow" in kinds:
         for name, other in others.items():
             if other is not None:
-                moved = motion(surfaces, Surfaces(other, threads, keepers.of(other)))
+                moved = motion(surfaces, Surfaces(other, threads, keepers.of(other), lens=lens))
                 passes |= _motions(name, moved)
                 lost[name.lower()] = list(moved.lost)
     if covered:
@@ -76,14 +84,12 @@ def label(
     planes = {name: np.asarray(values, np.float32).reshape(*shape, -1) for name, values in passes.items()}
     records = _instances(surfaces, covered, with_masks="masks" in kinds, with_amodal="amodal" in kinds)
     header = {"software": "Virtual Pinhole", **(covered.header if covered else {})}
-    return Labels(Image(planes, scene.camera, header), records, lost)
+    return Labels(Image(planes, scene.camera, header), records, lost, lens)
 
 
 def _depths(surfaces: Surfaces) -> dict[str, NDArray[Any]]:
-    camera, hit = surfaces.camera, np.isfinite(surfaces.depth)
-    x, _ = camera.view_plane(np.arange(camera.width) + 0.5, 0.5)
-    _, y = camera.view_plane(0.5, np.arange(camera.height) + 0.5)
-    distance = surfaces.depth * np.sqrt(x * x + (y * y + 1)[:, None])
+    hit, (x, y) = np.isfinite(surfaces.depth), surfaces.view_plane
+    distance = surfaces.depth * np.sqrt(x * x + (y * y + 1))
     return {
         "Depth": np.where(hit, surfaces.depth, BACKGROUND_DEPTH),
         "Distance": np.where(hit, distance, BACKGROUND_DEPTH),

@@ -2,7 +2,8 @@
 
 import hashlib
 import itertools
-from collections.abc import Collection
+import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import machine
+from ..cameras import distortion, undistortion
+from ..errors import InputError
 from ..pinhole import Pinhole
 from ..tracer import render
 from ..tracer.native import CoreScene
@@ -101,7 +104,8 @@ class Keeper:
         if (key := (name, matrix.tobytes())) not in self._alone:
             geometry = self.scene.geometries[name]
             geometry = replace(geometry, materials=np.zeros_like(geometry.materials))
-            middle = sum(self.box(name)) / 2
+            low, high = self.box(name)
+            middle = (low + high) / 2
             away = tuple(middle + np.array([0, 0, 1 + np.abs(middle).max()]))
             camera = Pinhole(tuple(middle), away, (0, 1, 0), 1, 1, 1)  # only so that rendering space's origin is near
             self._alone[key] = CoreScene(Scene(camera, {name: geometry}, (Object("", name, matrix),)), 1)
@@ -128,22 +132,58 @@ class Surfaces:
     depth : (height, width) planar depth z = −w·(P − e), inf where nothing is. instance, primitive : (height, width), −1 there:
     indices into `instances` and of the geometry's triangles or spheres. passes : those of level `geometry` that were named
     when it was made, of the same points.
+
+    lens : what bends the picture, whose own plane the scene's camera then has; each of its pixels is one ray through the place
+    that the lens shows there.
     """
 
     def __init__(
-        self, scene: Scene, threads: int | None = None, keeper: "Keeper | None" = None, names: Collection[str] = ()
+        self,
+        scene: Scene,
+        threads: int | None = None,
+        keeper: "Keeper | None" = None,
+        names: Collection[str] = (),
+        lens: distortion.Lens | None = None,
     ) -> None:
-        self.keeper = keeper or Keeper(scene, threads)
+        self.keeper, self.lens = keeper or Keeper(scene, threads), lens
         self.scene, self.camera, self.instances = scene, scene.camera, self.keeper.instances
         self._tracer, self._names = self.keeper.tracers.tracer(scene, threads), names
 
     @cached_property
     def _hits(self) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Passes]:
-        return self._tracer.hits(self._names)
+        return self._traced(names=self._names)
 
     def instances_at(self, place: tuple[float, float]) -> NDArray[np.int64]:
         """The instances seen through another place in the pixels than their centers."""
-        return self._tracer.hits(place=place)[1]
+        return self._traced(place)[1]
+
+    def _traced(
+        self, place: tuple[float, float] = (0.5, 0.5), names: Collection[str] = ()
+    ) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Passes]:
+        if self.lens is None:
+            return self._tracer.hits(names, place)
+        (d_x, d_y), (c_x, c_y) = self.camera.distance, self.camera.principal_point
+        x, y = self.view_plane if place == (0.5, 0.5) else self._view_plane(place)
+        return self._tracer.hits_at(c_x + d_x * x, c_y + d_y * y, names)
+
+    @cached_property
+    def view_plane(self) -> tuple[Array, Array]:
+        """(x, y) of the pixels' centers in the view plane at distance 1, which broadcast to (height, width)."""
+        return self._view_plane((0.5, 0.5))
+
+    def _view_plane(self, place: tuple[float, float]) -> tuple[Array, Array]:
+        if self.lens is None:
+            x, _ = self.camera.view_plane(np.arange(self.camera.width) + place[0], 0.5)
+            _, y = self.camera.view_plane(0.5, np.arange(self.camera.height) + place[1])
+            return x, y[:, None]
+        points = undistortion.points(self.lens, self.camera.plane, (place[0], 1 - place[1]))[::-1]
+        if not np.isfinite(points).all():
+            raise InputError("the lens shows nothing at some of the picture's pixels: its model folds there, crop the picture")
+        return points[..., 0], -points[..., 1]
+
+    def project(self, points: Array) -> tuple[Array, Array, Array]:
+        """The places in the picture at which points appear, and their depths, as Pinhole.project has them."""
+        return distortion.project(self.camera, self.lens, points)
 
     @property
     def depth(self) -> Array:
@@ -179,10 +219,9 @@ class Surfaces:
     def points(self) -> Array:
         """(height, width, 3), world space; 0 where nothing is."""
         right, up, forward = self.camera.picture_axes()
-        x, _ = self.camera.view_plane(np.arange(self.camera.width) + 0.5, 0.5)
-        _, y = self.camera.view_plane(0.5, np.arange(self.camera.height) + 0.5)
+        x, y = self.view_plane
         depth = np.where(np.isfinite(self.depth), self.depth, 0.0)[..., None]
-        points = (x[:, None] * right + forward) + (y[:, None] * up)[:, None]
+        points = (x[..., None] * right + forward) + y[..., None] * up
         points *= depth
         points += np.array(self.camera.eye)
         points[depth[..., 0] == 0.0] = 0.0
@@ -198,7 +237,7 @@ class Surfaces:
         points : (n, 3), world space, each on the primitive of the instance that it is given with. slack : how much nearer than
         a point, as a share of its depth, its own surface may be found.
         """
-        column, row, depth = self.camera.project(points)
+        column, row, depth = self.project(points)
         with np.errstate(invalid="ignore"):
             inside = (column >= 0) & (column < self.camera.width) & (row >= 0) & (row < self.camera.height)
             inside &= (depth >= self.scene.clip[0]) & (depth <= self.scene.clip[1])
@@ -228,7 +267,7 @@ class Silhouettes:
         if not surfaces.instances:
             return []
         visible = dict(surfaces.visible_numbers)
-        camera, clip = surfaces.camera, surfaces.scene.clip
+        camera = surfaces.camera
         matrices, inverses = (np.array([getattr(each, name) for each in surfaces.instances]) for name in ("matrix", "inverse"))
         is_flat = np.linalg.det(matrices[:, :3, :3]) == 0
         matrices[is_flat] = inverses[is_flat] = np.eye(4)
@@ -245,7 +284,7 @@ class Silhouettes:
         def trace(numbers: NDArray[np.intp]) -> None:
             for number in numbers.tolist():
                 window = reaches[number].tolist()
-                covered = cores[number].silhouette(camera, clip, eyes[number], axes[number], window)
+                covered = self._covered(cores[number], eyes[number], axes[number], window)
                 if number in visible:
                     rows, columns = np.divmod(visible[number], camera.width)
                     covered[rows - window[1], columns - window[0]] = True
@@ -264,6 +303,17 @@ class Silhouettes:
             pass
         return result
 
+    def _covered(self, core: CoreScene, eye: Array, axes: Array, window: Sequence[int]) -> NDArray[np.bool_]:
+        """True where an instance is seen in a part of the picture. eye, axes : the camera's in its space."""
+        surfaces, clip = self._surfaces, self._surfaces.scene.clip
+        if surfaces.lens is None:
+            return core.silhouette(surfaces.camera, clip, eye, axes, tuple(window))
+        left, low, width, height = window
+        x, y = (each[low : low + height, left : left + width].ravel() for each in surfaces.view_plane)
+        ends = math.nextafter(clip[0], 0.0), math.nextafter(clip[1], math.inf)
+        rays = core.rays(eye, np.stack([x, y, np.ones_like(x)], axis=-1) @ axes, *ends)
+        return np.isfinite(core.closest(rays)[0]).reshape(height, width)
+
     def _reaches(self) -> NDArray[np.intp]:
         """(n, 4): the first column and row that instances may have, and how many, by what of their boxes the clip leaves."""
         camera, near = self._surfaces.camera, self._surfaces.scene.clip[0]
@@ -277,6 +327,8 @@ class Silhouettes:
         places = np.stack(camera.project(np.concatenate([corners, cut], axis=1))[:2], axis=-1)
         is_seen = np.concatenate([is_beyond, is_cut], axis=1)
         is_known = (np.isfinite(places).all(axis=-1) | ~is_seen).all(axis=1)[:, None]
+        if self._surfaces.lens is not None:
+            return self._reaches_in_lens(places, is_seen, is_known)
         # Half a pixel and more beyond the centers that lie within, for rounding.
         size = np.array([camera.width, camera.height])
         least = np.where(is_seen[..., None], places, np.inf).min(axis=1)
@@ -284,6 +336,24 @@ class Silhouettes:
         first = np.where(is_known, np.clip(np.floor(least) - 1, 0, size), 0)
         last = np.where(is_known, np.clip(np.ceil(most) + 1, 0, size), size)
         return np.concatenate([first, np.maximum(last - first, 0)], axis=1).astype(np.intp)
+
+    def _reaches_in_lens(self, places: Array, is_seen: NDArray[np.bool_], is_known: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """`_reaches` of the pixels whose places in the pinhole's picture lie within the boxes there."""
+        camera = self._surfaces.camera
+        x, y = self._surfaces.view_plane
+        at = np.stack([x, y], axis=-1) * camera.distance + camera.principal_point
+        result = np.zeros((len(places), 4), np.intp)
+        for number, (box_places, seen, known) in enumerate(zip(places, is_seen, is_known[:, 0], strict=True)):
+            if known and not seen.any():
+                continue
+            within = np.ones(x.shape, bool)
+            if known:
+                least, most = box_places[seen].min(axis=0) - 1, box_places[seen].max(axis=0) + 1
+                within = ((at >= least) & (at <= most)).all(axis=-1)
+            rows, columns = (np.flatnonzero(within.any(axis=axis)) for axis in (1, 0))
+            if len(rows):
+                result[number] = columns[0], rows[0], columns[-1] + 1 - columns[0], rows[-1] + 1 - rows[0]
+        return result
 
 
 def box(geometry: Mesh | Spheres) -> tuple[Array, Array]:

@@ -163,6 +163,35 @@ class Tracer:
         # −1 is what NO_HIT is as a number with a sign; no scene has 2³¹ of either.
         return depth, objects.view(np.int32).astype(np.int64), primitives.view(np.int32).astype(np.int64), passes
 
+    def hits_at(
+        self, columns: ArrayLike, rows: ArrayLike, names: Collection[str] = ()
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], Passes]:
+        """The hits at places in the picture or beside it, as `hits` has those of pixels, in the shape of `columns`.
+
+        columns, rows : of one shape, (height, width), from the picture's left and bottom edge.
+        """
+        columns, rows = (np.asarray(each, np.float64) for each in (columns, rows))
+        depth, objects, primitives = np.empty(columns.shape), *np.empty((2, *columns.shape), np.int64)
+        passes = unwritten(columns.shape, names) if names else {}
+        axes, eye = self._camera.picture_axes(), np.array(self._camera.eye)
+
+        def trace(band: range, _stop: int) -> None:
+            part = slice(band.start, band.stop)
+            x, y = self._camera.view_plane(columns[part].ravel(), rows[part].ravel())
+            hits = self.closest(eye, np.stack([x, y, np.ones_like(x)], axis=-1) @ axes)
+            for into, values in zip((depth, objects, primitives), hits, strict=True):
+                into[part] = values.reshape(columns[part].shape)
+            if names:
+                arrays = unwritten((x.size,), names)
+                self._core.surface_at(arrays, columns[part].ravel(), rows[part].ravel())
+                for name, values in arrays.items():
+                    passes[name][part] = values.reshape(*columns[part].shape, -1)
+
+        bands = (range(first, min(first + BAND, len(columns))) for first in range(0, len(columns), BAND))
+        for _ in self._in_threads(trace, bands, None):
+            pass
+        return depth, objects, primitives, passes
+
     def pixels_of(self, names: Collection[str]) -> dict[str, NDArray[np.bool_]]:
         """Each of these names that objects have → (height, width), the pixels whose centers show one of them."""
         objects = self._scene.objects

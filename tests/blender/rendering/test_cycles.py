@@ -302,7 +302,7 @@ def test_more_objects_than_indices_start_again(scene, camera_object, monkeypatch
 
 
 def test_a_file_whose_color_mode_its_format_does_not_know_is_rendered(crowded, tmp_path):
-    """As some real files have it, and no property of Blender's can set."""
+    """Some real files have such a mode, and no property of Blender's can set it."""
     settings = crowded.render.image_settings
     if hasattr(settings, "media_type"):
         settings.media_type = "IMAGE"

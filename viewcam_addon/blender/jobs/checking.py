@@ -40,6 +40,7 @@ from .scene_files import SceneFiles
 from .stage import Stage, staged
 
 _MOST_TOLD = 5
+_AS_THE_SCENE_STANDS: dict[str, Any] = {"width": None, "height": None, "principal_point": None}
 
 
 class Checker:
@@ -77,7 +78,7 @@ class Checker:
             if the scene can't be exported or rendered by Cycles, or if the two can't be compared.
         """
         of = dataclasses.replace(
-            job, engine="CYCLES", level=LEVELS[0], recenter=False, clay=False, device="CPU", error=None, width=None, height=None
+            job, engine="CYCLES", level=LEVELS[0], recenter=False, clay=False, device="CPU", error=None, **_AS_THE_SCENE_STANDS
         )
         image = self._files.folder / "cycles.exr"
         with numbered_indices(), staged(of, scene, camera_object, whole=True) as stage:

@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 
+from ...cameras.calibration import Calibration
 from ...jobs.job import Job
 from ...jobs.tracing import Tracing
 from ...pinhole import Pinhole
@@ -43,7 +44,7 @@ class ShotLabels:
     ) -> list[str]:
         """Write the labels of what a camera sees, as the scene stands, beside a picture; the names of the files.
 
-        pinhole : the camera of the picture, as its sidecar has it. kinds, depth_steps : as in Renderer.label. job : by which
+        pinhole : the camera that took the picture. kinds, depth_steps : as in Renderer.label. job : by which
         the camera stands still, of four values, or not.
 
         Raises
@@ -51,23 +52,33 @@ class ShotLabels:
         InputError
             if the scene can't be exported, or the labels not be written.
         """
+        calibration = job.calibration
         with overridden() as overrides:
-            frames = {"here": self._seen(scene, camera_object, pinhole)}
+            frames = {"here": self._seen(scene, camera_object, pinhole, calibration)}
             if "flow" in kinds:
                 frame, subframe = scene.frame_current, scene.frame_subframe
                 overrides.afterwards(scene.frame_set, frame, subframe=subframe)
                 for name, step in (("previous", -1), ("next", 1)):
                     scene.frame_set(frame + step, subframe=subframe)
-                    frames[name] = self._seen(scene, camera_object, pinhole if job.eye is not None else None)
-        return self._tracing.label(frames, picture, kinds, depth_steps, job.threads)
+                    still = pinhole if job.eye is not None else None
+                    frames[name] = self._seen(scene, camera_object, still, calibration)
+        lens = calibration.lens if calibration else None
+        return self._tracing.label(frames, picture, kinds, depth_steps, job.threads, lens)
 
-    def _seen(self, scene: bpy.types.Scene, camera_object: bpy.types.Object, pinhole: Pinhole | None) -> dict[str, Any]:
+    def _seen(
+        self,
+        scene: bpy.types.Scene,
+        camera_object: bpy.types.Object,
+        pinhole: Pinhole | None,
+        calibration: Calibration | None,
+    ) -> dict[str, Any]:
         """The request of the tracer's process about the scene at its frame."""
         with staged(Job(), scene, camera_object, whole=True) as stage:
             export = self._files.exported(stage)
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
         clip = (data.clip_start, data.clip_end) if pinhole else export.scene.clip
-        return Tracing.frame(self._files.file_of(export.scene), pinhole or export.scene.camera, clip)
+        seen = pinhole or export.scene.camera
+        return Tracing.frame(self._files.file_of(export.scene), calibration.at(seen) if calibration else seen, clip)
 
     def __enter__(self) -> "ShotLabels":
         return self

@@ -36,7 +36,8 @@ def obstacles(
         if engine in _DRAWN and not graphics.are_there():
             needs = f"{engine_name(engine)} draws with a GPU, and Blender can't open one here"
             yield f"{needs}: choose CYCLES or VIEWCAM, or start a display"
-    for lacking in (html_page.lacking(), tracing.lacking() if outputs.check or outputs.labels else None):
+    needs_tracer = outputs.check or outputs.labels or any(shot.calibration for shot in shots)
+    for lacking in (html_page.lacking(), tracing.lacking() if needs_tracer else None):
         if lacking:
             yield lacking
     among = cameras_of(scene, own() if any(shot.eye is not None for shot in shots) else None)

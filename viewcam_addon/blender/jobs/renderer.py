@@ -23,6 +23,7 @@ import bpy
 
 from ...cameras.sidecar import record
 from ...events import Events
+from ...jobs import makers
 from ...jobs.folder import Outputs
 from ...jobs.job import Job
 from ...jobs.tracing import Tracing, Written
@@ -60,6 +61,7 @@ class BlenderRenderer:
         self._blend, self._trust, self._events = blend, trust, events
         self._loan = contextlib.ExitStack()
         self._own: bpy.types.Object | None = None
+        self._of_file: bpy.types.Object | None = None
         self._has_drawn = False
 
     def __enter__(self) -> "BlenderRenderer":
@@ -67,9 +69,9 @@ class BlenderRenderer:
             self._overrides, off = stack.enter_context(opened(self._blend, self._trust))
             self.scene = bpy.context.scene
             self._settings = JobSettings(self._overrides, self.scene, off)
-            tracing = stack.enter_context(Tracing(self._events))
-            self._checker = stack.enter_context(Checker(tracing, self._events))
-            self._labels = stack.enter_context(ShotLabels(tracing))
+            self._tracing = stack.enter_context(Tracing(self._events))
+            self._checker = stack.enter_context(Checker(self._tracing, self._events))
+            self._labels = stack.enter_context(ShotLabels(self._tracing))
             self._loan = stack.pop_all()
         return self
 
@@ -154,10 +156,17 @@ class BlenderRenderer:
             pictures.write(self.scene, image, preview)
         evaluated = self.scene.camera.evaluated_get(datablocks.depsgraph_of(self.scene))
         self._taken = cameras.read(evaluated, self.scene)
+        taken = record(self._taken, datablocks.camera_data_of(evaluated))
+        rendered = self._settings.rendered(bool(image)) | ({"camera": self._of_file.name} if self._of_file else {})
+        if calibration := shot.calibration:
+            if image and preview:
+                self._tracing.distort(image, preview, calibration, self._taken.plane)
+            taken = {**record(calibration.at(self._taken), lens=calibration.lens), "pinhole": taken}
+            rendered |= {"width": calibration.plane.width, "height": calibration.plane.height}
         return {
-            **record(self._taken, datablocks.camera_data_of(evaluated)),
+            **taken,
             **({"stated": record(self._stated)["camera"]} if self._stated else {}),
-            "rendered": self._settings.rendered(bool(image)) | ({} if self._stated else {"camera": self.scene.camera.name}),
+            "rendered": rendered,
             "warnings": [*self._settings.warnings, *warnings],
             "versions": origins.versions(),
         }
@@ -170,7 +179,8 @@ class BlenderRenderer:
         InputError
             if the scene can't be exported, or the labels not be written.
         """
-        names = self._labels.write(self.scene, self.scene.camera, self._taken, picture, kinds, depth_steps, shot)
+        camera_object = self._of_file or self.scene.camera
+        names = self._labels.write(self.scene, camera_object, self._taken, picture, kinds, depth_steps, shot)
         if "flow" in kinds:  # other frames were looked at
             persistent_data.drop(self.scene)
         return names
@@ -225,21 +235,33 @@ class BlenderRenderer:
     def _set(self, job: Job) -> list[str]:
         """Set the scene to a job, and make its camera the scene's; what a reader should know of it."""
         self._settings.set(job)
+        self._of_file, self._stated = None, None
         if job.eye is None:
             among = obstacles.cameras_of(self.scene, self._own)
-            camera_object = obstacles.camera_of(job, self.scene, among, self._settings)
-            self._stated, warnings = None, datablocks.beyond_pinhole(camera_object, self.scene)
-        else:
-            camera_object, self._stated = self._camera_of_values(), obstacles.stated(job, self._settings.frame_of(job))
-            warnings = cameras.apply(camera_object, self._stated, self.scene)
+            camera_object = self._of_file = obstacles.camera_of(job, self.scene, among, self._settings)
+            warnings = datablocks.beyond_pinhole(camera_object, self.scene)
+        if job.calibration and self._of_file:  # the pinhole that covers is none of the file's
+            evaluated = self._of_file.evaluated_get(datablocks.depsgraph_of(self.scene))
+            job = makers.calibrated(job, job.calibration, cameras.read(evaluated, self.scene))
+            self._settings.set(job)
+        if job.eye is not None:
+            camera_object, stated = self._camera_of_values(self._of_file), obstacles.stated(job, self._settings.frame_of(job))
+            warnings = cameras.apply(camera_object, stated, self.scene)
             warnings += datablocks.beyond_pinhole(camera_object, self.scene)
+            self._stated = None if self._of_file else stated
         self._settings.look_through(camera_object, job.is_of_scenes_camera)
         return warnings
 
-    def _camera_of_values(self) -> bpy.types.Object:
-        """The camera for the four values; made for the first of them, since objects are numbered by name."""
+    def _camera_of_values(self, like: bpy.types.Object | None = None) -> bpy.types.Object:
+        """The camera for the four values; made for the first of them, since objects are numbered by name.
+
+        like : the camera whose clip range it has, the scene's own where None.
+        """
+        like = like or self.scene.objects.get(self.scene_camera or "")
         if self._own is None:
-            self._own = _own_camera(self._overrides, self.scene, self.scene.objects.get(self.scene_camera or ""))
+            self._own = _own_camera(self._overrides, self.scene)
+        if like and like.type == "CAMERA":
+            self._own.data.clip_start, self._own.data.clip_end = like.data.clip_start, like.data.clip_end
         return self._own
 
 
@@ -261,13 +283,11 @@ def both_sides(job: Job, paths: Sequence[Path]) -> Scene:
         return renderer.both_sides(job, paths)
 
 
-def _own_camera(overrides: Overrides, scene: bpy.types.Scene, like: bpy.types.Object | None) -> bpy.types.Object:
-    """A camera while the overrides last, sharp, with the clip range of another."""
+def _own_camera(overrides: Overrides, scene: bpy.types.Scene) -> bpy.types.Object:
+    """A camera while the overrides last, sharp."""
     data = bpy.data.cameras.new(_NAME)
     overrides.afterwards(bpy.data.cameras.remove, data)
     camera_object = bpy.data.objects.new(_NAME, data)
     overrides.afterwards(bpy.data.objects.remove, camera_object)
-    if like and like.type == "CAMERA":
-        data.clip_start, data.clip_end = like.data.clip_start, like.data.clip_end
     scene.collection.objects.link(camera_object)
     return camera_object

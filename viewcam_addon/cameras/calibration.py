@@ -1,0 +1,149 @@
+"""The lens of a calibrated camera put on what a pinhole shows: which pinhole covers its picture, and the picture made of that.
+
+The way back of undistortion.py. The pinhole's picture is as sharp as the calibrated camera's wherever that is: its focal length
+is no shorter, and longer where the lens magnifies. A pixel of the result is interpolated between the four nearest of the
+pinhole's, and where it shows several of them, as at the border of a fisheye's, it is the mean of as many places.
+
+Rejected: a renderer's own lenses (Cycles' fisheyes are not OpenCV's, and other engines have none), and the compositor's, whose
+distortion is interpolated on a grid.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+
+from ..errors import InputError
+from ..pinhole import Pinhole, ViewPlane
+from .camera import Camera, choose
+from .distortion import Lens
+from .undistortion import looked_up, places_back
+
+_LATTICE = 512  # places along each side, at most, at which the lens is looked at: a polynomial of few terms has no finer detail
+_LARGEST = 2**28  # pixels: 4 GiB of Blender's floats
+_BAND = 2**19  # pixels that are computed at a time
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibrated camera without its pose. plane : of its picture. lens : what bends that."""
+
+    plane: ViewPlane
+    lens: Lens
+
+    def to_json(self) -> dict[str, Any]:
+        """All of it, as JSON can hold it."""
+        return {"plane": asdict(self.plane), "lens": self.lens.to_json()}
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
+        """The calibration that `to_json` gave. Raises InputError for what is none."""
+        try:
+            return cls(ViewPlane(**document["plane"]), Lens.from_json(document["lens"]))
+        except (LookupError, TypeError) as error:
+            raise InputError("the calibration has not all that it needs: write the file again") from error
+
+    def at(self, pinhole: Pinhole) -> Pinhole:
+        """The pinhole of the calibrated camera's own plane in another's place."""
+        return _with_plane(pinhole, self.plane)
+
+    def covering(self, pinhole: Pinhole) -> Pinhole:
+        """The pinhole in another's place whose picture has all that the calibrated camera shows. Raises as `cover` does."""
+        return _with_plane(pinhole, self.cover)
+
+    @cached_property
+    def cover(self) -> ViewPlane:
+        """The view plane of a pinhole's picture with square pixels that has all that the calibrated camera shows.
+
+        Raises
+        ------
+        InputError
+            if the model folds within the picture or shows what no pinhole does, or if the picture were too large.
+        """
+        plane = self.plane
+        top = plane.height - plane.principal_point[1]
+        columns, down = (np.linspace(0, size, min(size, _LATTICE) + 1) for size in (plane.width, plane.height))
+        pixels = np.stack(np.meshgrid(columns, down), axis=-1)
+        seen = self.lens.undistort((pixels - (plane.principal_point[0], top)) / plane.distance)
+        if (bad := ~np.isfinite(seen).all(axis=-1) | self.lens.folds(seen)).any():
+            column, row = pixels[bad][np.argmin(np.hypot(*(pixels[bad] - (plane.principal_point[0], top)).T))]
+            raise InputError(
+                f"from ({column:.0f}, {row:.0f}) on its lens shows nothing that a pinhole could, since the model folds there "
+                "or looks 90° and more aside: crop the picture, or calibrate with fewer terms"
+            )
+        steps = (np.linalg.norm(np.diff(seen, axis=axis), axis=-1) / each[1] for axis, each in enumerate((down, columns)))
+        distance = max(*plane.distance, *(1 / float(each.min()) for each in steps))
+        # Whole pixels aside of the calibrated camera's own, so that what no lens moves is not interpolated; and one around.
+        center = np.array([plane.principal_point[0], top])
+        before = np.ceil(-(seen.reshape(-1, 2).min(axis=0) * distance + center)).astype(int) + 1
+        width, height = (np.ceil(seen.reshape(-1, 2).max(axis=0) * distance + center).astype(int) + before + 1).tolist()
+        if width * height > _LARGEST:
+            raise InputError(
+                f"its lens sees so far aside that a pinhole's picture of it has {width} × {height} pixels: crop the picture, "
+                "or scale it down"
+            )
+        return ViewPlane((distance, distance), (center[0] + before[0], height - center[1] - before[1]), width, height)
+
+    def distorted(self, picture: np.ndarray, cut: ViewPlane, nearest: bool = False) -> np.ndarray:
+        """The picture as the calibrated camera shows it, of the same type; black where it has nothing.
+
+        picture : of a pinhole, (height, width, channels), rows from the top. cut : its view plane. nearest : takes the nearest
+        pixel's number, of masks and depths.
+        """
+        plane = self.plane
+        at = places_back(self.lens, plane, cut)
+        result = np.zeros((plane.height, plane.width, picture.shape[2]), picture.dtype)
+        if nearest:
+            return looked_up(picture, at, nearest=True)
+        along = [np.gradient(at, axis=axis) if at.shape[axis] > 1 else np.zeros_like(at) for axis in (1, 0)]
+        count = max(1, round(float(np.nanmax(np.linalg.norm(along, axis=-1)))))
+        offsets = (np.arange(count) + 0.5) / count - 0.5
+        rows_at_once = max(1, _BAND // plane.width)
+        for first in range(0, plane.height, rows_at_once):
+            rows = slice(first, first + rows_at_once)
+            total = np.zeros(result[rows].shape)
+            for x in offsets:
+                for y in offsets:
+                    total += looked_up(picture.astype(np.float64), at[rows] + x * along[0][rows] + y * along[1][rows])
+            mean = total / count**2
+            result[rows] = np.rint(mean) if picture.dtype.kind == "u" else mean
+        return result
+
+
+def of_cameras(read: Sequence[Camera], source: str, name: str | None = None) -> Calibration:
+    """The calibration that cameras of one file share. source : the file, as a sentence names it. name : of one of them.
+
+    Raises
+    ------
+    InputError
+        if there is none, or several and no name, or one that no pinhole's picture covers.
+    """
+    bent = {camera.name: Calibration(camera.pinhole.plane, camera.lens) for camera in read if camera.lens is not None}
+    if name is not None:
+        camera = choose([*read], name)
+        if camera.lens is None:
+            raise InputError(f"the camera {name} of {source} has no lens that distorts: name another")
+        result = Calibration(camera.pinhole.plane, camera.lens)
+    elif not bent:
+        raise InputError(f"no camera of {source} has a lens that distorts: give a file whose cameras have")
+    else:
+        result, *others = dict.fromkeys(bent.values())
+        if others:
+            firsts = {each: name for name, each in reversed(bent.items())}
+            raise InputError(
+                f"the cameras of {source} have {len(others) + 1} lenses or sizes: name one, as in {next(iter(bent))}"
+                f" or {firsts[others[0]]}"
+            )
+    try:
+        result.cover  # noqa: B018
+    except InputError as error:
+        raise InputError(f"the camera {name or next(iter(bent))} of {source} can't be rendered: {error}") from None
+    return result
+
+
+def _with_plane(pinhole: Pinhole, plane: ViewPlane) -> Pinhole:
+    return replace(
+        pinhole, distance=plane.distance, principal_point=plane.principal_point, width=plane.width, height=plane.height
+    )
