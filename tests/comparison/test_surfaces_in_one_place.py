@@ -15,7 +15,6 @@ from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
 # What moves each ray of the renderer on paper, in roundings: as in conftest.py.
 ROUNDINGS_OF_A_RENDERER = 0.35
 CAMERA = Pinhole((0.3, -4.0, 3.1), (0.1, 0.2, 0.0), (0.0, 0.0, 1.0), 150.0, 120, 80)
-FLOORS = ("Floor", "Carpet", "Tiles")
 HAIR = 3e-4
 
 
@@ -148,12 +147,6 @@ def test_leaves_of_a_pixel_are_seen(reference):
 
 def test_nothing_is_explained_without_the_scene(tracer, reference):
     assert not compare(reference, rendered(tracer), CAMERA).passed
-
-
-def a_pixel_of(reference, index, aside=0):
-    rows, columns = np.nonzero(reference["Object Index"][..., 0] == index)
-    i = len(rows) // 2 + aside
-    return rows[i], columns[i]
 
 
 def harmed(test, name, where, change):

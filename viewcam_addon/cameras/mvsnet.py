@@ -29,7 +29,7 @@ TITLE = "MVSNet cam.txt"
 
 _KINDS = ("extrinsic", "intrinsic")
 _NAME = "*cam.txt"
-_FOLDERS = ("cams", "Cameras", "Cameras/train")
+_FOLDERS = ("cams", "cams_1", "Cameras", "Cameras/train")
 _PICTURES = ("images", "blended_images")
 _TEXT = re.compile(r"extrinsic\s([-+\d.eE\s]+)intrinsic\s([-+\d.eE\s]+)")
 

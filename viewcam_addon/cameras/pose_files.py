@@ -99,11 +99,11 @@ def _intrinsics(file: Source) -> Mapping[str, Any]:
     """K of the data set, by its plain name; nothing where there is none."""
     for up in ((), ("..",)):
         for name in _INTRINSICS:
-            if pose := file.file(*up, *name.split("/")):
-                numbers = flat(f"K in {pose.name}", pose.text)
+            if k_file := file.file(*up, *name.split("/")):
+                numbers = flat(f"K in {k_file.name}", k_file.text)
                 side = {9: 3, 16: 4}.get(len(numbers))
                 if side is None:
-                    raise InputError(f"{pose.name} has {len(numbers)} numbers: K has 3 × 3, or 4 × 4")
+                    raise InputError(f"{k_file.name} has {len(numbers)} numbers: K has 3 × 3, or 4 × 4")
                 return {"k": np.array(numbers).reshape(side, side)[:3, :3].ravel().tolist()}
     return {}
 

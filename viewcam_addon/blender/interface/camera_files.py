@@ -20,7 +20,7 @@ from .. import datablocks, dataset_cameras, picture
 from . import clipboard, file_menu
 from .camera_options import READING, ReadingOptions, WorldOptions
 
-_DROPPED = ".json;.txt;.bin;.xml;.yaml;.yml;.fspy;.sfm;.xmp;.out;.npy;.csv;.pbrt;.pov"
+_DROPPED = ".json;.txt;.bin;.xml;.yaml;.yml;.fspy;.sfm;.xmp;.out;.nvm;.npy;.npz;.csv;.log;.pbrt;.pov"
 _MOST_NOTES = 12
 
 
