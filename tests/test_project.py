@@ -49,7 +49,7 @@ ROOMS = {
     "image": "errors machine files terminal pinhole",
     "intrinsics": "errors checks pinhole",
     "camera_values": "errors checks pinhole roll intrinsics",
-    "cameras": "errors checks files terminal npy usd_stage pinhole intrinsics",
+    "cameras": "errors checks files terminal npy usd_stage pinhole rotation intrinsics",
     "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks machine files npy pinhole image",
     "labels": "errors machine files png pinhole image cameras tracer",

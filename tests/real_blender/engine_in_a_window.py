@@ -159,8 +159,10 @@ def view():
 
 
 def swipe():
-    """The reference left of a line over solid shading: as the scene displays it, dragged, and gone without a trace."""
+    """The reference left of a line: as the scene displays it, before the theme's background where nothing is, dragged, and gone
+    without a trace."""
     scene = bpy.context.scene
+    scene.render.film_transparent = True
     area, part = region("VIEW_3D", "WINDOW")
     space = area.spaces.active
     scene.virtual_pinhole_reference.samples = 16
@@ -182,7 +184,10 @@ def swipe():
     for _ in range(10):
         yield
     screen = screenshot("before")[part.y : part.y + part.height, part.x : part.x + part.width]
-    expected = displays.displayed(scene, np.ascontiguousarray(running.live.picture[..., :3]))
+    light, alpha = np.split(running.live.picture, [3], axis=-1)
+    straight = np.divide(light, alpha, out=np.zeros_like(light), where=alpha > 0)
+    behind = np.array(bpy.context.preferences.themes[0].view_3d.space.gradients.high_gradient)
+    expected = displays.displayed(scene, straight)[..., :3] * alpha + behind * (1 - alpha)
     line = round(running.line())
     rows, columns = slice(60, part.height - 80), slice(120, line - 20)  # between header, tools and words
     left = np.abs(screen[rows, columns, :3] - expected[rows, columns, :3])

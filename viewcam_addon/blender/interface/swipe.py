@@ -33,7 +33,8 @@ _FRAGMENT = """
 vec3 displayed(ivec3 at) { return texelFetch(shades, ivec2(at.g * COLORS + at.r, at.b), 0).rgb; }
 void main() {
     vec4 here = texelFetch(light, ivec2(gl_FragCoord.xy), 0);
-    vec3 at = clamp(log2(max(here.rgb, 0.0) / LOWEST + 1.0) / STOPS, 0.0, 1.0) * float(COLORS - 1);
+    vec3 straight = here.a > 0.0 ? here.rgb / here.a : vec3(0.0);
+    vec3 at = clamp(log2(max(straight, 0.0) / LOWEST + 1.0) / STOPS, 0.0, 1.0) * float(COLORS - 1);
     ivec3 low = min(ivec3(at), COLORS - 2);
     vec3 share = at - vec3(low), sum = vec3(0.0);
     for (int corner = 0; corner < 8; corner++) {
@@ -118,6 +119,9 @@ class _Swipe:
         import gpu
         from gpu_extras.batch import batch_for_shader
 
+        # What the viewport shows must not be seen through what the reference does not.
+        gradients = bpy.context.preferences.themes[0].view_3d.space.gradients
+        proof_image.fill(0, 0, line, height, (*gradients.high_gradient, 1.0))
         across = line / self.region.width
         shader = gpu.shader.from_builtin("IMAGE")
         corners = [(0, 0), (line, 0), (line, height), (0, height)]
