@@ -48,7 +48,7 @@ PASSES = ("Depth", "Normal", "Position", "Object Index", "Material Index")
 # Calibrated: of the studio a pixel in a thousand differs by a quarter of these. Depth and place as shares of the depth.
 TOLERANCES = {"Object Index": 0.0, "Material Index": 0.0, "Depth": 1e-4, "Position": 1e-4, "Normal": 0.01}
 ON_EDGES = 1e-3
-"""Of all pixels: more may not differ in any pass. Calibrated: the studio has a tenth of it, and more the larger its pixels."""
+"""The share of pixels that may differ in a pass. Calibrated: the studio has a tenth, and more the larger its pixels."""
 
 # BlenderProc's: RendererUtility.render_init, and of render_segmap set_light_bounces, samples, noise threshold and denoiser.
 _CYCLES = {

@@ -43,14 +43,6 @@ def _map_flat(mesh) -> None:
         uv.data[loop.index].uv = corner.x + 0.5, corner.y + 0.5
 
 
-def _globe(name: str, radius: float, material, location, rotation=(0, 0, 0)):
-    """A smooth sphere with a UV map."""
-    globe = b.primitive(
-        name, bmesh.ops.create_uvsphere, smooth=True, u_segments=48, v_segments=24, radius=radius, calc_uvs=True
-    )
-    return b.place(name, globe, material, location, rotation)
-
-
 # Materials that several scenes have.
 
 

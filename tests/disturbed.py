@@ -235,7 +235,7 @@ class Disturbances:
 
     @pytest.mark.exhaustive
     def test_pictures_beyond_a_limit_end_the_batch_and_without_it_resume_finishes_it(self, command, undisturbed, tmp_path):
-        """What needs no right to mount: files may not be larger than the smallest of the pictures."""
+        """A limit needs no right to mount: files may not be larger than the smallest of the pictures."""
         sizes = sorted(file.stat().st_size for file in undisturbed.glob("*.exr"))
         status, events = command.run(tmp_path, limit=(sizes[0] + sizes[-1]) // 2048)
         failed = [event["error"] for event in events if event["event"] == "shot_failed"]

@@ -168,8 +168,8 @@ def test_a_picture_whose_light_is_all_a_renderers_choice_is_no_answer_in_shell_j
     report, result, junit = (tmp_path / name for name in ("report", "out.json", "out.xml"))
     line = fails(capfd, "compare", *sides, "--scene", scene, "--report", report, "--json", result, "--junit", junit)
     assert "Nothing to compare: 100 % of the pixels with light" in line and "('Ceiling' and 'Lamp')" in line, line
-    told = json.loads(result.read_text())
-    assert told["exit_status"] == 2 and "Nothing to compare" in told["error"], told
+    record = json.loads(result.read_text())
+    assert record["exit_status"] == 2 and "Nothing to compare" in record["error"], record
     assert "<error" in junit.read_text(encoding="utf-8") and "Nothing to compare" in junit.read_text(encoding="utf-8")
     assert not report.exists()
     with pytest.raises(InputError, match="Nothing to compare"):
@@ -305,7 +305,7 @@ def viewcam(*words, **options):
 
 @posix
 def test_a_picture_that_can_not_grow_leaves_nothing_behind(tmp_path):
-    """As on a full disk, where nobody may mount one: the tracer's and, where Blender is there, Cycles'."""
+    """A full disk, where nobody may mount one: the tracer's pictures and, where Blender is there, Cycles'."""
     jobs = [("render", write_scene(tmp_path))]
     if importlib.util.find_spec("bpy"):
         jobs.append(("cycles", DEMO_SCENE, "--size", "160x90"))
@@ -427,7 +427,7 @@ def test_an_empty_name_is_not_taken_for_the_current_folder(tmp_path, capfd, monk
 
 @posix
 def test_the_result_goes_to_standard_output_by_its_name_and_devices_stay(tmp_path):
-    """As root, --json /dev/null once left a file in its place."""
+    """Once --json /dev/null left a file in its place, where root typed it."""
     scene = write_scene(tmp_path)
     command = [sys.executable, "-m", "viewcam_addon", "render", scene, tmp_path / "out.exr", "--json"]
     output = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=True).stdout

@@ -194,7 +194,7 @@ def test_what_can_be_no_name_of_a_file_is_refused_in_one_sentence(tmp_path, name
 
 
 def test_texts_have_the_same_bytes_on_every_system():
-    """What Python writes without newline= ends its lines otherwise on Windows."""
+    """Lines that Python writes without newline= end otherwise on Windows."""
     package = Path(__file__).resolve().parent.parent / "viewcam_addon"
     for path in package.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_bytes())):

@@ -56,7 +56,7 @@ def test_the_distance_grows_with_the_picture_as_that_of_the_same_lens_does(camer
 
 
 @given(st.floats(1e-3, 1e7), frames, fits)
-def test_a_lens_below_one_millimetre_grows_the_sensor_and_keeps_the_distance(distance, frame, fit):
+def test_a_lens_below_one_millimeter_grows_the_sensor_and_keeps_the_distance(distance, frame, fit):
     width, height = frame.window[2:]
     plane = ViewPlane(
         (distance, distance * frame.pixel_aspect_x / frame.pixel_aspect_y), (width / 2, height / 2), width, height

@@ -50,12 +50,12 @@ def test_every_filter_is_undone_as_opencv_undoes_it(kind, width, filters, seed):
     shape = (len(filters), width, channels)
     pixels = np.random.default_rng(seed).integers(0, 2**bits, shape).astype(f"u{bits // 8}")
     content = filtered(pixels, filters)
-    found = png.decoded(content)
-    assert found.dtype == pixels.dtype and np.array_equal(found, pixels)
+    decoded = png.decoded(content)
+    assert decoded.dtype == pixels.dtype and np.array_equal(decoded, pixels)
     if channels != 2:
         theirs = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED).reshape(shape)
         order = {1: [0], 3: [2, 1, 0], 4: [2, 1, 0, 3]}[channels]
-        assert np.array_equal(found, theirs[..., order])
+        assert np.array_equal(decoded, theirs[..., order])
 
 
 @pytest.mark.parametrize("shape", [(5, 7), (5, 7, 3), (5, 7, 4)])
@@ -80,7 +80,7 @@ def test_what_is_damaged_or_another_png_is_a_value_error():
         for _ in range(dice.randint(1, 4)):
             mutant[dice.randrange(len(mutant))] = dice.randrange(256)
         try:
-            found = png.decoded(bytes(mutant))
+            decoded = png.decoded(bytes(mutant))
         except ValueError:
             continue
-        assert found.ndim == 3 and found.nbytes < 10**6
+        assert decoded.ndim == 3 and decoded.nbytes < 10**6

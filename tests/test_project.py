@@ -12,6 +12,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -48,7 +49,7 @@ ROOMS = {
     "image": "errors machine files terminal pinhole",
     "intrinsics": "errors checks pinhole",
     "camera_values": "errors checks pinhole roll intrinsics",
-    "cameras": "errors checks files terminal npy usd_stage pinhole intrinsics",
+    "cameras": "errors checks files terminal npy usd_stage pinhole rotation intrinsics",
     "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks machine files npy pinhole image",
     "labels": "errors machine files png pinhole image cameras tracer",
@@ -122,10 +123,15 @@ TOP_LEVEL = {"blender_manifest.toml", "viewcam_addon", "tests", "sample_scenes",
 BUILD_FILES = {"__init__.py", "pyproject.toml", "Makefile", "LICENSE", "CONTRIBUTING.md", "hatch_build.py"}
 
 
+@functools.cache
+def tree_of(source: str) -> ast.Module:
+    return ast.parse(source)
+
+
 def imported_modules(source: str, package: tuple[str, ...]) -> set[str]:
     """The modules that `source` imports anywhere, dotted and absolute; `package` is where its relative imports start."""
     result = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree_of(source)):
         if isinstance(node, ast.Import):
             result |= {name.name for name in node.names}
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
@@ -169,9 +175,8 @@ def sources() -> list[Path]:
     return sorted(PACKAGE.rglob("*.py"))
 
 
-@functools.cache
 def parsed(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
+    return tree_of(path.read_text(encoding="utf-8"))
 
 
 def tracked_files() -> list[str]:
@@ -302,7 +307,7 @@ def missing_names(trees: dict[Path, ast.Module]) -> list[str]:
 
 
 def test_what_is_imported_from_a_module_of_the_package_is_there():
-    """Of modules that need Blender, or something else that is not installed, and in functions, too."""
+    """Modules that need Blender, or something else that is not installed, are held to it, and imports in functions, too."""
     trees = {path.relative_to(ROOT): parsed(path) for path in sources()}
     assert not (missing := missing_names(trees)), missing
 
@@ -317,23 +322,81 @@ def test_an_import_of_what_is_not_there_is_seen():
     assert missing_names(trees) == ["a/d.py: gone from a/b"]
 
 
-def vague_beginnings(tree: ast.Module) -> list[str]:
-    """The docstrings that begin with a word after which their subject is still unknown."""
-    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    texts = [ast.get_docstring(node) or "" for node in ast.walk(tree) if isinstance(node, documented)]
-    vague = re.compile(r"(How|Of|That of|The same|Those|What|When|Where|Whether|Which|Who)\b")
-    return [text.splitlines()[0] for text in texts if vague.match(text)]
+def vague_beginnings(source: str) -> list[str]:
+    """The docstrings that begin with a word after which their subject is still unknown, those of constants among them."""
+    words = "As|How|Of|That of|The same|Those|What|When|Where|Whether|Which|Who"
+    return re.findall(rf'(?m)^ *r?"""((?:{words})\b.*?)(?:"""|$)', source)
+
+
+NO_NAMES = "found|given|made|one|said|shown|some|told"
+POOR = rf"_?(?:{NO_NAMES})_?"
+SPELLED_AS_NAMES = [  # more or less: whole trees of syntax take ten seconds for all files
+    re.compile(rf"\b{POOR}\)?( [:|+*/-]?= |, [^\"\n]* = )"),
+    re.compile(rf"(?m)^ *{POOR}: "),
+    re.compile(rf"\bfor [^\"\n#]*\b{POOR}[,) ][^\"\n#]*\bin "),
+    re.compile(rf"\b(?:def|lambda|class) ([^\"\n]*[(* ])?{POOR}[,:=()]"),
+]
+# Stems, since -ise ends many other words, too.
+BRITISH = "behaviour|cancell|centre|colour|favour|grey|labell|levell|metre|modell|neighbour|signall"
+BRITISH += "|initialis|normalis|optimis|organis|quantis|rasteris|recognis|regularis|synchronis"
+
+
+def is_british(text: str) -> bool:
+    text = text.replace("CANCELLED", "").lower()  # Blender's own word
+    return any(stem in text for stem in BRITISH.split("|"))
+
+
+def poor_names(source: str) -> list[str]:
+    """The names of values, functions and classes that say nothing of them, and those in British spelling."""
+    if not is_british(source) and not any(each.search(source) for each in SPELLED_AS_NAMES):
+        return []
+    result = []
+    for node in ast.walk(tree_of(source)):
+        name = ""
+        if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+            name = node.id if isinstance(node, ast.Name) else node.attr
+        elif isinstance(node, ast.arg):
+            name = node.arg
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            name = node.name
+        result += [name] if name.strip("_") in NO_NAMES.split("|") or is_british(name) else []
+    return result
+
+
+def guilty(check: Callable[[str], list[str]]) -> dict[str, list[str]]:
+    """File → faults, of those of the project's Python files in which `check` finds some."""
+    files = [name for name in tracked_files() if name.endswith(".py")]
+    return {name: faults for name in files if (faults := check((ROOT / name).read_text(encoding="utf-8")))}
 
 
 def test_docstrings_begin_with_what_a_thing_is_or_does():
-    vague = {path.relative_to(ROOT): vague_beginnings(parsed(path)) for path in sources()}
-    assert not (vague := {path: texts for path, texts in vague.items() if texts}), vague
+    assert guilty(vague_beginnings) == {}
+
+
+def test_names_say_what_a_value_is_and_are_spelled_as_blender_spells():
+    assert guilty(poor_names) == {}
+    assert not [name for name in tracked_files() if is_british(name)]
 
 
 def test_a_docstring_that_begins_without_its_subject_is_seen():
-    assert vague_beginnings(ast.parse('def a():\n    """Of a picture."""\n\ndef b():\n    """The area of a picture."""')) == [
-        "Of a picture."
-    ]
+    source = 'def a():\n    """Of a picture."""\n\ndef b():\n    """The area of a picture."""\n\nc = 1\n"""Those\nof it."""\n'
+    assert vague_beginnings(source) == ["Of a picture.", "Those"]
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "def f(a, given): ...",
+        "a._made = 1",
+        "for told in (): ...",
+        "found, a = b",
+        "one |= 1",
+        "class Normaliser: ...",
+        "colours = 1",
+    ],
+)
+def test_a_poor_name_is_seen(source):
+    assert len(poor_names(source)) == 1 and not poor_names("a = asyncio.CancelledError")
 
 
 def test_only_blender_knows_blender():
@@ -384,7 +447,7 @@ METHODS = {"numbers", "precision"}
 def uses_of_the_property_group(source: str) -> list[str]:
     """The lines where `source` reads `….virtual_pinhole`, or takes or gives a PropertyGroup."""
     result = []
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree_of(source)):
         if isinstance(node, ast.Attribute) and node.attr in ("virtual_pinhole", "PropertyGroup"):
             result.append(f"{node.lineno}: {ast.unparse(node)}")
     return result

@@ -14,6 +14,7 @@ panel would show a distance in pixels that are no longer those of the picture).
 import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -180,7 +181,7 @@ class CameraValues:
         """Other values, but their own numbers (name, index) that something else decides."""
         if not bound:
             return other
-        kept = {}
+        kept: dict[str, Any] = {}
         for name in {name for name, _ in bound}:
             own_value, other_value = getattr(self, name), getattr(other, name)
             if isinstance(own_value, tuple):

@@ -91,12 +91,12 @@ class _CommandParser(_OneLineParser):
     add_words: Callable[[argparse.ArgumentParser], None]
     """Adds the command's words, once it is this command that was given: what they need is imported for no other."""
 
-    def parse_known_args(self, *arguments: Any) -> Any:  # which intermixed parsing uses itself
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:  # which intermixed parsing uses itself
         if self._is_intermixing:
-            return super().parse_known_args(*arguments)
+            return super().parse_known_args(args, namespace)
         self._is_intermixing = True
         self.add_words(self)
-        return self.parse_known_intermixed_args(*arguments)
+        return self.parse_known_intermixed_args(args, namespace)
 
 
 _SERVE = "_serve"

@@ -35,7 +35,7 @@ def survived(words: list[str]) -> int | None:
         return None
     parent = os.getpid()
     is_batch = words[0] == "batch" or any(word.startswith(("--frames", "--cameras")) for word in words)
-    passing = {signal.SIGINT: signal.SIGUSR1, signal.SIGTERM: signal.SIGUSR2}
+    passing: dict[int, signal.Signals] = {signal.SIGINT: signal.SIGUSR1, signal.SIGTERM: signal.SIGUSR2}
     child = os.fork()
     if child == 0:
         if sys.platform == "linux":  # whoever kills this command means Blender, too

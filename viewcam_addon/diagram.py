@@ -74,7 +74,8 @@ def diagram(pinhole: Pinhole, up: Triple, share: float) -> Diagram:
 def up_tip(eye: Triple, look_at: Triple, up: Triple, share: float) -> Triple:
     """The tip of up's arrow, in world space; it starts at the eye, and its length says nothing. Parameters as in `diagram`."""
     length = _UP * share * math.dist(eye, look_at) / math.hypot(*up)
-    return tuple(e + length * component for e, component in zip(eye, up, strict=True))
+    x, y, z = (e + length * component for e, component in zip(eye, up, strict=True))
+    return x, y, z
 
 
 def arrow(tip: Array) -> Array:

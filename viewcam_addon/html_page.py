@@ -67,8 +67,8 @@ def figure(value: float) -> str:
         return "0"
     if not math.isfinite(value):
         return "∞" if value > 0 else "no number"
-    digits, exponent = f"{value:.1e}".split("e")
-    exponent = int(exponent)
+    digits, power = f"{value:.1e}".split("e")
+    exponent = int(power)
     if -3 < exponent < 5:
         return f"{float(f'{value:.1e}'):.{max(1 - exponent, 0)}f}"
     return f"{digits}·10{str(exponent).translate(_SUPERSCRIPTS)}"

@@ -333,7 +333,7 @@ def write_rgba(path: str | os.PathLike[str], pixels: NDArray[np.float32]) -> Non
 
 
 _DATA = ("Vector", "Denoising Depth", "Denoising Normal", "Crypto")
-"""How the names of Blender's further passes begin that are no colors."""
+"""The beginnings of names of Blender's further passes that are no colors."""
 
 
 def rewrite(path: str | os.PathLike[str], change: Callable[[NDArray[Any], bool], NDArray[Any]]) -> None:

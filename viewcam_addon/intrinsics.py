@@ -106,7 +106,7 @@ class Frame:
         # Blender multiplies in float32 before it rounds down.
         size = (width, height, width, height)
         with np.errstate(under="ignore"):
-            edges = np.floor(np.float32(self.border) * np.float32(size))
+            edges = np.floor(np.array(self.border, np.float32) * np.array(size, np.float32))
         left, bottom, right, top = (min(int(edge), most) for edge, most in zip(edges, size, strict=True))
         return left, bottom, right - left, top - bottom
 

@@ -66,7 +66,7 @@ def write(path: Path, words: str, status: int, result: Mapping[str, Any], second
     counts = {"errors": kinds.count("error"), "failures": kinds.count("failure"), "skipped": kinds.count("skipped")}
     counted = {name: str(count) for name, count in {**counts, "tests": len(cases)}.items()}
     suites = ElementTree.Element("testsuites", name="viewcam")
-    suite = ElementTree.SubElement(suites, "testsuite", name="viewcam", **counted, time=f"{seconds:.3f}")
+    suite = ElementTree.SubElement(suites, "testsuite", {"name": "viewcam", **counted, "time": f"{seconds:.3f}"})
     suite.extend(cases)
     with written_whole(path) as temporary:
         ElementTree.ElementTree(suites).write(temporary, encoding="utf-8", xml_declaration=True)

@@ -81,7 +81,7 @@ def orbited(pinhole: Pinhole, around: float, upwards: float) -> Pinhole:
     cosine, sine = math.cos(upwards), math.sin(upwards)
     axes = _turned_about(pinhole.up, around, np.array([u, cosine * v - sine * w, cosine * w + sine * v]))
     reach = math.dist(pinhole.eye, pinhole.look_at)
-    return _with_axes(pinhole, _along(pinhole.look_at, axes[2], reach), pinhole.look_at, axes)
+    return _with_axes(pinhole, _along(pinhole.look_at, axes[2], reach), pinhole.look_at, [*axes])
 
 
 def framed_by_eye(pinhole: Pinhole, points: ArrayLike, margin: float = 0.0) -> Pinhole:
@@ -148,7 +148,8 @@ def framed_by_distance(pinhole: Pinhole, points: ArrayLike, margin: float = 0.0)
         raise InputError("all of the points lie on the view axis, and any d frames them: give a point beside it too")
     if least > largest:
         raise _off_center()
-    return replace(pinhole, distance=tuple(largest * distance for distance in pinhole.distance))
+    d_x, d_y = pinhole.distance
+    return replace(pinhole, distance=(largest * d_x, largest * d_y))
 
 
 def _seen_from_eye(pinhole: Pinhole, points: ArrayLike) -> tuple[tuple[Array, Array], Array]:
@@ -192,7 +193,8 @@ def _turned_about(up: Triple, angle: float, axes: Array) -> Array:
 
 def _with_axes(pinhole: Pinhole, eye: Triple, look_at: Triple, axes: Sequence[Array]) -> Pinhole:
     """The pinhole at another place, with the up that gives these axes (u, v, w) for certain: its own, the opposite, else v."""
-    for up in (pinhole.up, tuple(0.0 - component for component in pinhole.up)):
+    x, y, z = pinhole.up
+    for up in (pinhole.up, (0.0 - x, 0.0 - y, 0.0 - z)):
         moved = replace(pinhole, eye=eye, look_at=look_at, up=up)
         is_as_certain = moved.roll_uncertainty(_ROUNDING) <= max(pinhole.roll_uncertainty(_ROUNDING), _UNSEEN)
         if is_as_certain and np.abs(np.subtract(moved.basis(), axes)).max() <= _UNSEEN:

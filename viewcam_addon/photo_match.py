@@ -280,8 +280,8 @@ def solve_edges(
         return residual, slopes[..., : len(units)] * units
 
     start = distance * half if known_distance is None else np.full_like(distance, known_distance)
-    rotation, found, *rest = _refined(measured, rotation, half * center[..., :free], start, half, known_distance is not None)
-    principal_point = found if free else np.zeros((*distance.shape, 2))
+    rotation, refined, *rest = _refined(measured, rotation, half * center[..., :free], start, half, known_distance is not None)
+    principal_point = refined if free else np.zeros((*distance.shape, 2))
     return Solution(rotation, np.zeros((*distance.shape, 3)), principal_point, *rest), is_mirrored
 
 
@@ -347,9 +347,9 @@ def _orthocenter(vanishing: Array) -> Array:
     """
     x, y, w = np.moveaxis(vanishing, -1, 0)
     i, j = np.array(list(combinations(range(3), 2))).T
-    one, other = np.s_[..., i], np.s_[..., j]
-    sums = (x[one] * w[other] + x[other] * w[one], y[one] * w[other] + y[other] * w[one], -w[one] * w[other])
-    products = x[one] * x[other] + y[one] * y[other]
+    first, second = np.s_[..., i], np.s_[..., j]
+    sums = (x[first] * w[second] + x[second] * w[first], y[first] * w[second] + y[second] * w[first], -w[first] * w[second])
+    products = x[first] * x[second] + y[first] * y[second]
     center = np.einsum("...ij,...j->...i", np.linalg.pinv(np.stack(sums, axis=-1)), products)[..., :2]
     return np.where((np.abs(center) <= 1.0).all(axis=-1, keepdims=True), center, 0.0)
 

@@ -43,10 +43,10 @@ SIDE = 5
 # Half of what a renderer may be off: Rayleigh's distribution has its median at 0.41 then (tests/comparison/conftest.py).
 _ROUNDINGS = 0.35
 
-Said = dict[str, float]
+Judgments = dict[str, float]
 """Judge → how different two pictures are; 1 is where it says so by itself."""
-Judged = tuple[list[Said], list[list[Said]]]
-"""Of a block: each picture against each reference, row after row; and of each fault, if they are wanted, each picture."""
+Judged = tuple[list[Judgments], list[list[Judgments]]]
+"""The judgments of a block: of each picture against each reference, row after row; and of each picture with each fault."""
 
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
@@ -83,7 +83,7 @@ def together(scores: np.ndarray, share: float = 0.01) -> float:
     return float(beside[is_high].mean() / (2 * (SIDE - 1)))
 
 
-def _by_judge(judged: Iterable[Said]) -> dict[str, np.ndarray]:
+def _by_judge(judged: Iterable[Judgments]) -> dict[str, np.ndarray]:
     judged = list(judged)
     return {judge: np.array([each[judge] for each in judged if judge in each]) for judge in judged[0]}
 
@@ -145,14 +145,14 @@ class Block:
         ]
         self._lit = [self._light(0, bench.tracer, i) for i in range(SIDE)]
 
-    def good(self) -> list[Said]:
+    def good(self) -> list[Judgments]:
         result = []
         for i, j in itertools.product(range(SIDE), repeat=2):
             of_geometry = self._of_geometry(self._surfaces(self._bench.tracer, self._random(0, i, j)))
-            result.append(self._said(of_geometry, self._lit[i], j, by_all=i == j == 0))
+            result.append(self._judgments(of_geometry, self._lit[i], j, by_all=i == j == 0))
         return result
 
-    def faulty(self, fault: Fault) -> list[Said]:
+    def faulty(self, fault: Fault) -> list[Judgments]:
         number, tracer, judged = 1 + FAULTS.index(fault), self._bench.faulty[fault], []
         for i in range(SIDE):
             test = self._surfaces(tracer, self._random(number, i))
@@ -169,10 +169,10 @@ class Block:
                 for passes in lit:
                     passes.update(Combined=passes["Combined"].copy())
                     fault.of_picture(passes, self._random(number, i))  # the same place in all of them
-            judged.append(self._said(of_geometry, lit, i, by_all=i == 0))
+            judged.append(self._judgments(of_geometry, lit, i, by_all=i == 0))
         return judged
 
-    def _said(self, of_geometry: float, lit: list[Passes], j: int, by_all: bool) -> Said:
+    def _judgments(self, of_geometry: float, lit: list[Passes], j: int, by_all: bool) -> Judgments:
         reference = self._references[j]
         pictures = [rivals.without_the_tracers_own(Image(passes, attributes={"samples": str(_SAMPLES)})) for passes in lit]
         values = {rivals.OURS: max(of_geometry, rivals.of_light(reference, pictures))}

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 Numbers = Callable[[int, int, int], Array]
 """(pairs, pixels, samples) → (2 · pairs, pixels, samples) numbers from 0 to 1: a pair for the film, and one for a lamp."""
 Integrand = Callable[[Array], Array]
-"""Those numbers → (pixels, samples)."""
+"""Numbers of the samples → (pixels, samples)."""
 
 OURS = "ours: Sobol' with a X + s"
 

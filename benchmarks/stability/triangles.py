@@ -125,11 +125,11 @@ def _hits_of_fans(size: float, fans: int, random: np.random.Generator) -> Iterat
     side = int(np.clip(0.4 / size, 1, 16))  # fans stand in a square, apart from one another
     groups = [_Fans(size, side, random) for _ in range(min(60, -(-fans // side**2)))]
     for name, test in _FORMULAS.items():
-        yield name, np.concatenate([group.hits(lambda *given, test=test: np.isfinite(test(*given))) for group in groups])
+        yield name, np.concatenate([group.hits(lambda *rays, test=test: np.isfinite(test(*rays))) for group in groups])
     for name, robust in (("Embree", False), ("Embree, robust", True)):
-        yield name, np.concatenate([group.first_hits(lambda *given, r=robust: _embree_depth(*given, r)) for group in groups])
+        yield name, np.concatenate([group.first_hits(lambda *rays, r=robust: _embree_depth(*rays, r)) for group in groups])
     for name, packets in (("ours", True), ("ours, one by one", False)):
-        counts = np.concatenate([group.first_hits(lambda *given, p=packets: _core_depth(*given, p)) for group in groups])
+        counts = np.concatenate([group.first_hits(lambda *rays, p=packets: _core_depth(*rays, p)) for group in groups])
         values = np.concatenate([np.isfinite(_core_depth(group.corners, group.x, group.y, packets)) for group in groups])
         yield name, np.where(values, np.maximum(counts, 1), 0)
 

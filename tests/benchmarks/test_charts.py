@@ -109,14 +109,17 @@ def test_a_chart_is_drawn_from_its_figures_as_it_was_drawn_when_it_was_measured(
 
 
 def test_what_is_measured_anew_stands_beside_the_figures_of_all_others():
-    def told(charts, *behind):
+    def document(charts, *behind):
         return {"behind": list(behind), "charts": {name: {"title": title, "run": run} for name, title, run in charts}}
 
-    earlier = told([("s-a", "A", 1), ("s-b", "A box", 1)], "A: slow", "A box: slow")
-    assert charts.beside(earlier, told([("s-a", "A", 2)])) == (1, told([("s-a", "A", 2), ("s-b", "A box", 1)], "A box: slow"))
-    assert charts.beside(earlier, told([("s-a", "A", 2), ("s-b", "A box", 2)]))[0] == 0
-    again = told([("s-b", "A box", 2)], "A box: slower")
-    assert charts.beside(earlier, again) == (1, told([("s-a", "A", 1), ("s-b", "A box", 2)], "A: slow", "A box: slower"))
+    earlier = document([("s-a", "A", 1), ("s-b", "A box", 1)], "A: slow", "A box: slow")
+    assert charts.beside(earlier, document([("s-a", "A", 2)])) == (
+        1,
+        document([("s-a", "A", 2), ("s-b", "A box", 1)], "A box: slow"),
+    )
+    assert charts.beside(earlier, document([("s-a", "A", 2), ("s-b", "A box", 2)]))[0] == 0
+    again = document([("s-b", "A box", 2)], "A box: slower")
+    assert charts.beside(earlier, again) == (1, document([("s-a", "A", 1), ("s-b", "A box", 2)], "A: slow", "A box: slower"))
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"charts": {"a": {"title": "A"}}}', '{"behind": []}'])

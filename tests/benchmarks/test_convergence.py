@@ -42,14 +42,14 @@ def test_an_edge_in_four_dimensions_falls_faster_than_noise_where_padding_does_n
 
 
 def test_random_numbers_fall_as_noise_does_in_every_chart(charts):
-    """Which also tests the answers on paper: with a wrong one, errors would not fall."""
+    """The answers on paper are tested, too: with a wrong one, errors would not fall."""
     for chart in charts.values():
         assert slope_of(chart, "random numbers") == pytest.approx(-0.5, abs=0.05), chart.name
 
 
 @pytest.mark.parametrize("name", ["edge", "lamp"])
 def test_in_two_dimensions_ours_is_owens_permutations(charts, name):
-    """The same variance; RMS over 256 pixels is off by its own 1/√512 on both sides, thrice that is 19 %."""
+    """Both have one variance; RMS over 256 pixels is off by its own 1/√512 on both sides, thrice that is 19 %."""
     ours, owen = curve(charts[name], OURS).y, curve(charts[name], "Owen's permutations, padded").y
     np.testing.assert_allclose(np.log(ours), np.log(owen), atol=math.log(1.19))
 

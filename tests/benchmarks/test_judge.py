@@ -65,10 +65,10 @@ def test_a_search_for_half_a_percent_finds_what_a_thousand_samples_find_and_take
     asked = right if family == "none" else [fault for fault in faults.FAULTS if fault.family == family]
     took = {}
     for number, fault in enumerate(asked):
-        found = _searched(bench, fault, 1000 * (1 + number))
+        comparison = _searched(bench, fault, 1000 * (1 + number))
         expected = fault is None or fault.name == is_missed
-        assert found.passed == expected, (fault, found.sentence)
-        took[number] = found.search.samples
+        assert comparison.passed == expected, (fault, comparison.sentence)
+        took[number] = comparison.search.samples
         assert took[number] <= 256, (fault, took[number])
     if family != "none":
         assert np.median(list(took.values())) == 16

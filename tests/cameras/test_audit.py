@@ -371,9 +371,9 @@ def test_a_field_of_view_of_the_other_side_is_named_against_true_cameras(tmp_pat
     ("change", "sentence"),
     [
         # nerfstudio-project/nerfstudio #2255: c of OpenCV's calibration, where half a pixel is missing
-        (lambda said: {"cx": said["cx"] - 0.5, "cy": said["cy"] - 0.5}, "half a pixel too small"),
+        (lambda values: {"cx": values["cx"] - 0.5, "cy": values["cy"] - 0.5}, "half a pixel too small"),
         # ashawkey/stable-dreamfusion #377: cx stood for the height's and cy for the width's
-        (lambda said: {"cx": said["cy"], "cy": said["cx"]}, "swapped"),
+        (lambda values: {"cx": values["cy"], "cy": values["cx"]}, "swapped"),
     ],
 )
 def test_a_principal_point_that_was_written_wrongly_in_transforms_json_is_named(tmp_path, capsys, change, sentence):

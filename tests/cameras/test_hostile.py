@@ -95,9 +95,9 @@ def places(value, path=()):
         yield from places(inner, (*path, key))
 
 
-def read_or_refused(given_, options=GIVEN):
+def read_or_refused(source, options=GIVEN):
     try:
-        return cameras.read(given_, options=options)
+        return cameras.read(source, options=options)
     except InputError as error:
         assert str(error) and "\n" not in str(error), str(error)
         return []

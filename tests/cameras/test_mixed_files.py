@@ -134,7 +134,7 @@ MIXED = (
 )
 
 
-def given(make, folder) -> Path | str:
+def source(make, folder) -> Path | str:
     contents = make(folder) if make in (colmap_binary, realitycapture) else make()
     if isinstance(contents, dict):
         for name, text in contents.items():
@@ -145,7 +145,7 @@ def given(make, folder) -> Path | str:
 
 @pytest.mark.parametrize("make", MIXED)
 def test_one_camera_that_is_no_pinhole_keeps_none_of_the_others_back(tmp_path, make):
-    cameras_read = cameras.read(given(make, tmp_path), options=GIVEN)
+    cameras_read = cameras.read(source(make, tmp_path), options=GIVEN)
     assert [camera.name for camera in cameras_read] == ["good"]
     (note,) = (note for note in cameras_read[0].notes if note.startswith("Left out"))
     assert re.search("bad", note) and re.search("pinhole", note), note

@@ -490,7 +490,7 @@ def test_gaussian_splattings_principal_point_counts_where_it_is_said():
 
 
 def nerfstudio_path(*known, fov=None):
-    """As get_path_from_json takes it: the focal length is height / 2 / tan(fov / 2)."""
+    """A path as get_path_from_json takes it: the focal length is height / 2 / tan(fov / 2)."""
     path = [
         {
             "camera_to_world": [*each.opengl.ravel().tolist(), 0, 0, 0, 1],
@@ -586,8 +586,8 @@ def kubric(*known, **metadata):
     quaternions = [np.roll(rotation.from_matrix(each.opengl[:, :3]).as_quat(), 1).tolist() for each in known]
     camera = {"positions": [each.e.tolist() for each in known], "quaternions": quaternions, "sensor_width": 32.0}
     camera["focal_length"] = known[0].f_x / known[0].width * 32
-    said = {"resolution": [known[0].width, known[0].height], "frame_rate": 12, **metadata}
-    return {"camera": camera, "metadata": said, "instances": []}
+    metadata_of_views = {"resolution": [known[0].width, known[0].height], "frame_rate": 12, **metadata}
+    return {"camera": camera, "metadata": metadata_of_views, "instances": []}
 
 
 @pytest.mark.parametrize("name", CENTERED)
@@ -724,11 +724,11 @@ def test_open3d_has_column_after_column_and_counts_from_the_first_pixels_center(
 def opensfm(known, **camera):
     rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_matrix(known.opencv).as_rotvec().tolist()
     longer = max(known.width, known.height)
-    said = {"projection_type": "brown", "width": known.width, "height": known.height}
-    said |= {"focal_x": known.f_x / longer, "focal_y": known.f_y / longer}
-    said |= {"c_x": (known.c_x - known.width / 2) / longer, "c_y": (known.c_y - known.height / 2) / longer}
+    entry = {"projection_type": "brown", "width": known.width, "height": known.height}
+    entry |= {"focal_x": known.f_x / longer, "focal_y": known.f_y / longer}
+    entry |= {"c_x": (known.c_x - known.width / 2) / longer, "c_y": (known.c_y - known.height / 2) / longer}
     shot = {"rotation": rotation, "translation": (-known.opencv @ known.e).tolist(), "camera": "c"}
-    return [{"cameras": {"c": said | camera}, "shots": {"a.jpg": shot}, "points": {}}]
+    return [{"cameras": {"c": entry | camera}, "shots": {"a.jpg": shot}, "points": {}}]
 
 
 @pytest.mark.parametrize("name", UNMIRRORED)
@@ -1011,9 +1011,9 @@ def test_realitycaptures_table_without_a_focal_length_has_poses():
 
 def test_a_single_term_of_realitycaptures_table_is_divisions_and_several_are_browns():
     known = Known("plain")
-    given = Options(size=(known.width, known.height))
-    (division,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1), options=given)
-    (brown,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1, 0.02), options=given)
+    options = Options(size=(known.width, known.height))
+    (division,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1), options=options)
+    (brown,) = cameras.read(realitycapture_table(known, RC_HEADS[0], -0.1, 0.02), options=options)
     assert division.lens.projection == "division" and division.lens.parameters == (-0.1,)
     assert brown.lens.projection == "pinhole" and brown.lens.radial == (-0.1, 0.02)
     assert all(any("does not name the lens's model" in note for note in camera.notes) for camera in (division, brown))
@@ -1114,7 +1114,7 @@ def test_middlebury_lists_k_r_and_t(tmp_path):
 
 
 def test_the_right_camera_of_middleburys_pair_sees_a_point_further_left():
-    """As scenes2014 says it: Z = baseline · f / (d + doffs). The numbers are Adirondack's."""
+    """A depth as scenes2014 has it: Z = baseline · f / (d + doffs). The numbers are Adirondack's."""
     text = "cam0=[4161.221 0 1445.577; 0 4161.221 984.686; 0 0 1]\ncam1=[4161.221 0 1654.636; 0 4161.221 984.686; 0 0 1]\n"
     left, right = cameras.read(text + "doffs=209.059\nbaseline=176.252\nwidth=2880\nheight=1988\nndisp=280\n")
     assert (left.pinhole.width, left.pinhole.height) == (2880, 1988) and (left.name, right.image) == ("cam0", "im1.png")
@@ -1201,15 +1201,15 @@ def test_kittis_cameras_stand_side_by_side(tmp_path):
 
 def test_pmvs_counts_from_the_corner_and_dtu_from_the_first_pixels_center(tmp_path):
     known = Known("shifted_and_not_square")
-    given = Options(size=(known.width, known.height))
-    the_same(cameras.read("CONTOUR\n" + "\n".join(map(text_of, projection(known, 0))) + "\n", options=given), known, 2.0**-48)
+    options = Options(size=(known.width, known.height))
+    the_same(cameras.read("CONTOUR\n" + "\n".join(map(text_of, projection(known, 0))) + "\n", options=options), known, 2.0**-48)
     for number in range(2):
         (tmp_path / f"pos_{number:03d}.txt").write_text("\n".join(map(text_of, projection(known))))
-    read = cameras.read(tmp_path, options=given)
+    read = cameras.read(tmp_path, options=options)
     assert [camera.name for camera in read] == ["pos_000", "pos_001"]
     the_same(read[1:], known, 2.0**-48)
-    with pytest.raises(InputError, match="no camera"):  # a pose, in which K is missing
-        cameras.read("1 0 0 5\n0 1 0 6\n0 0 1 7\n", options=given)
+    with pytest.raises(InputError, match="--pose"):  # a pose, in which K is missing
+        cameras.read("1 0 0 5\n0 1 0 6\n0 0 1 7\n", options=options)
 
 
 def test_bops_camera_json_is_k_alone():
@@ -1220,3 +1220,50 @@ def test_bops_camera_json_is_k_alone():
     assert column[0] == pytest.approx(572.4114 / 15 + 325.2611 + 0.5, rel=1e-14)
     assert 480 - row[0] == pytest.approx(-573.57043 * 2 / 15 + 242.04899 + 0.5, rel=1e-13)
     assert any("no world" in note for note in camera.notes)
+
+
+def pose_text(known):
+    return "\n".join(map(text_of, [*np.column_stack([known.opencv.T, known.e]), [0, 0, 0, 1]])) + "\n"
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_redwoods_log_has_five_lines_a_pose_and_replicas_trajectory_one(name):
+    known = Known(name)
+    plane = ViewPlane(known.pinhole.distance, known.pinhole.principal_point, known.width, known.height)
+    line = pose_text(known).replace("\n", " ")
+    for text in (f"0 0 1\n{pose_text(known)}1 1 2\n{pose_text(known)}", f"{line}\n{line}\n"):
+        first, second = cameras.read(text, options=Options(view_plane=plane))
+        the_same([first], known)
+        the_same([second], known)
+        assert second.time == pytest.approx(1 / 30) and any("whose poses" in note for note in first.notes)
+
+
+def test_scannets_folder_has_its_intrinsics_and_pictures(tmp_path):
+    known = Known("shifted")
+    for name in ("pose", "color", "intrinsic"):
+        (tmp_path / name).mkdir()
+    k = [[known.f_x, 0, known.c_x - 0.5, 0], [0, known.f_y, known.c_y - 0.5, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    (tmp_path / "intrinsic" / "intrinsic_color.txt").write_text("\n".join(map(text_of, k)))
+    (tmp_path / "color" / "0.jpg").write_bytes(png(known.width, known.height))
+    for number in (0, 2, 10):
+        (tmp_path / "pose" / f"{number}.txt").write_text(pose_text(known))
+    (tmp_path / "pose" / "3.txt").write_text("-inf -inf -inf -inf\n" * 4)
+    for place in (tmp_path, tmp_path / "pose"):
+        read = cameras.read(place)
+        assert [(camera.name, camera.image) for camera in read] == [(f"{i}", f"{i}.jpg") for i in (0, 2, 10)]
+        assert the_same(read[2:], known).size_stated and any(
+            "1 pictures that were not placed" in note for note in read[0].notes
+        )
+    the_same(cameras.read(tmp_path / "pose" / "2.txt", options=Options(size=(known.width, known.height))), known)
+
+
+def test_seven_scenes_frames_go_to_the_world_and_a_pose_of_nobody_knows_is_asked_for(tmp_path):
+    known = Known("plain")
+    (tmp_path / "frame-000001.pose.txt").write_text(pose_text(known))
+    options = Options(base=known.pinhole)
+    assert the_same(cameras.read(tmp_path, options=options), known).name == "frame-000001"
+    with pytest.raises(InputError, match="--pose"):
+        cameras.read(pose_text(known), options=options)
+    the_same(cameras.read(pose_text(known), options=Options(base=known.pinhole, pose="c2w_opencv")), known)
+    with pytest.raises(InputError, match="how it sees"):
+        cameras.read(tmp_path)

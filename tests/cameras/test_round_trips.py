@@ -183,7 +183,7 @@ OTHERS = {
 @pytest.mark.parametrize("other", OTHERS)
 @pytest.mark.parametrize("form", [form for form in WRITTEN if form not in ("sidecar", "text", *NO_POSE)])
 def test_values_that_are_not_those_of_the_numbers_beside_them_do_not_count(tmp_path, form, other):
-    """As where somebody edits the file in another program, which knows the format's own numbers alone."""
+    """Somebody may edit the file in another program, which knows the format's own numbers alone."""
     path = tmp_path / f"a{suffix}" if (suffix := cameras.FORMATS[form].SUFFIX) else tmp_path
     options = Options(size=(640, 360))
     wrong = json.dumps(own.document(dataclasses.replace(CAMERAS["plain"], **OTHERS[other])))
@@ -284,23 +284,23 @@ def test_several_cameras_are_read_as_they_were_written_to_the_bit_and_by_name(tm
     if cameras.FORMATS[form].SUFFIX == "" or form in (*FILES, *OF_PICTURES):
         called = [name for name in called if not set(name) & set('/"#{ ')]
         assume(len(called) > 1)
-    given_ = [Camera(name, fitting(data.draw(pinholes()), form)) for name in called]
+    written = [Camera(name, fitting(data.draw(pinholes()), form)) for name in called]
     if form in NUMBERED:  # whose pictures say their size
-        given_ = [replace(camera, pinhole=replace(camera.pinhole, width=640, height=360)) for camera in given_]
+        written = [replace(camera, pinhole=replace(camera.pinhole, width=640, height=360)) for camera in written]
     if form in ("nerfstudio_path", "instant_ngp"):  # which have one size for all
         sizes = {"width": 640, "height": 360, "principal_point": None}
-        given_ = [replace(camera, pinhole=replace(camera.pinhole, **sizes)) for camera in given_]
+        written = [replace(camera, pinhole=replace(camera.pinhole, **sizes)) for camera in written]
     options = Options(
         size=(640, 360), axes=data.draw(st.sampled_from([*cameras.AXES])), scale=data.draw(st.sampled_from([1.0, 0.5]))
     )
     path = tmp_path_factory.mktemp("a")
     path = path if form in ("sidecar", "colmap", "colmap_binary", *FILES) else path / f"all{cameras.FORMATS[form].SUFFIX}"
-    cameras.save(given_, path, form, options)
+    cameras.save(written, path, form, options)
     back = {camera.name: camera for camera in cameras.read(path, options=options)}
     if form in NUMBERED:
         back = dict(zip(called, back.values(), strict=True))
     assert back.keys() == {*called}
-    for camera in given_:
+    for camera in written:
         if form in NO_POSE:
             assert cameras.write([back[camera.name]], form) == cameras.write([camera], form)
         else:
@@ -308,9 +308,9 @@ def test_several_cameras_are_read_as_they_were_written_to_the_bit_and_by_name(tm
 
 
 def test_of_several_codes_one_that_is_changed_counts_as_it_stands(tmp_path):
-    given_ = [Camera(name, CAMERAS["plain"]) for name in ("a", "b")]
+    written = [Camera(name, CAMERAS["plain"]) for name in ("a", "b")]
     for form, eye, other in (("look_at", "gluLookAt(7,", "gluLookAt(8,"), ("vtk", "SetPosition(7,", "SetPosition(8,")):
-        text = other.join(cameras.write(given_, form).rsplit(eye, 1))
+        text = other.join(cameras.write(written, form).rsplit(eye, 1))
         first, second = cameras.read(text)
         assert first.pinhole == CAMERAS["plain"] and second.pinhole.eye == (8, -6, 4)
         with pytest.raises(InputError, match="2 cameras and one is wanted"):

@@ -29,7 +29,7 @@ def read(text, options=HD):
     return camera
 
 
-def said(text, **options):
+def pinhole_of(text, **options):
     """The camera of a text that may say only some of it."""
     return read(text, Options(size=(1920, 1080), base=BASE, **options)).pinhole
 
@@ -116,9 +116,9 @@ def test_any_order_and_punctuation_says_the_same_and_only_what_was_given(order, 
     expected = allow(lambda: Pinhole(*(whole[name] for name in POSE), distance or BASE.distance, 1920, 1080)) if text else None
     if expected is None:
         with pytest.raises(InputError):
-            said(text)
+            pinhole_of(text)
         return
-    actual = said(text)
+    actual = pinhole_of(text)
     assert pose(actual) == pose(expected) and actual.distance == expected.distance
     # A view plane is said as a whole or not at all.
     assert (actual.principal_point, actual.mirrored) == (((960, 540), False) if distance else (BASE.principal_point, True))
@@ -165,7 +165,7 @@ def test_of_a_scene_file_the_stated_camera_is_read_in_the_worlds_coordinates(tmp
     ],
 )
 def test_a_field_of_view_becomes_the_distance_that_has_it(says, of_which, aspect):
-    seen = said(says, pixel_aspect=aspect)
+    seen = pinhole_of(says, pixel_aspect=aspect)
     assert seen.distance[1] / seen.distance[0] == pytest.approx(aspect, rel=1e-15)
     # A tangent, a quotient and their inverses: a few roundings of 1.1e-16 each.
     assert math.degrees(seen.field_of_view()[of_which]) == pytest.approx(40, rel=2e-15)
@@ -207,7 +207,7 @@ def test_the_shorter_side_of_an_upright_picture_is_its_width():
 )
 def test_what_is_not_understood_is_shown_in_one_sentence(text, sentence):
     with pytest.raises(InputError, match=sentence) as error:
-        said(text)
+        pinhole_of(text)
     assert "\n" not in str(error.value) and len(str(error.value)) < 1200
 
 
@@ -328,10 +328,10 @@ def test_pybullets_two_matrices_are_eye_target_up_and_the_height_in_degrees():
 )
 def test_pybullets_yaw_and_pitch_are_as_pybullet_has_them(axis, eye):
     """eye : of PyBullet 3.2.7, whose numbers are float32."""
-    pinhole = said(f"p.computeViewMatrixFromYawPitchRoll([1, 2, 3], 5, 30, -20, 0, {axis})")
+    pinhole = pinhole_of(f"p.computeViewMatrixFromYawPitchRoll([1, 2, 3], 5, 30, -20, 0, {axis})")
     assert pinhole.eye == pytest.approx(eye, abs=1e-6) and pinhole.look_at == (1, 2, 3)
     with pytest.raises(InputError, match="no roll"):
-        said(f"p.computeViewMatrixFromYawPitchRoll([1, 2, 3], 5, 30, -20, 15, {axis})")
+        pinhole_of(f"p.computeViewMatrixFromYawPitchRoll([1, 2, 3], 5, 30, -20, 15, {axis})")
 
 
 def test_pytorch3ds_view_is_on_a_sphere_and_its_angle_is_of_the_shorter_side():

@@ -602,7 +602,7 @@ def test_vtks_own_angle_counts_where_its_code_says_none_whatever_camera_was_ther
     ],
 )
 def test_three_js_view_offset_shows_a_part_of_the_full_picture(part, size):
-    """Where a point of space is in the part, it is in the full picture less the part's place. It was ignored."""
+    """A point's place in the part is that in the full picture less the part's place. It was ignored."""
     text = "camera = new THREE.PerspectiveCamera(40, {}); camera.position.set(7, -6, 4); camera.lookAt(0, 0, 1);"
     full_width, full_height = 5760, 2160  # three by two screens, as in three.js' documentation
     (full,) = cameras.read(text.format("5760 / 2160"), options=Options(size=(full_width, full_height)))

@@ -203,19 +203,19 @@ def test_maps_tell_pycolmaps_places_both_ways(tmp_path, capfd, model):
     (written / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n2 1 0 0 0 1 0 0 1 b.png\n\n")
     assert cli.main(["camera", str(written), "--st-maps", str(tmp_path / "out"), "--blank", "1"]) == 0
     assert "lens_1: 320 × 180 with the lens, " in capfd.readouterr().out
-    told = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    document = json.loads((tmp_path / "out" / "transforms.json").read_text())
     bent = pycolmap.Camera(model=model, width=320, height=180, params=numbers)
-    pinhole = [told[key] for key in ("fl_x", "fl_y", "cx", "cy")]
-    straight = pycolmap.Camera(model="PINHOLE", width=told["w"], height=told["h"], params=pinhole)
+    pinhole = [document[key] for key in ("fl_x", "fl_y", "cx", "cy")]
+    straight = pycolmap.Camera(model="PINHOLE", width=document["w"], height=document["h"], params=pinhole)
     for what, here, there in (("distort", bent, straight), ("undistort", straight, bent)):
-        found = read_rgba(tmp_path / "out" / f"lens_1.{what}.exr")
-        assert found.shape == (here.height, here.width, 4)
-        rows, columns = np.nonzero(found[..., 3])
+        pixels = read_rgba(tmp_path / "out" / f"lens_1.{what}.exr")
+        assert pixels.shape == (here.height, here.width, 4)
+        rows, columns = np.nonzero(pixels[..., 3])
         assert len(rows) > 0.7 * here.width * here.height
         assert what == "undistort" or len(rows) == 320 * 180, "with --blank 1 the render fills the photograph"
         rays = here.cam_from_img(np.stack([columns, rows], axis=-1) + 0.5)
         expected = there.img_from_cam(np.column_stack([rays, np.ones(len(rays))]))
-        s, t = found[rows, columns, :2].T.astype(float)
+        s, t = pixels[rows, columns, :2].T.astype(float)
         off = np.abs(np.stack([s * there.width, (1 - t) * there.height], axis=-1) - expected)
         assert off.max() <= 1e-4, f"{what} is off by {off.max():.3g} pixels"  # float32's half step of 1 is 1e-5 of 320
 

@@ -117,13 +117,13 @@ def test_a_search_for_a_bias_ends_with_the_samples_that_it_takes_and_is_kept_as_
     assert check(FLIGHT, *words, "--report", out, "--json", result) == 0
     assert "samples a pixel, about" in capfd.readouterr().err
     (sidecar,) = out.glob("frame_*.json")
-    told = json.loads(sidecar.read_text(encoding="utf-8"))["check"]
-    searched = told["figures"]["find"]
+    record = json.loads(sidecar.read_text(encoding="utf-8"))["check"]
+    searched = record["figures"]["find"]
     assert searched["wanted"] == 0.05 and 0 < searched["least"] <= 0.05 and "seconds" not in searched
-    assert told["figures"]["samples"] == {"reference": searched["samples"], "test": searched["samples"]}
+    assert record["figures"]["samples"] == {"reference": searched["samples"], "test": searched["samples"]}
     page = sidecar.with_suffix(".html").read_text(encoding="utf-8")
     assert f"The samples came in {searched['rounds']} rounds" in page and "to be found in 99 of 100 cases: it would be" in page
-    assert searched["samples"] == 64 and searched["rounds"] == 2 and "in 99 of 100 cases" in told["verdict"]
+    assert searched["samples"] == 64 and searched["rounds"] == 2 and "in 99 of 100 cases" in record["verdict"]
     assert check(FLIGHT, *words, "--report", out, "--resume") == 0
     assert "1 of them kept" in capfd.readouterr().out
 
@@ -192,7 +192,7 @@ json.dump([answers[0], entered, upward], sys.stdout)
 
 
 def test_the_walk_of_a_check_enters_each_station_once_and_never_calls_upward(monkeypatch):
-    """As CONTRIBUTING draws it: commands, Blender, jobs, tracer, comparison."""
+    """The walk is that of CONTRIBUTING: commands, Blender, jobs, tracer, comparison."""
     from viewcam_addon.jobs.render_client import BLENDER
     from viewcam_addon.jobs.tracing import Tracing
 

@@ -122,7 +122,7 @@ def test_nothing_is_taken_out_where_no_two_surfaces_are_in_one_place(honest):
 
 @pytest.fixture(scope="module")
 def chosen_nearly_everywhere(reference, coincident):
-    """The same, but that all light of the columns from the third on is a renderer's choice."""
+    """Surfaces in one place, with all light of the columns from the third on a renderer's choice."""
     passes = {name: values.copy() for name, values in coincident.light.passes.items()}
     passes["Combined"][:, 2:, :3] = reference["Combined"][:, 2:, :3] + 1e-3
     return replace(coincident, light=Image(passes))
@@ -131,13 +131,13 @@ def chosen_nearly_everywhere(reference, coincident):
 def test_where_nearly_all_is_taken_out_there_is_no_answer_and_the_rest_may_still_differ(
     reference, honest, chosen_nearly_everywhere
 ):
-    found = radiance.compare(reference, honest, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
-    assert found.is_empty and not found.passed
-    assert found.sentence.startswith("Nothing to compare: 9"), found.sentence
-    assert all(words in found.sentence for words in ("'Carpet' and 'Floor'", "move one of two", "level geometry"))
+    comparison = radiance.compare(reference, honest, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
+    assert comparison.is_empty and not comparison.passed
+    assert comparison.sentence.startswith("Nothing to compare: 9"), comparison.sentence
+    assert all(words in comparison.sentence for words in ("'Carpet' and 'Floor'", "move one of two", "level geometry"))
     dark = [replace(image, passes={**image.passes, "Combined": 0.5 * image["Combined"]}) for image in honest]
-    found = radiance.compare(reference, dark, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
-    assert not found.is_empty and found.sentence.startswith("Different here"), found.sentence
+    comparison = radiance.compare(reference, dark, CAMERA, make_coincident=lambda: chosen_nearly_everywhere)
+    assert not comparison.is_empty and comparison.sentence.startswith("Different here"), comparison.sentence
 
 
 FAULTS = {

@@ -49,7 +49,7 @@ def test_a_single_other_bit_of_geometry_is_counted(paper_scene, name):
     test = geometry(paper_scene)
     everything = changed(test, name, (3, 4), by=np.spacing(np.abs(test[name][3, 4]).max()) * 2)
     actual = not_modeled(("Hair",), {}, test, [test], everything)
-    assert actual.names == ("Hair",) and actual.share == 1 / (WIDTH * HEIGHT) and actual.shown == 0.0
+    assert actual.names == ("Hair",) and actual.share == 1 / (WIDTH * HEIGHT) and actual.visible == 0.0
 
 
 def test_other_normals_count_where_an_object_is_not_modeled_and_nowhere_else(paper_scene):
@@ -85,7 +85,7 @@ def test_other_noise_of_the_same_light_is_no_change():
 def test_what_is_seen_counts_at_levels_of_light_however_like_its_stand_in_it_is():
     reference, tests = lit()
     actual = not_modeled(("Ball", "Hair"), {"Ball": BALL}, reference, tests, tests[0], PINHOLE)
-    assert actual.names == ("Ball",) and actual.share == actual.shown == BALL.mean()
+    assert actual.names == ("Ball",) and actual.share == actual.visible == BALL.mean()
 
 
 def test_a_pixel_that_is_no_number_with_everything_is_another():

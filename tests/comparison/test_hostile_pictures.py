@@ -45,7 +45,7 @@ def lit(seed, samples=64):
 
 
 def assert_told(comparison, write_report, reference, test, folder):
-    """That all of it can be said and drawn, in finite figures."""
+    """Assert that the comparison can be printed and drawn, in finite figures."""
     text = json.dumps(checks.for_json(comparison.to_json()), allow_nan=False)
     assert comparison.sentence and all(comparison.lines()) and text
     write_report(comparison, reference, test, folder, (), "viewcam compare")

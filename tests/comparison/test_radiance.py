@@ -55,12 +55,12 @@ def test_rare_light_that_the_reference_has_missed_is_no_difference_and_hides_non
     def compared(factor, anew=True):
         rng = np.random.default_rng(seed)
         tests = [picture(rng, 50, np.full_like(TRUTH, factor), "cycles.ViewLayer.samples") for _ in range(SEEDS)]
-        made = [with_rare_light(rng) for _ in range(1 + radiance.SEEDS)]
-        return radiance.compare(made[0], tests, PINHOLE, trace_anew=(lambda: made[1:]) if anew else None)
+        references = [with_rare_light(rng) for _ in range(1 + radiance.SEEDS)]
+        return radiance.compare(references[0], tests, PINHOLE, trace_anew=(lambda: references[1:]) if anew else None)
 
     assert not compared(1.0, anew=False).passed, "else the test proves nothing"
-    found = compared(1.0)
-    assert found.passed and found.samples[0] == SAMPLES * radiance.SEEDS, "\n".join(found.lines())
+    comparison = compared(1.0)
+    assert comparison.passed and comparison.samples[0] == SAMPLES * radiance.SEEDS, "\n".join(comparison.lines())
     assert not compared(1.1).passed
 
 
@@ -107,14 +107,16 @@ def test_noise_in_another_pass_alone_is_noise():
 def test_the_mean_is_told_in_as_many_digits_as_its_error_has():
     """Never "differs by −0.000 % ± 0.000 %"."""
 
-    def told(difference, error):
+    def sentence(difference, error):
         return light_verdict._mean_text(light_verdict.LightRow("Combined", 1.0, 1.0 + difference, error, 2 * error, 0))
 
-    assert told(-2.5e-7, 4.4e-7).startswith("the mean differs by −0.000025 %, with an error of ± 0.000044 %, and ")
-    assert told(-2.5e-9, 4.4e-7).startswith("the mean is the same within ± 0.000044 %, and a difference of 0.000088 % would")
-    assert told(0.25, 0.3).startswith("the mean differs by +25 %, with an error of ± 30 %")
-    assert told(0.0, 0.0).startswith("the mean is the same within ± 0 %")
-    assert "−0.000 %" not in told(-1e-9, math.inf)
+    assert sentence(-2.5e-7, 4.4e-7).startswith("the mean differs by −0.000025 %, with an error of ± 0.000044 %, and ")
+    assert sentence(-2.5e-9, 4.4e-7).startswith(
+        "the mean is the same within ± 0.000044 %, and a difference of 0.000088 % would"
+    )
+    assert sentence(0.25, 0.3).startswith("the mean differs by +25 %, with an error of ± 30 %")
+    assert sentence(0.0, 0.0).startswith("the mean is the same within ± 0 %")
+    assert "−0.000 %" not in sentence(-1e-9, math.inf)
 
 
 def test_noise_explains_the_relative_error_of_the_right_picture(same):

@@ -103,7 +103,7 @@ def test_the_scene_is_not_asked_for_where_it_is_given(paper_scene):
 
 @given(values=st.lists(st.floats(-60000, 60000, width=32), min_size=3, max_size=3), index=st.integers(0, 32767))
 def test_halves_add_up_to_what_was_written(values, index):
-    """As the shader parts them: the nearest whole steps first, each part kept as half a float."""
+    """The shader parts them so: the nearest whole steps first, each part kept as half a float."""
     written = {"Position": np.array(values), "Normal": np.array(values) / 60000, "Object Index": np.full(3, float(index))}
     passes = {"Combined": np.ones((1, 1, 4), np.float32)}
     for name, rest in written.items():

@@ -44,11 +44,11 @@ def searched(rng, find, kind=exponential, truth=TRUTH):
         samples, before = total - before, total
         tests = [picture(rng, kind, samples // SEEDS, truth, "cycles.ViewLayer.samples") for _ in range(SEEDS)]
         rounds.add(samples, picture(rng, kind, samples), tests, None)
-        shown = rounds.reference, rounds.tests, PINHOLE, rounds.samples // SEEDS
-        compared = radiance.compare_quantities(*shown, false_alarms=sequential.FALSE_ALARMS_OF_EACH)
-        found = sequential.search(Compared(compared), find, rounds)
-        if found.is_decided:
-            return Compared(compared).passed, found
+        pictures = rounds.reference, rounds.tests, PINHOLE, rounds.samples // SEEDS
+        compared = radiance.compare_quantities(*pictures, false_alarms=sequential.FALSE_ALARMS_OF_EACH)
+        search = sequential.search(Compared(compared), find, rounds)
+        if search.is_decided:
+            return Compared(compared).passed, search
     raise AssertionError("unreachable: the last round decides")
 
 
@@ -89,9 +89,9 @@ def test_what_differs_by_much_is_found_in_the_first_round_and_what_differs_by_li
 
 
 def test_the_wanted_bias_is_findable_in_the_end_and_was_not_a_round_before():
-    passed, found = searched(np.random.default_rng(4), 0.01)
-    assert passed and 0.005 < found.least <= min(0.01, found.least_in_blocks)
-    assert found.samples in sequential.TOTALS and found.rounds == 1 + sequential.TOTALS.index(found.samples)
+    passed, search = searched(np.random.default_rng(4), 0.01)
+    assert passed and 0.005 < search.least <= min(0.01, search.least_in_blocks)
+    assert search.samples in sequential.TOTALS and search.rounds == 1 + sequential.TOTALS.index(search.samples)
 
 
 def test_all_looks_together_may_raise_the_false_alarms_that_one_is_promised():
@@ -125,13 +125,13 @@ def test_light_that_is_stored_over_its_color_is_pooled_as_light():
 
 
 def test_a_bias_that_takes_more_samples_than_there_are_rounds_for_is_given_up_as_soon_as_that_is_seen():
-    passed, found = searched(np.random.default_rng(7), 1e-5)
-    assert passed and not found.reached and found.samples == 64 and found.expected > sequential.TOTALS[-1]
+    passed, search = searched(np.random.default_rng(7), 1e-5)
+    assert passed and not search.reached and search.samples == 64 and search.expected > sequential.TOTALS[-1]
 
 
 def test_pictures_without_noise_need_no_more_than_a_check_takes_by_default():
     def quiet(_, __):
         return np.ones((HEIGHT, WIDTH, 3)), np.zeros((HEIGHT, WIDTH, 3))
 
-    passed, found = searched(np.random.default_rng(8), 1e-4, quiet)
-    assert passed and (found.samples, found.least) == (64, 0.0)
+    passed, search = searched(np.random.default_rng(8), 1e-4, quiet)
+    assert passed and (search.samples, search.least) == (64, 0.0)

@@ -15,7 +15,6 @@ from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
 # What moves each ray of the renderer on paper, in roundings: as in conftest.py.
 ROUNDINGS_OF_A_RENDERER = 0.35
 CAMERA = Pinhole((0.3, -4.0, 3.1), (0.1, 0.2, 0.0), (0.0, 0.0, 1.0), 150.0, 120, 80)
-FLOORS = ("Floor", "Carpet", "Tiles")
 HAIR = 3e-4
 
 
@@ -120,7 +119,7 @@ def test_any_of_several_surfaces_in_one_place_is_right_and_the_objects_are_named
 
 
 def test_a_twin_whose_normals_are_a_little_off_is_told_from_the_one_that_is_seen():
-    """As after a subdivision of doubled faces: any pixel of it would pass by itself, and a tenth of the picture does not."""
+    """A subdivision of doubled faces makes one: any pixel of it would pass by itself, and a tenth of the picture does not."""
     floor = square(2.0)
     scene = a_scene()
     turn = 12 * np.median(
@@ -148,12 +147,6 @@ def test_leaves_of_a_pixel_are_seen(reference):
 
 def test_nothing_is_explained_without_the_scene(tracer, reference):
     assert not compare(reference, rendered(tracer), CAMERA).passed
-
-
-def a_pixel_of(reference, index, aside=0):
-    rows, columns = np.nonzero(reference["Object Index"][..., 0] == index)
-    i = len(rows) // 2 + aside
-    return rows[i], columns[i]
 
 
 def harmed(test, name, where, change):
@@ -224,10 +217,10 @@ def test_each_wrong_normal_amid_thousands_of_spheres_of_a_pixel_is_found(fault):
     facing = tolerances.facing(CAMERA, reference.passes)
     rows, columns = np.nonzero(is_ball & (facing > 0.2))  # less is within the tolerance of the rim, where any normal is right
     chosen = random.choice(len(rows), 40, replace=False)
-    found = compared(reference, harmed(test, "Normal", (rows[chosen], columns[chosen]), WRONG_NORMALS[fault]), tracer)
-    mismatches = found.mismatches
+    comparison = compared(reference, harmed(test, "Normal", (rows[chosen], columns[chosen]), WRONG_NORMALS[fault]), tracer)
+    mismatches = comparison.mismatches
     unexplained = {*zip(mismatches.rows[~mismatches.explained], mismatches.columns[~mismatches.explained], strict=True)}
-    assert unexplained == {*zip(rows[chosen], columns[chosen], strict=True)}, "\n".join(found.lines())
+    assert unexplained == {*zip(rows[chosen], columns[chosen], strict=True)}, "\n".join(comparison.lines())
 
 
 @pytest.mark.parametrize("lift", [HAIR, -HAIR])
@@ -242,7 +235,7 @@ def test_a_twin_that_is_moved_by_a_hair_is_found(tracer, reference, lift):
 
 
 def test_a_hair_is_beyond_tolerance_and_a_hundredth_of_it_within(tracer, reference):
-    """Where surfaces are a hundredth of it apart a renderer may see either; where they are one apart it may not."""
+    """A renderer may see either of two surfaces that are a hundredth of it apart, and not of two that are one apart."""
     for lift, passes in (HAIR / 100, True), (HAIR, False):
         moved = Tracer(a_scene(lift), 1)
         assert compared(Image(moved.render()), rendered(moved, within=lift), moved).passed == passes

@@ -21,7 +21,7 @@ def straight_down(depth=10.0, **passes):
     return seen(Depth=[[depth]], Position=[[0.0, 0.0, 10.0 - depth]], **passes)
 
 
-def test_one_rounding_at_a_kilometre_seen_from_ten_meters_is_six_thousandths_of_a_pixel():
+def test_one_rounding_at_a_kilometer_seen_from_ten_meters_is_six_thousandths_of_a_pixel():
     shift = tolerances.ray_shift(PINHOLE, straight_down(Magnitude=[[1000.0]]))
     assert shift == pytest.approx([2**-24 * 1000 * (1000 + 10) / 10])
 

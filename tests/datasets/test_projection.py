@@ -92,8 +92,8 @@ PINHOLE = Pinhole((7, -6, 4), (0.5, 0.2, 1), (0.1, 0, 1), (1200.0, 900.0), 640, 
 MIRRORED = dataclasses.replace(PINHOLE, mirrored=True)
 
 
-def through_json(*given):
-    return json.loads(json.dumps(record.record(*given), allow_nan=False))
+def through_json(*arguments):
+    return json.loads(json.dumps(record.record(*arguments), allow_nan=False))
 
 
 @pytest.mark.parametrize("pinhole", [PINHOLE, MIRRORED], ids=["plain", "mirrored"])

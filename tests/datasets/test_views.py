@@ -14,12 +14,12 @@ from viewcam_addon.pinhole import Pinhole
 PINHOLE = Pinhole((7, -6, 4), (0, 0, 1), (0, 0, 1), 1200.0, 640, 360)
 MIRRORED = Pinhole((7, -6, 4), (0, 0, 1), (0, 0, 1), 1200.0, 640, 360, mirrored=True)
 
-FORMATS = pytest.mark.parametrize("made", [transforms.document, colmap.texts], ids=["transforms", "colmap"])
+FORMATS = pytest.mark.parametrize("make", [transforms.document, colmap.texts], ids=["transforms", "colmap"])
 
 
-def refusal(made, *given):
+def refusal(make, *arguments):
     with pytest.raises(InputError) as caught:
-        made(*given)
+        make(*arguments)
     sentence = str(caught.value)
     assert "\n" not in sentence and len(sentence) < 300, sentence
     return sentence
@@ -50,19 +50,19 @@ def test_any_text_is_a_path_on_one_line_or_refused(text):
 
 
 @FORMATS
-def test_no_pictures_make_no_dataset(made):
-    assert "no picture" in refusal(made, [])
+def test_no_pictures_make_no_dataset(make):
+    assert "no picture" in refusal(make, [])
 
 
 @FORMATS
-def test_two_pictures_of_one_file_are_refused_by_its_name(made):
-    assert "a.png would be" in refusal(made, [Camera("a", PINHOLE), Camera("b", PINHOLE), Camera("a", PINHOLE)])
+def test_two_pictures_of_one_file_are_refused_by_its_name(make):
+    assert "a.png would be" in refusal(make, [Camera("a", PINHOLE), Camera("b", PINHOLE), Camera("a", PINHOLE)])
 
 
 @FORMATS
-def test_mirrored_cameras_are_refused_by_name_however_many(made):
+def test_mirrored_cameras_are_refused_by_name_however_many(make):
     views = [Camera("fine", PINHOLE), *(Camera(f"{i}", MIRRORED) for i in range(1000))]
-    sentence = refusal(made, views)
+    sentence = refusal(make, views)
     assert "mirrored" in sentence and "0.png, 1.png, 2.png and 997 more" in sentence and "fine" not in sentence
 
 
@@ -79,12 +79,12 @@ any_triple = st.tuples(any_float, any_float, any_float)
 
 @FORMATS
 @given(any_triple, any_triple, any_triple, st.floats(min_value=5e-324, allow_infinity=False), st.tuples(any_float, any_float))
-def test_any_camera_is_written_in_finite_numbers_or_refused(made, eye, look_at, up, distance, point):
+def test_any_camera_is_written_in_finite_numbers_or_refused(make, eye, look_at, up, distance, point):
     assume(eye != look_at and any(up))
     try:
-        content = repr(made([Camera("a", Pinhole(eye, look_at, up, distance, 640, 360, point))]))
+        content = repr(make([Camera("a", Pinhole(eye, look_at, up, distance, 640, 360, point))]))
     except InputError as error:
-        assert made is colmap.texts and "translation" in str(error)
+        assert make is colmap.texts and "translation" in str(error)
     else:
         assert not re.search(r"\b(nan|inf)\b", content)
 

@@ -67,12 +67,12 @@ WRITTEN = {
 
 @dataclass(frozen=True)
 class Example:
-    """page : relative to the project. text : a command or a whole block. shown : the block behind it that says what it says."""
+    """page : relative to the project. text : a command or a whole block. output : the block behind it, which it prints."""
 
     page: str
     language: str
     text: str
-    shown: str = ""
+    output: str = ""
 
     def __str__(self) -> str:
         return f"{self.page}: {self.text.strip().splitlines()[0][:100]}"
@@ -189,9 +189,9 @@ class Reader:
         folder = Path(tempfile.mkdtemp(prefix="list-", dir=folder))
         (folder / name).write_text(example.text, encoding="utf-8")
         command = ["viewcam", "batch", "../shot.blend", name, "--out", "out", "--engine", "VIEWCAM", "--level", "geometry"]
-        if "nothing is rendered" in example.shown:
+        if "nothing is rendered" in example.output:
             done = self._run(command, folder)
-            assert done.returncode == 2 and f"viewcam batch: {example.shown}" in done.stderr, done.stderr
+            assert done.returncode == 2 and f"viewcam batch: {example.output}" in done.stderr, done.stderr
             assert not (folder / "out").exists()
         else:
             self._must(command, folder)

@@ -11,6 +11,7 @@ import numpy as np
 
 from tests.cameras import test_hostile as documents
 from tests.cameras import test_mixed_files as mixed
+from tests.cameras import test_paths as paths
 from tests.cameras import test_read_only_formats as published
 from tests.cameras.conftest import CAMERAS
 from viewcam_addon import cameras
@@ -177,6 +178,13 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "neus": {"cameras_sphere.npz": _neus(published.projection(known))},
         "kitti_calibration": {"calib.txt": published.KITTI},
         "pmvs": {"a.txt": "CONTOUR\n" + "\n".join(map(published.text_of, published.projection(known)))},
+        "pose_files": {
+            ".": "",
+            "intrinsic/intrinsic_color.txt": "500 0 32 0\n0 500 24 0\n0 0 1 0\n0 0 0 1\n",
+            **{f"pose/{number}.txt": published.pose_text(known) for number in range(2)},
+        },
+        "redwood": {"a.log": f"0 0 1\n{published.pose_text(known)}" * 2},
+        "replica": {"traj.txt": f"{published.pose_text(known).replace(chr(10), ' ')}\n" * 2},
         "bop_sensor": {"camera.json": json.dumps(dict(fx=572, fy=573, cx=325, cy=242, width=640, height=480, depth_scale=1))},
         "llff": {"poses_bounds.npy": _npy()},
         "polycam": {"a.json": json.dumps(phone)},
@@ -196,6 +204,10 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "nvisii": {"a.json": json.dumps(published.nvisii(known))},
         "infinigen": {"a.npz": _camview(known)},
         "fspy_exported": {"a.json": json.dumps(published.FSPY_EXPORTED)},
+        "supersplat": {"settings.json": json.dumps(paths.supersplat_viewer())},
+        "supersplat_project": {"a.ssproj": paths.ssproj(paths.supersplat_project())},
+        "earth_studio": {"a.json": json.dumps(paths.earth_studio((3.0, 4.0, 5.0)))},
+        "after_effects": {"a.jsx": paths.AFTER_EFFECTS},
         "opensfm": {"reconstruction.json": json.dumps(published.opensfm(known, k1=-0.1, k2=0.02))},
         "tum": {"a.txt": "".join(f"{i} 1 2 3 0 0 0 1\n" for i in range(5))},
         "kitti": {"a.txt": "1 0 0 1 0 1 0 2 0 0 1 3\n" * 3},

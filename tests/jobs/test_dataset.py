@@ -167,57 +167,63 @@ def label(folder, name, camera, steps=1000.0, kinds=("depth", "masks")):
     folder.preview(name).write_bytes(encoded(picture))
     beside = label_files.write(folder.image(name), vp.label(room(camera), kinds), steps)
     sizes = {"image": 7, "preview": folder.preview(name).stat().st_size, **{path.name: path.stat().st_size for path in beside}}
-    told = {"rendered": {"width": 64, "height": 48}, "warnings": [], "timing": {"seconds": 0.5}}
+    document = {"rendered": {"width": 64, "height": 48}, "warnings": [], "timing": {"seconds": 0.5}}
     of_labels = {"kinds": [*kinds], "depth_steps": steps, "files": [path.name for path in beside]}
     made_from = {"settings": "of now", "image": f"{name}.exr", "bytes": sizes, "labels": of_labels}
-    write_json(folder.sidecar(name), {**made_from, **told, **record.record(camera)})
+    write_json(folder.sidecar(name), {**made_from, **document, **record.record(camera)})
 
 
 def test_nerfstudio_finds_all_it_asks_for(learned):
     """Its parser's rules: a depth and a mask of every frame, each of one channel; lists of all three splits, of pictures that
     there are; numbers of the camera at the top."""
     cv2 = pytest.importorskip("cv2")
-    told = json.loads((learned / "transforms.json").read_text())
-    assert {"fl_x", "fl_y", "cx", "cy", "w", "h"} <= told.keys()
-    assert all({"mask_path", "depth_file_path", "file_path", "transform_matrix"} <= frame.keys() for frame in told["frames"])
-    for frame in told["frames"]:
-        assert cv2.imread(str(learned / frame["file_path"])).shape == (told["h"], told["w"], 3)
-        depth = cv2.imread(str(learned / frame["depth_file_path"]), cv2.IMREAD_ANYDEPTH) * told["depth_unit_scale_factor"]
+    document = json.loads((learned / "transforms.json").read_text())
+    assert {"fl_x", "fl_y", "cx", "cy", "w", "h"} <= document.keys()
+    assert all(
+        {"mask_path", "depth_file_path", "file_path", "transform_matrix"} <= frame.keys() for frame in document["frames"]
+    )
+    for frame in document["frames"]:
+        assert cv2.imread(str(learned / frame["file_path"])).shape == (document["h"], document["w"], 3)
+        depth = cv2.imread(str(learned / frame["depth_file_path"]), cv2.IMREAD_ANYDEPTH) * document["depth_unit_scale_factor"]
         mask = cv2.imread(str(learned / frame["mask_path"]), cv2.IMREAD_UNCHANGED)
-        assert mask.shape == depth.shape == (told["h"], told["w"])
+        assert mask.shape == depth.shape == (document["h"], document["w"])
         camera = np.array(frame["transform_matrix"])
         floor = -camera[2, 3] / -camera[2, 2]  # along the axis to z = 0: nothing that the middle shows is beyond
         assert 0 < depth[24, 32] <= floor + 0.001 and set(np.unique(mask)) == {0, 255}
         assert np.array_equal(mask > 0, depth > 0)
-    pictures = [frame["file_path"] for frame in told["frames"]]
-    assert told["test_filenames"] == told["val_filenames"] == ["r_0.png", "r_4.png", "r_8.png"]
-    assert sorted(told["train_filenames"] + told["test_filenames"]) == sorted(pictures)
+    pictures = [frame["file_path"] for frame in document["frames"]]
+    assert document["test_filenames"] == document["val_filenames"] == ["r_0.png", "r_4.png", "r_8.png"]
+    assert sorted(document["train_filenames"] + document["test_filenames"]) == sorted(pictures)
 
 
 def test_points_have_the_pictures_colors_where_splatting_looks_for_them(learned):
     pycolmap = pytest.importorskip("pycolmap")
-    told = json.loads((learned / "transforms.json").read_text())
-    head, _, data = (learned / told["ply_file_path"]).read_bytes().partition(b"end_header\n")
+    document = json.loads((learned / "transforms.json").read_text())
+    head, _, data = (learned / document["ply_file_path"]).read_bytes().partition(b"end_header\n")
     names = [line.split()[-1] for line in head.decode().splitlines() if line.startswith("property")]
     assert names == ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"]
-    found = np.frombuffer(data, [(name, "<f4" if i < 6 else "u1") for i, name in enumerate(names)])
+    vertices = np.frombuffer(data, [(name, "<f4" if i < 6 else "u1") for i, name in enumerate(names)])
     model = pycolmap.Reconstruction(learned / "sparse" / "0")
-    assert len(found) == model.num_points3D() > 1000 and model.num_images() == 9
+    assert len(vertices) == model.num_points3D() > 1000 and model.num_images() == 9
     near = 0
-    for point, vertex in zip((model.points3D[i] for i in sorted(model.points3D)), found, strict=True):
+    for point, vertex in zip((model.points3D[i] for i in sorted(model.points3D)), vertices, strict=True):
         assert np.abs(point.xyz - [vertex[name] for name in "xyz"]).max() < 1e-5
         assert [*point.color] == [vertex[name] for name in ("red", "green", "blue")] and vertex["blue"] == 7
         places = [model.images[each.image_id].points2D[each.point2D_idx].xy for each in point.track.elements]
         near += any(np.abs([4 * (y - 0.5) - vertex["red"], 3 * (x - 0.5) - vertex["green"]]).max() < 0.01 for x, y in places)
-    assert near == len(found), f"{len(found) - near} of {len(found)} points have a color that no picture has at their place"
+    assert near == len(vertices), (
+        f"{len(vertices) - near} of {len(vertices)} points have a color that no picture has at their place"
+    )
 
 
 def test_instant_ngp_has_depth_in_scene_units_and_a_cube_that_holds_the_points(learned):
-    told = json.loads((learned / "transforms.json").read_text())
-    assert told["integer_depth_scale"] == 0.001 and all((learned / frame["depth_path"]).is_file() for frame in told["frames"])
+    document = json.loads((learned / "transforms.json").read_text())
+    assert document["integer_depth_scale"] == 0.001 and all(
+        (learned / frame["depth_path"]).is_file() for frame in document["frames"]
+    )
     lines = (learned / "sparse/0/points3D.txt").read_text().splitlines()
     points = np.array([line.split()[1:4] for line in lines if line[0] != "#"], float) * 0.33
-    scale = told["aabb_scale"]
+    scale = document["aabb_scale"]
     assert scale in (1, 2, 4, 8, 16, 32, 64, 128)
     assert np.abs(points).max() <= scale / 2 and (scale == 1 or np.abs(points).max() > scale / 4)
 
@@ -225,9 +231,9 @@ def test_instant_ngp_has_depth_in_scene_units_and_a_cube_that_holds_the_points(l
 def test_the_original_nerf_and_its_readers_find_three_files_of_pictures_without_a_suffix(learned):
     names = {}
     for split in ("train", "val", "test"):
-        told = json.loads((learned / f"transforms_{split}.json").read_text())
-        assert abs(told["camera_angle_x"] - 2 * np.arctan(32 / 70)) < 1e-12
-        names[split] = [frame["file_path"] for frame in told["frames"]]
+        document = json.loads((learned / f"transforms_{split}.json").read_text())
+        assert abs(document["camera_angle_x"] - 2 * np.arctan(32 / 70)) < 1e-12
+        names[split] = [frame["file_path"] for frame in document["frames"]]
         assert all((learned / f"{name}.png").is_file() and not Path(name).suffix for name in names[split])
     assert names["test"] == names["val"] == ["r_0", "r_4", "r_8"] and len(names["train"]) == 6
     assert len(cameras.read(learned / "transforms_train.json")) == 6
@@ -240,8 +246,8 @@ def test_pictures_are_held_out_by_number_or_name(folder, finish, test, held_out)
         finish(shot.name)
     dataset.refuse(listed, "png", test)
     dataset.write(folder, listed, settings(listed), "png", test)
-    told = json.loads((folder.path / "transforms_test.json").read_text())
-    assert [frame["file_path"] for frame in told["frames"]] == held_out
+    document = json.loads((folder.path / "transforms_test.json").read_text())
+    assert [frame["file_path"] for frame in document["frames"]] == held_out
 
 
 @pytest.mark.parametrize(
@@ -265,6 +271,6 @@ def test_depths_of_different_steps_are_refused_and_labels_of_some_shots_are_not_
         write(folder, shots("a", "b"))
     finish("c", camera)
     write(folder, shots("a", "c"))
-    told = json.loads((folder.path / "transforms.json").read_text())
-    assert not {"ply_file_path", "depth_unit_scale_factor"} & told.keys()
-    assert all(frame.keys() == {"file_path", "transform_matrix", "virtual_pinhole"} for frame in told["frames"])
+    document = json.loads((folder.path / "transforms.json").read_text())
+    assert not {"ply_file_path", "depth_unit_scale_factor"} & document.keys()
+    assert all(frame.keys() == {"file_path", "transform_matrix", "virtual_pinhole"} for frame in document["frames"])

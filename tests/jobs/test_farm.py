@@ -33,13 +33,13 @@ def here(stand_in, tmp_path):
         "viewcam": shlex.join(child_process.viewcam()),
     }
 
-    def told(text):
+    def farm_of(text):
         text = text.replace("/opt/blender/blender", "blender").replace("/shared/", f"{tmp_path}/")
         text = text.replace("VIEWCAM_BLENDER=blender", f"VIEWCAM_BLENDER={programs['blender']}")
         program = re.match(r"(?:\w+=\S+ )*(\w+)", text)
         return text[: program.start(1)] + programs[program[1]] + text[program.end(1) :]
 
-    return told
+    return farm_of
 
 
 def the_one(beginning):

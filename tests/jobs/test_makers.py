@@ -120,21 +120,21 @@ def test_an_orbit_keeps_the_principal_point_and_the_mirroring():
 
 
 @pytest.mark.parametrize(
-    "made",
+    "make",
     [
         lambda: makers.orbit(Pinhole((5, 0, 0), (0, 0, 0), (0, 0, 1), 400, 320, 180), 1_000_000),
         lambda: makers.frames("1..1000000", "Camera"),
     ],
 )
-def test_of_a_million_shots_those_of_a_shard_are_made_and_no_others(made, monkeypatch):
+def test_of_a_million_shots_those_of_a_shard_are_made_and_no_others(make, monkeypatch):
     """One shot of a million took three minutes."""
     made_ones = []
     monkeypatch.setattr(makers, "Job", lambda name, *values, **named: made_ones.append(name) or Job(name, *values, **named))
-    (last,) = shard(made(), "999999/1000000")
+    (last,) = shard(make(), "999999/1000000")
     assert last.name in ("orbit_999998", "frame_0999999") and len(made_ones) <= 3
-    several = shard(made(), "2/100000")
+    several = shard(make(), "2/100000")
     assert len(several) == 10 and len(made_ones) <= 3 + 12
     assert several[1].name in ("orbit_100001", "frame_0100002")
-    assert made()[:3][-1] == list(made()[:3])[2]
+    assert make()[:3][-1] == list(make()[:3])[2]
     with pytest.raises(IndexError):
-        made()[1_000_000]
+        make()[1_000_000]

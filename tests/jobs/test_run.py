@@ -140,7 +140,7 @@ def test_where_the_disk_is_full_a_summary_that_does_not_fit_either_is_no_second_
 
 @pytest.mark.parametrize("fits", range(14))
 def test_the_disk_may_be_full_at_any_file(tmp_path, painting, monkeypatch, fits):
-    """Of the 14 files that a batch of four shots waits for the disk with, so many still fit."""
+    """A batch of four shots waits for the disk with 14 files, of which so many still fit."""
     written = []
 
     def fsync(descriptor):

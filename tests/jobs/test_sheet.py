@@ -133,16 +133,16 @@ def test_each_shot_says_what_it_is_of_by_which_lens_and_at_what_angle():
 def test_each_picture_has_its_verdict_or_says_that_it_was_not_checked():
     record = {"image": "a.exr", "rendered": {"width": 4, "height": 3}, "warnings": []}
 
-    def said(check):
+    def text_of(check):
         return Page(sheet.picture(Result("a", {**record, **({"check": check} if check else {})}))).text
 
-    assert "not checked" in said(None)
+    assert "not checked" in text_of(None)
     passed = {"passed": True, "verdict": "The same picture.", "figures": {"position": {"p50": 1e-5, "max": 0.000304}}}
-    assert "identical to 0.0003 px" in said(passed) and "not checked" not in said(passed)
-    assert "identical" in said({**passed, "figures": {"position": {}}})
-    assert "differs Another picture." in said({"passed": False, "verdict": "Another picture."})
+    assert "identical to 0.0003 px" in text_of(passed) and "not checked" not in text_of(passed)
+    assert "identical" in text_of({**passed, "figures": {"position": {}}})
+    assert "differs Another picture." in text_of({"passed": False, "verdict": "Another picture."})
     but = {**passed, "answer": "same_but", "not_modeled": {"count": 2, "names": ["Hair", "Fog"], "share": 0.25}}
-    assert "identical to 0.0003 px, but for 2 objects that are not modeled" in said(but)
+    assert "identical to 0.0003 px, but for 2 objects that are not modeled" in text_of(but)
     assert "class=but" in sheet.picture(Result("a", {**record, "check": but}))
     without_picture = {key: value for key, value in record.items() if key != "image"}
     assert "not checked" not in Page(sheet.picture(Result("a", without_picture))).text, "labels alone are no picture"

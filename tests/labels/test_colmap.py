@@ -168,14 +168,14 @@ def test_points_come_into_the_model_of_cameras_alone_that_a_batch_has_written_an
 
 def test_tracks_may_be_shortened_and_lead_over_all_pictures_still():
     rng = np.random.default_rng(1)
-    shown = [(np.flatnonzero(rng.random(500) < 0.7), None) for _ in range(20)]
-    shown = [(which, np.stack([which, which + 0.5], axis=-1)) for which, _ in shown]
-    short = colmap._shortened(shown, 4)
-    before, after = (np.bincount(np.concatenate([which for which, _ in each]), minlength=500) for each in (shown, short))
+    observations = [(np.flatnonzero(rng.random(500) < 0.7), None) for _ in range(20)]
+    observations = [(which, np.stack([which, which + 0.5], axis=-1)) for which, _ in observations]
+    short = colmap._shortened(observations, 4)
+    before, after = (np.bincount(np.concatenate([which for which, _ in each]), minlength=500) for each in (observations, short))
     assert (after == np.minimum(before, 4)).all()
     assert all(
         set(which) <= set(all_of) and (places[:, 0] == which).all()
-        for (which, places), (all_of, _) in zip(short, shown, strict=True)
+        for (which, places), (all_of, _) in zip(short, observations, strict=True)
     )
     counts = [len(which) for which, _ in short]
     assert min(counts) > 0.7 * np.mean(counts), "no picture goes without"

@@ -153,7 +153,7 @@ def test_what_cuts_the_eye_plane_is_whole_too():
 @settings(max_examples=50)
 @given(st.data())
 def test_run_lengths_of_a_part_of_a_picture_are_those_of_the_whole_picture(data):
-    """Of parts that touch every edge, down to no pixel at all."""
+    """The parts touch every edge, down to no pixel at all."""
     height, width = data.draw(st.integers(1, 7)), data.draw(st.integers(1, 7))
     windows, pictures = [], []
     for _ in range(data.draw(st.integers(0, 4))):
@@ -174,7 +174,7 @@ def test_run_lengths_of_a_part_of_a_picture_are_those_of_the_whole_picture(data)
 @settings(max_examples=25)
 @given(cameras, st.floats(0.1, 9))
 def test_a_silhouette_ends_where_the_clip_range_begins(camera, near):
-    """Of boxes that are cut by it, each pixel is found, however little of them is left."""
+    """Each pixel of boxes that are cut by it is found, however little of them is left."""
     scene = replace(room(camera), clip=(near, 100.0))
     windows = Silhouettes(Surfaces(scene)).windows()
     for number, (instance, window) in enumerate(zip(instances(scene), windows, strict=True)):

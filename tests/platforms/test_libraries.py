@@ -22,9 +22,9 @@ pytestmark = [pytest.mark.platforms, pytest.mark.timeout(3600)]
 
 ARM64 = [platform for platform in PLATFORMS if platform.endswith("arm64")]
 GLIBC = (2, 28)
-"""Of manylinux_2_28, which is what Blender itself asks for."""
+"""glibc of manylinux_2_28, which is what Blender itself asks for."""
 MACOS = (11, 0)
-"""Of the wheel's tag; Blender 4.2 asks for 11.2."""
+"""macOS of the wheel's tag; Blender 4.2 asks for 11.2."""
 SYSTEM = {
     "linux": r"lib(c|m|pthread|dl|rt)\.so\.\d|ld-linux-.*\.so\.\d",
     "macos": r"/usr/lib/libSystem\.B\.dylib|/usr/lib/libc\+\+\.1\.dylib",
@@ -122,7 +122,7 @@ def test_without_ffp_contract_off_thousands_would_be():
 
 @pytest.mark.parametrize("platform", ARM64)
 def test_arm64_s_libraries_fuse_as_much_as_linux_does(library):
-    """Where std::fma is inlined may differ a little: calibrated, 40 on Linux."""
+    """Compilers may inline std::fma in other places, a little: calibrated, 40 on Linux."""
     assert len(fused(library)) < 200
 
 

@@ -179,6 +179,6 @@ def test_a_wheel_without_data_is_taken_as_it_is(upstream):
 
 
 def test_a_wheel_as_upstream_makes_it_lacks_a_library_where_an_installer_moves_nothing(installer, upstream, tmp_path):
-    """What the repacking is for: once every supported Blender moves files, it can go."""
+    """The reason for the repacking: once every supported Blender moves files, it can go."""
     whole = files_in(installer.installed([upstream], tmp_path / "extensions")) == files_of_pip(upstream)
     assert whole == installer.moves_files

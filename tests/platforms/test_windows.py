@@ -81,7 +81,7 @@ def test_smoke_the_core_s_pictures_have_linux_bits_in_threads(run_emulated, samp
 
 
 def test_smoke_the_zip_s_wheels_are_installed_and_used_as_4_2_does(run_emulated, of_windows, windows_wheels, tmp_path):
-    """Of its Pythons' wheels, those of 3.11; and a check of a file with them and no other packages than Blender's own."""
+    """The wheels of Python 3.11 are installed; and a file is checked with them and no other packages than Blender's own."""
     wheels = [of_windows(wheel) for wheel in windows_wheels if re.search("cp311|py3", wheel.name)]
     script = Path(__file__).with_name("wheels_in_blender.py")
     printed = run_emulated("windows-4.2-bare", script, of_windows(tmp_path / "local"), *wheels)

@@ -21,7 +21,7 @@ EDGES = (
 )
 
 
-_made = []  # camera, its matrix while the photo was taken, the edges as it shows them, and what it is now
+_photo = []  # camera, its matrix while the photo was taken, the edges as it shows them, and what it is now
 
 
 def make_a_photo():
@@ -52,16 +52,16 @@ def make_a_photo():
     region("VIEW_3D", "WINDOW")[0].spaces.active.region_3d.view_perspective = "CAMERA"
     yield from settle()
     push_undo("before")
-    _made[:] = matrix, edges, room("interface.kept").state(camera)
+    _photo[:] = matrix, edges, room("interface.kept").state(camera)
 
 
 def _is_as_before():
-    return room("interface.kept").state(bpy.data.objects["Camera"]) == _made[2]
+    return room("interface.kept").state(bpy.data.objects["Camera"]) == _photo[2]
 
 
 def escape_from_a_match():
     yield from make_a_photo()
-    yield from match_photo(_made[1])
+    yield from match_photo(_photo[1])
     yield from picture("photo_match")
     press("ESC", *NOWHERE)
     yield
@@ -71,14 +71,14 @@ def escape_from_a_match():
 
 def match_a_photo():
     """The lens and the view come back within three of the errors that are told; one step of undo."""
-    matching, _ = yield from match_photo(_made[1])
+    matching, _ = yield from match_photo(_photo[1])
     result = matching.result
     assert result is not None, matching.sentence
     press("RET", *NOWHERE)
     yield
     yield
     bpy.context.view_layer.update()
-    camera, matrix = bpy.data.objects["Camera"], _made[0]
+    camera, matrix = bpy.data.objects["Camera"], _photo[0]
     low, high = result.distance_between
     off = np.degrees(np.arccos(np.clip((np.array(camera.matrix_world)[:3, 2] @ matrix[:3, 2]), -1, 1)))
     print(f"{camera.data.lens:.2f} mm of {LENS:g}, {off:.3f}° off, d from {low:.1f} to {high:.1f} px", flush=True)

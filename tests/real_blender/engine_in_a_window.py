@@ -26,16 +26,16 @@ from tour_hands import SCREEN_HEIGHT
 
 PART, FILE, OUT = sys.argv[sys.argv.index("--") + 1 :]
 TRACED_FOR = 2.0  # seconds that a heavy render goes on before it is canceled
-CANCELLED = 6  # times
+TIMES_CANCELED = 6  # times
 KINDS = ("images", "objects", "scenes", "meshes", "materials", "texts", "cameras", "node_groups")
 TURNS = 20  # of the view
 
-told, ended = [], []
+messages, ended = [], []
 
 
 @persistent
 def on_stats(words):
-    told.append(words)
+    messages.append(words)
 
 
 @persistent
@@ -107,10 +107,10 @@ def cancel():
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 1920, 1080, 100
     scene.virtual_pinhole_reference.samples = 1024
     seconds = []
-    for _ in range(CANCELLED):
-        told.clear()
+    for _ in range(TIMES_CANCELED):
+        messages.clear()
         yield from press_f12()
-        while not any("Level path" in words for words in told):
+        while not any("Level path" in words for words in messages):
             yield
         started = time.perf_counter()
         while time.perf_counter() - started < TRACED_FOR:
@@ -159,8 +159,10 @@ def view():
 
 
 def swipe():
-    """The reference left of a line over solid shading: as the scene displays it, dragged, and gone without a trace."""
+    """The reference left of a line: as the scene displays it, before the theme's background where nothing is, dragged, and gone
+    without a trace."""
     scene = bpy.context.scene
+    scene.render.film_transparent = True
     area, part = region("VIEW_3D", "WINDOW")
     space = area.spaces.active
     scene.virtual_pinhole_reference.samples = 16
@@ -181,12 +183,15 @@ def swipe():
         longest = max(longest, time.monotonic() - step)
     for _ in range(10):
         yield
-    shown = screenshot("before")[part.y : part.y + part.height, part.x : part.x + part.width]
-    expected = displays.displayed(scene, np.ascontiguousarray(running.live.picture[..., :3]))
+    screen = screenshot("before")[part.y : part.y + part.height, part.x : part.x + part.width]
+    light, alpha = np.split(running.live.picture, [3], axis=-1)
+    straight = np.divide(light, alpha, out=np.zeros_like(light), where=alpha > 0)
+    behind = np.array(bpy.context.preferences.themes[0].view_3d.space.gradients.high_gradient)
+    expected = displays.displayed(scene, straight)[..., :3] * alpha + behind * (1 - alpha)
     line = round(running.line())
     rows, columns = slice(60, part.height - 80), slice(120, line - 20)  # between header, tools and words
-    left = np.abs(shown[rows, columns, :3] - expected[rows, columns, :3])
-    right = np.abs(shown[rows, line + 20 :, :3] - expected[rows, line + 20 :, :3])
+    left = np.abs(screen[rows, columns, :3] - expected[rows, columns, :3])
+    right = np.abs(screen[rows, line + 20 :, :3] - expected[rows, line + 20 :, :3])
     y = part.y + part.height // 2
     move(part.x + line, y)
     yield

@@ -235,7 +235,7 @@ def fly_over_the_top():
 
 @contextlib.contextmanager
 def nobody_notices_moves():
-    """As if another handler moved the camera after ours: else the values follow it at once."""
+    """Let another handler, so to say, move the camera after ours: else the values follow it at once."""
     handlers = bpy.app.handlers.depsgraph_update_post
     ours = next(each for each in handlers if each.__module__.endswith("viewcam_addon.blender.animation"))
     handlers.remove(ours)

@@ -1,8 +1,9 @@
 """Runs inside a real Blender with a window: takes the pictures of docs/artists.md that no step of the tour (tour.py) takes.
 
-blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python pictures_in_a_window.py -- FOLDER PHOTO
+blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python pictures_in_a_window.py -- FOLDER PHOTO [PART…]
 
-FOLDER : docs/images. PHOTO : that of photo_of_a_room.py. test_tour.py runs this.
+FOLDER : docs/images. PHOTO : that of photo_of_a_room.py. PART : a function of STEPS; without any, all of them. test_tour.py
+runs this.
 Leaves with status 0, or 5 and a traceback.
 """
 
@@ -18,10 +19,11 @@ from panel_in_a_window import NOWHERE, press, region, start, window
 from tour_hands import SIDEBAR, VIEWPORT, call, hide_the_sidebar, match_photo, photograph, seen, settle, until
 from tour_step import room
 
-FOLDER, PHOTO = map(Path, sys.argv[sys.argv.index("--") + 1 :])
+FOLDER, PHOTO, *PARTS = sys.argv[sys.argv.index("--") + 1 :]
+FOLDER, PHOTO = Path(FOLDER), Path(PHOTO)
 STUDIO = Path(__file__).resolve().parent.parent.parent / "sample_scenes" / "studio.blend"
 LISTED = 222  # pixels of the file browser's list
-SAMPLES, PATIENCE = 64, 100_000  # of light, and steps until it is there
+SAMPLES, PATIENCE = 8, 100_000  # of light, and steps until it is there
 EDGE, LEGEND = 8, 70  # pixels around the pictures of a proof, and below them
 # (axis, start, end) of edges of the room, world space.
 EDGES = (
@@ -167,40 +169,45 @@ def proof():
     camera = bpy.context.scene.camera
     camera.virtual_pinhole.enabled = True
     yield from hide_the_sidebar(hidden=False)
-    _, sidebar = region(*SIDEBAR)
-    sidebar.active_panel_category = "Pinhole"
-    yield from settle()
     background = room("interface.proof").background
     call(bpy.ops.viewcam.compare_with_cycles, camera=camera.name)
     yield from until(lambda: background.latest, "the verdict", PATIENCE)
     assert background.latest.answer == "same", background.latest.verdict
-    view, _ = region(*VIEWPORT)
+    view, sidebar = region(*SIDEBAR)
     with bpy.context.temp_override(window=window(), area=view, region=view.regions[-1]):
         bpy.ops.screen.area_split(direction="VERTICAL", factor=1 - sidebar.width / view.width)
     yield from settle()
     left, right = sorted((area for area in window().screen.areas if area.type == "VIEW_3D"), key=lambda area: area.x)
     left.type = "IMAGE_EDITOR"
+    right.spaces.active.show_region_toolbar = False
     yield from settle()
+    next(part for part in right.regions if part.type == "UI").active_panel_category = "Pinhole"
     call(bpy.ops.viewcam.show_difference)
-    for _ in range(60):  # its size comes a moment later
-        yield
-    photograph((left.x, left.y, right.x + right.width - left.x, left.height), FOLDER / "artists" / "proof.png", 75)
+    yield from fitted()
     part = next(part for part in left.regions if part.type == "WINDOW")
     (x0, y0), (x1, y1) = (part.view2d.view_to_region(at, at, clip=False) for at in (0, 1))
     whole = part.x + x0 - EDGE, part.y + y0 - LEGEND, x1 - x0 + 2 * EDGE, y1 - y0 + LEGEND + EDGE
     photograph(whole, FOLDER / "proof-pictures.png")
+    bpy.context.window_manager.virtual_pinhole_proof.view = "SWIPE"
+    yield from fitted()
+    photograph((left.x, left.y, right.x + right.width - left.x, left.height), FOLDER / "artists" / "proof.png", 75)
+
+
+def fitted():
+    """Steps until a picture has the size of its editor, which it gets a moment later."""
+    for _ in range(60):
+        yield
 
 
 def steps():
     yield
     bpy.context.preferences.system.viewport_aa = "OFF"  # drawn in software
-    yield from photo_match()
-    yield from preferences()
-    yield from export()
-    yield from reference_over_eevee()
-    yield from reference_in_the_viewport()
-    yield from proof()
+    for each in STEPS:
+        if not PARTS or each.__name__ in PARTS:
+            yield from each()
+            print(f"done: {each.__name__}", flush=True)
     print("done: the pictures", flush=True)
 
 
+STEPS = (photo_match, preferences, export, reference_over_eevee, reference_in_the_viewport, proof)
 start(steps, interval=0.01)

@@ -30,15 +30,15 @@ PATIENCE = 60  # seconds that one comparison may take on a busy machine
 LEFT, MIDDLE, RIGHT, CANCEL = 0.3, 0.5, 0.7, 0.83  # shares of the sidebar's width
 
 opened = []
-found = {}  # where each button stood the last time, without a verdict below and with one
+places = {}  # where each button stood the last time, without a verdict below and with one
 proof = None  # the module PROOF, once the add-on is enabled
 
 
 def button(operator, across=MIDDLE):
     """Steps that end with where the button stands, looked for from the bottom of the sidebar."""
     there = operator, proof.background.latest is None
-    if there in found and (yield from look(*found[there], SIDEBAR)).startswith(operator):
-        return found[there]
+    if there in places and (yield from look(*places[there], SIDEBAR)).startswith(operator):
+        return places[there]
     area, part = region(*SIDEBAR)
     with bpy.context.temp_override(window=window(), area=area, region=part):
         for _ in range(10):
@@ -48,8 +48,8 @@ def button(operator, across=MIDDLE):
     yield
     for y in range(part.y + ROW, part.y + part.height, ROW):
         if (yield from look(x, y, SIDEBAR)).startswith(operator):
-            found[there] = x, y + ROW / 3
-            return found[there]
+            places[there] = x, y + ROW / 3
+            return places[there]
     raise AssertionError(f"no button of {operator}")
 
 

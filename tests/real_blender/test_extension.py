@@ -77,7 +77,7 @@ def test_it_installs_from_the_preferences_and_registers(host, extension_zip):
 
 
 @pytest.mark.parametrize(
-    ("sabotage", "told"),
+    ("sabotage", "words"),
     [
         ("", "0 left behind after 10 rounds"),
         (
@@ -90,12 +90,12 @@ def test_it_installs_from_the_preferences_and_registers(host, extension_zip):
         ),
     ],
 )
-def test_installing_and_removing_it_ten_times_leaves_nothing_behind(real_blender, extension_zip, tmp_path, sabotage, told):
+def test_installing_and_removing_it_ten_times_leaves_nothing_behind(real_blender, extension_zip, tmp_path, sabotage, words):
     """tests/test_leftovers.py does the same with wheels."""
     script = [ROOT / "tests" / "leftovers.py", "--", extension_zip, "1" if sabotage else "10", sabotage]
     fresh = dataclasses.replace(real_blender, user_folder=tmp_path)
     outcome = fresh.run("-b", "--factory-startup", "--python", *script)
-    assert told in outcome.stdout, outcome.stdout + outcome.stderr
+    assert words in outcome.stdout, outcome.stdout + outcome.stderr
     assert outcome.returncode == bool(sabotage), outcome.stdout + outcome.stderr
 
 

@@ -6,11 +6,12 @@ import tempfile
 from pathlib import Path
 
 import bpy
-from panel_in_a_window import press, region, window
+from panel_in_a_window import move, press, region, window
 from tour_hands import call, push, unfold
-from tour_step import Step, camera, is_at_its_values, room, values
+from tour_step import UPPER_PART, Step, camera, is_at_its_values, room, values
 
 FILE = Path(tempfile.gettempdir(), f"shots_{os.getpid()}", "monkey.json")
+LEFT_OF_THE_PANEL, BELOW_ITS_TOP = 160, 200  # pixels
 
 
 class CompareWithCycles(Step):
@@ -92,7 +93,7 @@ class Preset(Step):
     """A lens from the list."""
 
     picture = "presets.png"
-    shows = "area"
+    shows = UPPER_PART
 
     def by_hand(self):
         call(bpy.ops.viewcam.execute_preset, shipped="Lens 85 mm")
@@ -107,6 +108,9 @@ class Preset(Step):
         is_at_its_values()
 
     def pose_for_the_picture(self):
+        _, sidebar = region("VIEW_3D", "UI")
+        move(sidebar.x - LEFT_OF_THE_PANEL, sidebar.y + sidebar.height - BELOW_ITS_TOP)  # where it opens
+        yield
         call(bpy.ops.wm.call_panel, name="VIEWCAM_PT_presets", keep_open=True)
         for _ in range(4):
             yield

@@ -29,7 +29,7 @@ _DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT
 # The corners of a mouse pointer, pixels right of and below its tip.
 _ARROW = ((0, 0), (0, 17), (4, 13), (7, 19), (10, 18), (7, 12), (12, 12))
 
-_found = {}
+_places = {}
 
 
 def begin(show=open_the_panels):
@@ -79,7 +79,7 @@ def find(button, where=SIDEBAR):
 
 
 def seek(button, where):
-    """As `find`, or None if there is no such button."""
+    """Steps that end with where the button stands, as of `find`, or None if there is no such button."""
     if place := _remembered(button, where):
         for _ in range(_PATIENCE):  # the button that the mouse comes from may want to be left first
             if (yield from look(*place, where)).startswith(button):
@@ -128,7 +128,7 @@ def _top(where):
 
 
 def _map(where):
-    return _found.setdefault(where, {})
+    return _places.setdefault(where, {})
 
 
 def _remembered(button, where):
@@ -164,7 +164,7 @@ def unfold(button, where=SIDEBAR):
             if _remembered(button, where):
                 return
             yield from click(x, y)
-            _found[where] = dict(known)
+            _places[where] = dict(known)
             y -= _ROW / 2
         y -= _ROW / 2
     raise AssertionError(f"no sub-panel has {button}, beside {sorted(_map(where))}")

@@ -1,8 +1,9 @@
 """Runs inside a real Blender with a window: takes the tour (tour.py) by mouse and keys, and undoes and redoes each step.
 
-blender --enable-event-simulate -p 0 0 1600 2000 --addons … --python tour_in_a_window.py -- [FOLDER]
+blender --enable-event-simulate -p 0 0 1600 2000 --addons … --python tour_in_a_window.py -- [FOLDER [STEP…]]
 
-FOLDER : where the pictures of docs/artists.md go; without it none are taken. Leaves with status 0, or 5 and a traceback.
+FOLDER : where the pictures of docs/artists.md go; without it none are taken. STEP : those alone are taken by hand, all others
+by script, for a picture that is wanted soon. Leaves with status 0, or 5 and a traceback.
 """
 
 import sys
@@ -19,7 +20,8 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from panel_in_a_window import move, region, start, window
 from tour_hands import SIDEBAR, VIEWPORT, begin, beside, lowest_button, photograph, push_undo, redo, survey_the_rest, undo
 
-FOLDER = next(map(Path, sys.argv[sys.argv.index("--") + 1 :]), None)
+FOLDER, *WANTED = sys.argv[sys.argv.index("--") + 1 :] or [None]
+FOLDER = FOLDER and Path(FOLDER)
 BEFORE, AFTER = (Path(tempfile.gettempdir(), f"{name}.png") for name in ("before", "after"))
 MOUSE_AWAY = (200, 700)
 BELOW_BUTTONS = 45  # pixels below the lowest button of a panel that a picture of it shows
@@ -64,6 +66,17 @@ def take(step):
     yield
 
 
+def pass_over(step):
+    """The steps of a step that is taken by script."""
+    if not step.needs_a_window:
+        step.prepare()
+        yield
+        step.by_script()
+        yield
+        step.tidy()
+        yield
+
+
 def take_the_picture(step, path):
     """Steps that take what a step shows of the window as it is by now."""
     if step.shows == "sidebar":
@@ -71,12 +84,12 @@ def take_the_picture(step, path):
     yield from step.pose_for_the_picture()
     move(*MOUSE_AWAY)
     yield from draw_finely()
-    part, share = _shown(step.shows)
+    part, share = _area_and_share(step.shows)
     photograph(part, path, share)
     yield from step.after_the_picture()
 
 
-def _shown(name):
+def _area_and_share(name):
     """(left, bottom, width, height) of what a picture shows, and in how many percent of its size."""
     if name == "sidebar":
         _, sidebar = region("VIEW_3D", "UI")
@@ -99,7 +112,7 @@ def steps():
     yield from begin()
     for each in tour.STEPS:
         started = time.perf_counter()
-        yield from take(each())
+        yield from (pass_over if WANTED and each.__name__ not in WANTED else take)(each())
         print(f"done: {each.__name__} in {time.perf_counter() - started:.1f} s", flush=True)
     print("done: the tour", flush=True)
 

@@ -86,7 +86,7 @@ def read(file, json_file):
 
 
 def plain(value):
-    """As JSON has it: a block by its name, a vector as a list."""
+    """The value as JSON has it: a block by its name, a vector as a list."""
     if isinstance(value, bpy.types.ID):
         return value.name
     return value if value is None or isinstance(value, str | bool | int | float) else list(value)

@@ -15,7 +15,7 @@ from viewcam_addon.tracer.scene.materials import Material, Picture
 from viewcam_addon.tracer.scene.shader_nodes import Closure, Node, node
 
 FILM, SCATTERING = 2, 8
-"""How many dimensions the film has, and each scattering."""
+"""The number of dimensions of the film, and of each scattering."""
 
 FUNCTIONS = ("sin of turns", "cos of turns", "asin", "acos", "atan2", "pow", "fresnel")
 

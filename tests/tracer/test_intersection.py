@@ -230,7 +230,7 @@ def test_every_instruction_set_gives_the_same_bits_and_the_one_that_is_asked_for
 
 
 def test_spheres_of_an_instance_far_from_its_own_origin_are_met(make_scene, make_spheres):
-    """What is 10⁹ away in the object's space, and here in the world, is known to 10⁻⁷ only: boxes must not lose it."""
+    """A sphere 10⁹ away in the object's space, and here in the world, is known to 10⁻⁷ only: boxes must not lose it."""
     matrix = np.eye(4)
     matrix[0, 3] = -1e9
     spheres: Spheres = make_spheres([[1e9 + x, y, -5] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)], 0.4)
@@ -245,7 +245,7 @@ def test_spheres_of_an_instance_far_from_its_own_origin_are_met(make_scene, make
 
 
 def test_rays_of_any_numbers_end_no_process():
-    """What is not there in a node is met by no ray, though its distance may be no number."""
+    """No ray meets a node's empty places, though their distance may be no number."""
     corners = np.array([[i, j, k % 3] for i, j, k in np.random.default_rng(0).integers(0, 9, (15, 3))], np.float64)
     mesh = Mesh(vertices=corners, triangles=np.arange(15, dtype=np.int32).reshape(5, 3), materials=np.zeros(5, np.int32))
     core = CoreScene(Scene(camera=CAMERA, geometries={"Mesh": mesh}, objects=[Object("Mesh", "Mesh", np.eye(4))]), 1)

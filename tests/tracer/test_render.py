@@ -183,7 +183,7 @@ def test_memory_beside_the_passes_does_not_grow_with_the_picture(ball, make_scen
 # --- What is seen first: the ends of the clip range, nothing, eyes in spheres, and many spheres, against answers on paper
 
 
-def found(scene):
+def objects_seen(scene):
     """(height, width) of a picture: the index of the object seen, 0 where there is none."""
     return Tracer(scene, 2).render()["Object Index"][..., 0].astype(int)
 
@@ -218,7 +218,7 @@ def test_what_lies_before_the_clip_range_is_looked_through_and_what_lies_behind_
         ((4, 5), 3),
         ((0, 0.9), 0),
     ):
-        rendered = found(make_scene(camera, *things, clip=clip))[2, 2]
+        rendered = objects_seen(make_scene(camera, *things, clip=clip))[2, 2]
         assert rendered == seen, f"clip {clip}: object {rendered} instead of {seen}"
 
 
@@ -237,14 +237,14 @@ def test_scenes_and_meshes_that_are_empty_or_degenerate_show_nothing(make_scene,
         ((make_spheres([[0, 0, 0]], 1.0), flat),),  # a sphere that its matrix flattens
     ):
         scene = make_scene(camera, *things)
-        assert not found(scene).any(), f"{things}: {np.unique(found(scene))}"
+        assert not objects_seen(scene).any(), f"{things}: {np.unique(objects_seen(scene))}"
 
 
 def test_an_eye_inside_a_sphere_sees_through_it_and_one_just_outside_sees_it(make_scene, make_spheres):
     camera = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 10, 1, 1)
     around, beyond = [0, 0, -0.5], [0, 0, -4]
     for radius, seen in ((0.5 + 1e-12, 2), (0.5 - 1e-12, 1)):
-        rendered = found(make_scene(camera, make_spheres([around], radius), make_spheres([beyond], 1.0)))[0, 0]
+        rendered = objects_seen(make_scene(camera, make_spheres([around], radius), make_spheres([beyond], 1.0)))[0, 0]
         assert rendered == seen, f"radius {radius}: object {rendered}"
 
 
@@ -389,7 +389,7 @@ CHANGES = {
     "a vertex by its last bit": lambda scene: one_mesh(scene, vertices=lambda v: put(v, 100, np.nextafter(v[100], 9))),
     "the order of triangles": lambda scene: one_mesh(scene, triangles=lambda t: t[::-1].copy()),
     "a triangle less": lambda scene: one_mesh(
-        scene, **dict.fromkeys(("triangles", "materials", "corner_normals", "corner_uvs"), lambda some: some[:-40].copy())
+        scene, **dict.fromkeys(("triangles", "materials", "corner_normals", "corner_uvs"), lambda array: array[:-40].copy())
     ),
     "corner normals": lambda scene: one_mesh(scene, corner_normals=lambda n: -n),
     "a UV map": lambda scene: one_mesh(scene, corner_uvs=lambda uv: uv * 2),

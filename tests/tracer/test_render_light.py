@@ -255,15 +255,15 @@ def test_a_watcher_is_shown_all_rows_in_the_thread_that_asked(lively, level):
 @pytest.mark.parametrize("samples", [1, 7, 40])
 def test_a_picture_that_refines_is_shown_whole_at_each_step_and_ends_with_the_bits_of_one_that_does_not(lively, samples):
     """A step is what a picture has that never gets more, but for what of it is known of its noise."""
-    scene, steps, shown = lively(SEED, 70, 40), refinement(samples, 70 * 40), []
+    scene, steps, tiles = lively(SEED, 70, 40), refinement(samples, 70 * 40), []
     audience = Audience()
-    audience.tile = lambda passes, rows: shown.append(
+    audience.tile = lambda passes, rows: tiles.append(
         (rows, {name: values[rows.start : rows.stop].copy() for name, values in passes.items()})
     )
     refined = render(scene, "path", samples, 7, threads=2, watcher=audience, steps=steps)
     assert_same(refined, render(scene, "path", samples, 7, threads=3))
-    each = len(shown) // len(steps)
-    for step, bands in zip(steps, (shown[i : i + each] for i in range(0, len(shown), each)), strict=True):
+    each = len(tiles) // len(steps)
+    for step, bands in zip(steps, (tiles[i : i + each] for i in range(0, len(tiles), each)), strict=True):
         assert sorted(row for rows, _ in bands for row in rows) == list(range(40))
         picture = np.concatenate([passes["Combined"] for _, passes in sorted(bands, key=lambda band: band[0].start)])
         assert np.isfinite(picture).all()

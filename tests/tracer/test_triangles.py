@@ -156,7 +156,7 @@ def test_smooth_normals_are_turned_by_the_cofactors_of_any_matrix_mirrored_shear
 
 
 def test_normals_of_a_mesh_with_one_user_are_normalized_at_its_corners_and_shared_ones_are_not(make_mesh):
-    """What Cycles does with a mesh that it moves to world space beforehand, and with one that it can't."""
+    """Cycles does so with a mesh that it moves to world space beforehand, and with one that it can't."""
     mesh = smooth_triangle(make_mesh)
     matrix = np.diag([3.0, 1, 1, 1])
     camera = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 100, 100)

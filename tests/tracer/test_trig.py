@@ -7,7 +7,7 @@ from core_probes import function
 
 COUNT = 1500
 UNIT = 2.0**-53
-"""Of what lies between ½ and 1: half a unit in the last place of 1."""
+"""Half a unit in the last place of 1: of numbers between ½ and 1."""
 
 
 def spread(low, high, seed=1):

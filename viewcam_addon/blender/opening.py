@@ -57,9 +57,11 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
             yield overrides, off
             return
         _check_files()
+        if bpy.app.background:
+            _leave_sculpt_mode()
         lacking = tuple(_without_cache(overrides.set))
         if not trust:
-            off = (*lacking, *_told(*_disarmed(overrides.set), *_unrun()))
+            off = (*lacking, *_without_trust(*_disarmed(overrides.set), *_unrun()))
         elif any(_unrun()):
             raise InputError(
                 "Blender has opened the file without running what is in it: write --enable-autoexec before the file, or leave "
@@ -91,7 +93,7 @@ def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, 
         _check_files()
         off.extend(_without_cache(setattr))
         if not trust:
-            off.extend(_told(*_disarmed(setattr)))
+            off.extend(_without_trust(*_disarmed(setattr)))
 
     with _not_kept_waiting(), _after_reading(read):
         try:
@@ -103,10 +105,11 @@ def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, 
                     f"{path} can't be opened by Blender {bpy.app.version_string} ({reason}): save it again"
                 ) from error
             off.append(f"Blender {bpy.app.version_string} has read the file but for something: {reason}")
-    return (*off, *_told(*_unrun()))
+    _leave_sculpt_mode()
+    return (*off, *_without_trust(*_unrun()))
 
 
-def _told(*sentences: str) -> tuple[str, ...]:
+def _without_trust(*sentences: str) -> tuple[str, ...]:
     return tuple(f"{sentence} (without --trust)" for sentence in sentences)
 
 
@@ -207,6 +210,21 @@ def _without_cache(put: _Put) -> Iterator[str]:
                     put(modifier, "show_render", False)
                     name = f"the modifier {modifier.name!r} of {each.name!r}"
                     yield f"{name} is off: its cache {folder} is missing, bake it again"
+
+
+def _leave_sculpt_mode() -> None:
+    """Put the objects of a file that was saved while they were sculpted into object mode.
+
+    Sculpting weighs the normals of a vertex's faces alike, a mesh by their angles, and the first render has the mesh's and each
+    further one the sculpture's: export and Cycles would see two of them. In a window the mode is the artist's, and stays.
+    """
+    objects = bpy.context.view_layer.objects
+    active = objects.active
+    for each in objects:
+        if each.mode == "SCULPT":
+            objects.active = each
+            bpy.ops.object.mode_set(mode="OBJECT")
+    objects.active = active
 
 
 def _unrun() -> Iterator[str]:

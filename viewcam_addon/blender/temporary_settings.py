@@ -27,7 +27,7 @@ class Overrides:
 
     def __init__(self, stack: contextlib.ExitStack, lasting: "Overrides | None" = None) -> None:
         self._stack = stack
-        self._made: dict[Hashable, Any] = {}
+        self._shared: dict[Hashable, Any] = {}
         self.lasting = lasting or self
 
     def set(self, owner: bpy.types.bpy_struct, name: str, value: Any) -> None:
@@ -42,14 +42,14 @@ class Overrides:
     def shared(self, make: Callable[..., Made], *arguments: Hashable) -> Made:
         """The result of `make(overrides, *arguments)` while the overrides last, made for the first who asks."""
         key = make, *arguments
-        if key not in self._made:
-            self._made[key] = make(self, *arguments)
-        return self._made[key]
+        if key not in self._shared:
+            self._shared[key] = make(self, *arguments)
+        return self._shared[key]
 
     @property
     def is_shared(self) -> bool:
         """True if anything is."""
-        return bool(self._made)
+        return bool(self._shared)
 
     def enter(self, context: contextlib.AbstractContextManager) -> None:
         """Enter a context, and leave it when the overrides end."""

@@ -7,6 +7,7 @@
 
     camera.py       Camera and Options
     axes.py         the one place of conventions: axes, pixels, world
+    ground.py       the ground of a data set's points as z = 0; clouds.py finds these
     source.py       what is read from: text, file, folder; JSON and XML without their dangers
     distortion.py   lenses: what they do with a pinhole's picture
     undistortion.py photographs without their lens
@@ -54,6 +55,7 @@ from ..errors import InputError, several
 from ..files import written_whole
 from ..pinhole import Pinhole
 from . import (
+    after_effects,
     arkit,
     arrays,
     bop,
@@ -61,9 +63,11 @@ from . import (
     colmap,
     colmap_binary,
     distortion,
+    earth_studio,
     fspy,
     gaussian_splatting,
     gltf,
+    ground,
     infinigen,
     instant_ngp,
     kubric,
@@ -84,12 +88,14 @@ from . import (
     opensfm,
     own,
     pbrt,
+    pose_files,
     pov_ray,
     projections,
     ray_tracer_challenge,
     realitycapture,
     ros,
     sidecar,
+    supersplat,
     textbook,
     three_js,
     trajectories,
@@ -141,6 +147,7 @@ FORMATS: dict[str, ModuleType] = {
     "mvsnet": mvsnet,
     "middlebury": middlebury,
     "projections": projections,
+    "pose_files": pose_files,
     "arkit": arkit,
     "gaussian_splatting": gaussian_splatting,
     "nerfstudio_path": nerfstudio_path,
@@ -148,6 +155,9 @@ FORMATS: dict[str, ModuleType] = {
     "kubric": kubric,
     "nvisii": nvisii,
     "infinigen": infinigen,
+    "supersplat": supersplat,
+    "earth_studio": earth_studio,
+    "after_effects": after_effects,
     "open3d": open3d,
     "opensfm": opensfm,
     "ros": ros,
@@ -185,10 +195,10 @@ def writable() -> list[str]:
     return [name for name, module in FORMATS.items() if hasattr(module, "write")]
 
 
-def read(given: str | Path, *, format: str | None = None, options: Options | None = None) -> list[Camera]:
+def read(content: str | Path, *, format: str | None = None, options: Options | None = None) -> list[Camera]:
     """The cameras of a text, a file or a folder.
 
-    given : a text, or the Path of a file or folder. format : one of `readable()`; None to recognize it by its content.
+    content : a text, or the Path of a file or folder. format : one of `readable()`; None to recognize it by its content.
 
     Raises
     ------
@@ -196,12 +206,14 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
         if there is no camera in it, or one that is no pinhole, lacks something, or is not what it should be.
     """
     options = options or Options()
-    source = Source(given)
+    source = Source(content)
     module = _module(format or recognized(source), "read")
     with _told_of_damage(source, module.TITLE), np.errstate(all="ignore"):  # anything may stand in a file
         if format and not _recognizes(module, source):
             raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
         read_cameras = _of_all(source, module, options)
+        if options.up_from == "ground":
+            return ground.leveled(read_cameras, source, options)
         return leveled(read_cameras) if options.up_from == "cameras" else read_cameras
 
 
@@ -303,8 +315,7 @@ def recognized(source: str | Path | Source) -> str:
             f"the text is no camera that is understood, from its beginning {place} on: copy a whole camera, or write "
             "eye=1,2,3 look_at=0,0,0 up=0,0,1 d=1000"
         )
-    formats = ", ".join(FORMATS[name].TITLE for name in readable())
-    raise InputError(f"{source.name} is no camera that is understood: give one of {formats}")
+    raise InputError(f"{source.name} is no camera that is understood: give a file of {', '.join(readable())}")
 
 
 def write(cameras: Iterable[Camera], format: str, options: Options | None = None) -> str | dict[str, str | bytes]:

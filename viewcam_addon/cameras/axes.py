@@ -293,7 +293,8 @@ def moved(camera: Camera, options: Options) -> Camera:
 
 def moved_back(camera: Camera, options: Options) -> Camera:
     """A camera on its way into a file: the inverse of `moved`."""
-    return _in_world(camera, _TURNS[options.axes][1], 1 / options.scale)
+    back = _in_world(camera, _TURNS[options.axes][1], 1 / options.scale)
+    return back if camera.world else dataclasses.replace(back, world=None)  # which only what is read has
 
 
 def leveled(cameras: Sequence[Camera]) -> list[Camera]:
@@ -308,22 +309,48 @@ def leveled(cameras: Sequence[Camera]) -> list[Camera]:
     length = math.hypot(*up)
     if length < _NO_MEAN:
         raise InputError("the cameras' up directions cancel out: none is the world's, leave out --up-from")
-    x, y, z = (up / length).tolist()
+    return turned_up(cameras, (up / length).tolist(), "the mean of the cameras' up")
+
+
+def turned_up(cameras: Sequence[Camera], up: Sequence[float], what: str, rise: float = 0.0) -> list[Camera]:
+    """The cameras in a world that is turned by the least angle after which `up` is z, and then moved up; each says so.
+
+    up : of length 1. what : it, as the note calls it. rise : along z.
+    """
+    x, y, z = up
     rows = np.diag([1.0, -1.0, -1.0])  # of the world that is upside down
     if z > 0 or (x, y) != (0, 0):  # about up × z, by the angle between them: 1 + K + K² / (1 + cos)
         cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
         rows = np.identity(3) + cross + cross @ cross * (1 / (1 + z) if z > 0 else (1 - z) / (x * x + y * y))
-    note = f"The world was turned by {math.degrees(math.atan2(math.hypot(x, y), z)):.4g}°: the mean of the cameras' up is z"
-    return [_in_world(camera, lambda p: tuple((rows @ p).tolist()), 1.0).noted(note) for camera in cameras]
+    moved_up = f" and moved by {rise:.6g} along z" if rise else ""
+    turn = f"{math.degrees(math.atan2(math.hypot(x, y), z)):.4g}°"
+    note = f"The world was turned by {turn}{moved_up}: {what} is z"
+    return [_in_world(camera, lambda p: tuple((rows @ p).tolist()), 1.0, rise).noted(note) for camera in cameras]
 
 
-def _in_world(camera: Camera, turn: Callable[[Triple], Triple] | None, scale: float) -> Camera:
+def moved_points(points: np.ndarray, options: Options) -> np.ndarray:
+    """(n, 3): points out of a file, in the world that `options` asks for, as `moved` has its cameras."""
+    return points @ _matrix(_TURNS[options.axes][0]).T * options.scale
+
+
+def _matrix(turn: Callable[[Triple], Triple] | None) -> np.ndarray:
+    """(3, 3) of a turn."""
+    return np.identity(3) if turn is None else np.column_stack([turn(tuple(axis)) for axis in np.identity(3).tolist()]) + 0.0
+
+
+def _in_world(camera: Camera, turn: Callable[[Triple], Triple] | None, scale: float, rise: float = 0.0) -> Camera:
     if turn is None and scale == 1:
         return camera
     pinhole = camera.pinhole
     e, l, up = ((turn(p) if turn else p) for p in (pinhole.eye, pinhole.look_at, pinhole.up))
-    e, l = (tuple(scale * a + 0.0 for a in p) for p in (e, l))
-    return dataclasses.replace(camera, pinhole=dataclasses.replace(pinhole, eye=e, look_at=l, up=tuple(a + 0.0 for a in up)))
+    e, l = (tuple(scale * a + b + 0.0 for a, b in zip(p, (0.0, 0.0, rise), strict=True)) for p in (e, l))
+    world = np.column_stack([_matrix(turn) * scale, [0.0, 0.0, rise]])
+    before = np.vstack([np.eye(3, 4) if camera.world is None else camera.world, [0, 0, 0, 1]])
+    return dataclasses.replace(
+        camera,
+        pinhole=dataclasses.replace(pinhole, eye=e, look_at=l, up=tuple(a + 0.0 for a in up)),
+        world=tuple(map(tuple, (world @ before + 0.0).tolist())),
+    )
 
 
 def _axes(pinhole: Pinhole) -> list:

@@ -25,7 +25,10 @@ POSES = {
     "w2c_opengl": "World to camera, x right, y up, z back: OpenGL, Blender",
     "c2w_opengl": "Camera to world, x right, y up, z back: OpenGL, Blender, NeRF",
 }
-UPS = {"cameras": "The mean of the cameras' up is Z here: all are turned by the least angle that makes it so"}
+UPS = {
+    "cameras": "The mean of the cameras' up is Z here: all are turned by the least angle that makes it so",
+    "ground": "The ground of the data set's points is Z = 0 here, with the cameras above it",
+}
 ANGLES = {"degrees": "Degrees", "radians": "Radians"}
 _NAMED = 8
 
@@ -39,7 +42,8 @@ class Camera:
     pixels the picture has, or tells it by the picture itself; else they are those of `Options`. notes : sentences on what was
     in the file and did not come along, or how it was taken. image : the picture's path, as the file has it. picture : the
     picture itself, encoded, where the file holds it. time : seconds, where the file says when. left_out : (name, sentence) of
-    each camera of the same file that is no pinhole.
+    each camera of the same file that is no pinhole. world : 3 × 4, from the world of the file to this one, where `Options` had
+    it turned, scaled or moved; None where not.
     """
 
     name: str
@@ -51,6 +55,7 @@ class Camera:
     time: float | None = None
     left_out: tuple[tuple[str, str], ...] = field(default=(), repr=False)
     lens: Lens | None = None
+    world: tuple[tuple[float, ...], ...] | None = field(default=None, repr=False)
 
     def noted(self, *notes: str) -> "Camera":
         """This camera with more notes, each of them once."""

@@ -16,7 +16,7 @@ import numpy as np
 from .. import checks, npy
 from ..errors import InputError
 from ..files import read_bytes
-from . import colmap
+from . import clouds, colmap
 from .audit import Depths, Tracks
 from .camera import Camera
 from .source import Record, Source
@@ -40,12 +40,11 @@ def tracks(path: Path, cameras: Sequence[Camera]) -> Tracks | None:
     points = where / f"points3D{suffix}"
     if not points.is_file():
         return None
-    binary = suffix == ".bin"
-    places = dict(_binary_points(points) if binary else _text_points(points))
+    places = dict(clouds.of_colmap(points))
     numbers = {camera.image or camera.name: number for number, camera in enumerate(cameras)}
     short = {PurePosixPath(name).name: number for name, number in numbers.items()}
     which, seen, ids = [], [], []
-    for name, observations in _binary_tracks(where / "images.bin") if binary else _text_tracks(where / "images.txt"):
+    for name, observations in _binary_tracks(where / "images.bin") if suffix == ".bin" else _text_tracks(where / "images.txt"):
         number = numbers.get(name, short.get(PurePosixPath(name).name))
         if number is None:
             continue
@@ -57,16 +56,6 @@ def tracks(path: Path, cameras: Sequence[Camera]) -> Tracks | None:
     if not which:
         return None
     return Tracks(np.array(which), np.array(seen), np.array([places[point] for point in ids]))
-
-
-def _text_points(path: Path) -> Iterator[tuple[int, tuple[float, float, float]]]:
-    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
-        words = line.split()
-        if words and not words[0].startswith("#"):
-            try:
-                yield int(words[0]), checks.vector("a point", [float(word) for word in words[1:4]], 3)
-            except ValueError:
-                raise InputError(f"line {number} of {path} is {checks.quoted(line)}: it should be POINT3D_ID X Y Z …") from None
 
 
 def _text_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, int]]]]:
@@ -82,19 +71,6 @@ def _text_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, int
             raise InputError(
                 f"{path} has a line {checks.quoted(head)}: each image has two lines, the second X Y POINT3D_ID"
             ) from None
-
-
-def _binary_points(path: Path) -> Iterator[tuple[int, tuple[float, float, float]]]:
-    data = path.read_bytes()
-    try:
-        (count,), at = struct.unpack_from("<Q", data), 8
-        for _ in range(count):
-            point, x, y, z = struct.unpack_from("<Q3d", data, at)
-            (length,) = struct.unpack_from("<Q", data, at + 43)
-            at += 51 + 8 * length
-            yield point, checks.vector("a point", (x, y, z), 3)
-    except (struct.error, OverflowError):
-        raise InputError(f"{path} ends too early: copy it again") from None
 
 
 def _binary_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, int]]]]:

@@ -25,7 +25,7 @@ _BEFORE_NAMES = {"new", "const", "auto", "return"}
 _CAST_TO = {"float", "double", "int", "GLfloat", "GLdouble", "FLOAT", "real"}
 JOINTS = {".", "->", "::"}
 _CLOSING = {"(": ")", "[": "]", "{": "}", "<": ">"}
-_PLAIN = {
+_PLAIN: dict[str, Callable[..., float]] = {
     "float": float,
     "float32": float,
     "float64": float,
@@ -38,7 +38,7 @@ _PLAIN = {
     "min": min,
     "max": max,
 }
-_INVERSE = {"atan": math.atan, "atan2": math.atan2, "asin": math.asin, "acos": math.acos}
+_INVERSE: dict[str, Callable[..., float]] = {"atan": math.atan, "atan2": math.atan2, "asin": math.asin, "acos": math.acos}
 _PI = {
     "pi": 1.0,
     "mpi": 1.0,
@@ -229,7 +229,8 @@ class Expressions:
         if depth > _DEEPEST:
             raise _Failed
         closing = _CLOSING[self.text[opened]]
-        values, named = [], {}
+        values: list[object] = []
+        named: dict[str, object] = {}
         next_ = self._token(opened + 1)
         separated = True
         while next_.text != closing:

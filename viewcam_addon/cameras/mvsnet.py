@@ -29,7 +29,7 @@ TITLE = "MVSNet cam.txt"
 
 _KINDS = ("extrinsic", "intrinsic")
 _NAME = "*cam.txt"
-_FOLDERS = ("cams", "Cameras", "Cameras/train")
+_FOLDERS = ("cams", "cams_1", "Cameras", "Cameras/train")
 _PICTURES = ("images", "blended_images")
 _TEXT = re.compile(r"extrinsic\s([-+\d.eE\s]+)intrinsic\s([-+\d.eE\s]+)")
 
@@ -75,5 +75,5 @@ def _picture(file: Source, name: str) -> Path | None:
     if file.path is None:
         return None
     places = [file.path.parent / up / place for place in _PICTURES for up in ("..", "../..")]
-    found = (naming.near(f"{name}.{suffix}", place) for place in places for suffix in ("jpg", "png"))
-    return next(filter(None, found), None)
+    images = (naming.near(f"{name}.{suffix}", place) for place in places for suffix in ("jpg", "png"))
+    return next(filter(None, images), None)

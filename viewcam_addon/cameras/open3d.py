@@ -24,9 +24,9 @@ def recognizes(source: Source) -> bool:
 
 def read(source: Source, options: Options) -> list[Camera]:
     top = Record(source.document, source.name)
-    found = top.records("parameters", "camera") if top.get("class_name") == _SEVERAL else [top]
+    records = top.records("parameters", "camera") if top.get("class_name") == _SEVERAL else [top]
     cameras = []
-    for number, record in enumerate(found):
+    for number, record in enumerate(records):
         intrinsic = record.record("intrinsic")
         size = intrinsic.size("width"), intrinsic.size("height")
         k = np.array(intrinsic.numbers("intrinsic_matrix", 9)).reshape(3, 3).T

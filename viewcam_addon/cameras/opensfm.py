@@ -35,14 +35,18 @@ def recognizes(source: Source) -> bool:
 
 def _reconstructions(source: Source) -> list[dict]:
     file = source.file(FILE) if source.is_folder else source
-    found = file.json if file and isinstance(file.json, list) else []
-    return [each for each in found if isinstance(each, dict) and {"cameras", "shots"} <= each.keys()]
+    entries = file.json if file and isinstance(file.json, list) else []
+    return [each for each in entries if isinstance(each, dict) and {"cameras", "shots"} <= each.keys()]
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    found = _reconstructions(source)
-    notes = (f"Of {len(found)} reconstructions the first was taken: each has a world of its own",) if len(found) > 1 else ()
-    top = Record(found[0], source.name)
+    reconstructions = _reconstructions(source)
+    notes = (
+        (f"Of {len(reconstructions)} reconstructions the first was taken: each has a world of its own",)
+        if len(reconstructions) > 1
+        else ()
+    )
+    top = Record(reconstructions[0], source.name)
     cameras = top.record("cameras")
     shots = top.record("shots")
     if not shots.values:
@@ -55,11 +59,11 @@ def read(source: Source, options: Options) -> list[Camera]:
             key = shot.text("camera")
             if key not in planes:
                 planes[key] = _plane(Record(cameras.needed(key), f"camera {checks.quoted(key)}"), options)
-            plane, lens, told = planes[key]
+            plane, lens, of_lens = planes[key]
             turn = opencv.of_rotation_vector(shot.numbers("rotation", 3), shot.place)
             matrix = axes.from_world_to_camera(turn, shot.numbers("translation", 3), shot.place)
             pinhole, more = axes.pinhole(matrix, plane, shot.place)
-            result.append(Camera(name, pinhole, True, (*notes, *told, *more), path, lens=lens))
+            result.append(Camera(name, pinhole, True, (*notes, *of_lens, *more), path, lens=lens))
     return left_out.with_notes(result)
 
 

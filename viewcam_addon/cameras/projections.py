@@ -116,8 +116,8 @@ def _camera(
     pinhole, notes = texts.projected(matrix[:, :3], eye, size or options.size_or_refuse(what), what)
     c_x, c_y = pinhole.principal_point
     opencv.refuse_widths(*pinhole.distance, c_x, pinhole.height - c_y, (pinhole.width, pinhole.height), what)
-    told = opencv.told_of_half_pixel(options, program) if program else ()
-    return Camera(name, pinhole, size is not None, (*told, *notes), image)
+    notes_of_program = opencv.told_of_half_pixel(options, program) if program else ()
+    return Camera(name, pinhole, size is not None, (*notes_of_program, *notes), image)
 
 
 def _of_neus(source: Source) -> dict[str, np.ndarray]:
@@ -141,9 +141,11 @@ def _of_neus(source: Source) -> dict[str, np.ndarray]:
 
 def _of_kitti(source: Source) -> dict[str, np.ndarray]:
     """KITTI's P by their names."""
-    found = {match[1]: match[2].split() for match in _KITTI.finditer(source.text[:10_000])}
+    matrices = {match[1]: match[2].split() for match in _KITTI.finditer(source.text[:10_000])}
     return {
-        key: np.array(flat(f"{key} of {source.name}", words)).reshape(3, 4) for key, words in found.items() if len(words) == 12
+        key: np.array(flat(f"{key} of {source.name}", words)).reshape(3, 4)
+        for key, words in matrices.items()
+        if len(words) == 12
     }
 
 

@@ -46,16 +46,16 @@ _UTF_16 = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"<\0?\0": "utf-16-le",
 
 
 class Source:
-    """A source that was given: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters.
+    """A source of cameras: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters.
 
     `parsed` is for formats whose content takes its time: what one has made of it, by its title.
 
-    given : a text or its bytes, the Path of a file or folder, or the files of a folder by their names.
+    content : a text or its bytes, the Path of a file or folder, or the files of a folder by their names.
     """
 
-    def __init__(self, given: "str | bytes | Path | Mapping[str, str | bytes]") -> None:
-        self.path = given if isinstance(given, Path) else None
-        self._given = given
+    def __init__(self, content: "str | bytes | Path | Mapping[str, str | bytes]") -> None:
+        self.path = content if isinstance(content, Path) else None
+        self._content = content
         self.parsed: dict[str, Any] = {}
 
     @property
@@ -65,7 +65,7 @@ class Source:
 
     @cached_property
     def is_folder(self) -> bool:
-        return self.path.is_dir() if self.path else isinstance(self._given, Mapping)
+        return self.path.is_dir() if self.path else isinstance(self._content, Mapping)
 
     @cached_property
     def data(self) -> bytes:
@@ -79,7 +79,7 @@ class Source:
         if self.is_folder:
             return b""
         if self.path is None:
-            return self._given if isinstance(self._given, bytes) else self._given.encode("utf-8", errors="replace")
+            return self._content if isinstance(self._content, bytes) else self._content.encode("utf-8", errors="replace")
         try:
             if self.path.stat().st_size > _MOST_BYTES:
                 raise InputError(f"{self.path} is larger than {_MOST_BYTES >> 20} MiB: give the file of the cameras alone")
@@ -112,7 +112,7 @@ class Source:
         usual = utf_16 or "utf-8-sig"
         head = data[:1024].decode(utf_16, errors="ignore").encode("ascii", errors="ignore") if utf_16 else data[:1024]
         declared = _XML_DECLARATION.match(head.removeprefix(b"\xef\xbb\xbf"))
-        if isinstance(self._given, str) or not declared:
+        if isinstance(self._content, str) or not declared:
             return usual, ""
         name = declared[1].decode("ascii", errors="replace")
         advice = "save it in UTF-8 and let it say so"
@@ -209,7 +209,7 @@ class Source:
     def file(self, *parts: str) -> "Source | None":
         """The file of that name in the folder, or beside this file; None if there is none."""
         if self.path is None:
-            held = self._given.get("/".join(parts)) if self.is_folder else None
+            held = self._content.get("/".join(parts)) if self.is_folder else None
             return None if held is None else Source(held)
         path = (self.path if self.is_folder else self.path.parent).joinpath(*parts)
         try:

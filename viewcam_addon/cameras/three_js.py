@@ -73,7 +73,7 @@ def _camera(record: Record, matrix: np.ndarray, name: str, options: Options) -> 
     film = texts.film(options, record.place, size, None if size else aspect)
     height, width = 2 * half, 2 * half * aspect
     left, top = -width / 2, height / 2
-    if view:
+    if view and size:
         whole = view.number("fullWidth", least=1e-9), view.number("fullHeight", least=1e-9)
         left += view.number("offsetX", 0.0) * width / whole[0]
         top -= view.number("offsetY", 0.0) * height / whole[1]

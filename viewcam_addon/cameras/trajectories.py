@@ -1,14 +1,17 @@
-"""Trajectories as evo and the odometry benchmarks have them: TUM, KITTI and EuRoC. Poses alone; how the camera sees is given.
+"""Trajectories as evo and the benchmarks have them: TUM, KITTI, EuRoC, Replica, Redwood. Poses alone; how it sees is given.
 
     TUM     t tx ty tz qx qy qz qw      seconds, camera to world
     KITTI   twelve numbers              3 × 4, row by row, camera to the world of the first one
+    Replica sixteen numbers             4 × 4, the same with the row 0 0 0 1
+    Redwood three numbers, then 4 × 4   five lines a pose: the .log of Open3D and of Tanks and Temples
     EuRoC   ns, p, q w x y z, …         of the body; a cam0/sensor.yaml of the data set says how the camera stands on it
 
 Camera axes are x right, y down, z into the view. TUM's and KITTI's files do not say whether the poses are the camera's or a
 body's; the first is their convention, and a note says that it was taken. Each pose becomes a camera with its time, so that
 they make one animation.
 
-Sources: the data sets' own pages, and evo's file_interface.py for the order of numbers.
+Sources: the data sets' own pages, redwood-data.org/indoor/fileformat.html, Open3D's io/file_format/FileLOG.cpp, and evo's
+file_interface.py for the order of numbers.
 """
 
 import math
@@ -23,12 +26,13 @@ from .camera import Camera, Options
 from .distortion import Lens
 from .source import Record, Source, numbered_lines, table
 
-TITLE = "trajectories of TUM, KITTI and EuRoC"
+TITLE = "trajectories of TUM, KITTI, EuRoC, Replica and Redwood (.log)"
 
 _MOST = 1_000_000
 _WHOSE = "The file does not say whose poses it has: taken as the camera's, to the world, x right, y down, z into the view"
 _W_FIRST = re.compile(r"^#.*\bq_?w\b.*\bq_?x\b", re.MULTILINE)
-_KITTI_STEP = 0.1  # seconds; its pictures are taken at 10 Hz
+_STEPS = {"KITTI": 0.1, "Replica": 1 / 30, "Redwood": 1 / 30}  # seconds; their pictures are taken at 10 and 30 Hz
+_PINNED = [0.0, 0.0, 0.0, 1.0]
 
 
 def recognizes(source: Source) -> bool:
@@ -42,7 +46,10 @@ def read(source: Source, options: Options) -> list[Camera]:
             f"{source.name} is Nuke's chan, with angles whose order it does not say: import it with Blender's Nuke Animation "
             "Format, or export cameras in another format"
         )
-    rows = table(source.name, numbered_lines(source))
+    lines = numbered_lines(source)
+    if kind == "Redwood":
+        lines = [(number, " ".join(line for _, line in lines[at : at + 4])) for at, (number, _) in enumerate(lines)][1::5]
+    rows = table(source.name, lines)
     if rows.shape[1] < 8:
         raise InputError(f"{source.name} has {rows.shape[1]} numbers in a line: a pose has at least 8")
     if len(rows) > _MOST:
@@ -54,8 +61,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     stated = kind == "EuRoC" and options.view_plane is None
     whats = [f"pose {index}" for index in range(len(rows))]
     matrices = np.tile(np.eye(4), (len(rows), 1, 1))
-    if kind == "KITTI":
-        times = np.arange(len(rows)) * _KITTI_STEP
+    if kind in _STEPS:
+        times = np.arange(len(rows)) * _STEPS[kind]
         matrices[:, :3] = rows[:, :12].reshape(-1, 3, 4)
     else:
         times = rows[:, 0] * (1 if kind == "TUM" else 1e-9)
@@ -87,6 +94,10 @@ def _kind(source: Source) -> str | None:
             rows.append([*map(float, words)])
     if counts <= {(7, False), (8, False)} and rows and (_is_named_chan(source) or all(map(_is_of_chan, rows))):
         return "chan"
+    if [len(row) for row in rows[:5]] == [3, 4, 4, 4, 4]:
+        return "Redwood" if rows[4] == _PINNED else None
+    if counts == {(16, False)}:
+        return "Replica" if all(row[12:] == _PINNED for row in rows) else None
     return {(8, False): "TUM", (12, False): "KITTI"}.get(*counts) if len(counts) == 1 else None
 
 

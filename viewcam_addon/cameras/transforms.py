@@ -2,7 +2,8 @@
 
 **Pose.** `transform_matrix` is the camera in the world, its columns the camera's axes, x right, y up, z away from the view: u,
 v, w and the eye. It counts in whatever the scene counts in. `applied_transform` and `applied_scale` say what was done to the
-world before; the cameras stay in the file's world unless `original_world` is chosen.
+world before; the cameras stay in the file's world unless `original_world` is chosen. What `Options` did to a world on reading
+is written so, too.
 
 **Picture.** `fl_x`, `fl_y` are the view-plane distance in pixel widths and heights, `cx`, `cy` the principal point from the
 left and the top edge, where the first pixel's center is (0.5, 0.5), and `w`, `h` pixels. `camera_angle_x` = 2 atan(w / 2
@@ -66,7 +67,8 @@ def notes_in(source: Source) -> list[str]:
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
-    return text(({"comment": options.remembered} if options.remembered else {}) | document(cameras))
+    comment = {"comment": options.remembered} if options.remembered else {}
+    return text(comment | document(cameras, more=_said_of_world(cameras)))
 
 
 def text(content: dict[str, Any]) -> str:
@@ -113,6 +115,17 @@ def document(
             for camera, picture, keys in zip(cameras, pictures, of_frames or [{}] * len(cameras), strict=True)
         ],
     }
+
+
+def _said_of_world(cameras: Sequence[Camera]) -> dict[str, Any]:
+    """The keys for what was done to the world that the cameras were read in, as nerfstudio has them: p′ = scale (R p + t)."""
+    worlds = {camera.world for camera in cameras}
+    if len(worlds) != 1 or (world := worlds.pop()) is None:
+        return {}
+    rows = np.array(world)
+    scale = float(np.cbrt(np.linalg.det(rows[:, :3])))
+    keys = {"applied_transform": (rows / scale + 0.0).tolist()}
+    return keys | ({} if abs(scale - 1) < 2.0**-40 else {"applied_scale": scale})
 
 
 def _said_of(camera: Camera) -> dict[str, Any]:

@@ -39,7 +39,8 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
 def _continued(quaternion: axes.Quaternion, before: axes.Quaternion) -> axes.Quaternion:
     """The one of a rotation's two quaternions that is nearer to the row before: else what goes from row to row spins."""
     opposed = sum(a * b for a, b in zip(quaternion, before, strict=True)) < 0
-    return tuple(0.0 - part for part in quaternion) if opposed else quaternion
+    a, b, c, d = quaternion
+    return (0.0 - a, 0.0 - b, 0.0 - c, 0.0 - d) if opposed else quaternion
 
 
 def _line(camera: Camera, quaternion: axes.Quaternion) -> str:
@@ -71,4 +72,5 @@ def centered_field_of_view(camera: Camera, engine: str) -> tuple[float, float]:
         raise InputError(
             f"{camera.name} is {' and '.join(odd)}, which {engine}'s field of view can't say: change it, or write matrices"
         )
-    return tuple(math.degrees(2 * math.atan(side / 2 / d)) for side, d in ((width, d_x), (height, d_y)))
+    across, along = (math.degrees(2 * math.atan(side / 2 / d)) for side, d in ((width, d_x), (height, d_y)))
+    return across, along

@@ -50,7 +50,11 @@ def add_reading_options(added: argparse._ActionsContainer, size: bool = True) ->
     added.add_argument(
         "--axes", choices=[*cameras.AXES], default="as_is", help="y_up, y_down: where y points in the file, and z up here"
     )
-    added.add_argument("--up-from", choices=[*cameras.UPS], help="turn the world so that the mean of the cameras' up is z")
+    text = "turn the world so that up is z: the mean of the cameras' up, or the ground's of the data set's points"
+    ups = added.add_mutually_exclusive_group()
+    ups.add_argument("--up-from", choices=[*cameras.UPS], help=text)
+    text = "the same as --up-from ground: z = 0 is the ground of the points, of a COLMAP model or a .ply"
+    ups.add_argument("--ground", action="store_const", dest="up_from", const="ground", help=text)
     added.add_argument("--scale", type=types.above_zero, metavar="S", default=1.0, help="1 unit of the file is S units here")
     added.add_argument("--distance", type=types.above_zero, metavar="D", help="view-plane distance in pixels, for poses alone")
     added.add_argument(

@@ -27,13 +27,13 @@ class NotModeled:
 
     names : of the objects, those that the ledger has as approximated or skipped and that are in the picture, or may be, and
     those whose light is a renderer's choice. share : of the pixels, 0 to 1: those that show them or differ by them; None where
-    that was not measured. shown : those that show them alone. in_one_place : of the names those of surfaces in one place.
+    that was not measured. visible : those that show them alone. in_one_place : of the names those of surfaces in one place.
     seen_otherwise : those whose shadows not all kinds of rays see.
     """
 
     names: tuple[str, ...] = ()
     share: float | None = 0.0
-    shown: float = 0.0
+    visible: float = 0.0
     in_one_place: tuple[str, ...] = ()
     seen_otherwise: tuple[str, ...] = ()
 
@@ -47,7 +47,7 @@ class NotModeled:
             "count": len(self.names),
             "names": list(self.names),
             "share": self.share,
-            "shown": self.shown,
+            "shown": self.visible,
             "in_one_place": list(self.in_one_place),
             "seen_otherwise": list(self.seen_otherwise),
         }

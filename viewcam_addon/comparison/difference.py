@@ -59,7 +59,7 @@ def write_sides(
     InputError
         if a file can't be written.
     """
-    light = {} if everything is None else {"everything": everything["Combined"][..., :3]}
+    light: dict[str, NDArray] = {} if everything is None else {"everything": everything["Combined"][..., :3]}
     if isinstance(comparison, RadianceComparison):
         light |= {"reference": reference["Combined"][..., :3], "test": comparison.test}
     else:
@@ -76,8 +76,9 @@ def on_screen(
 ) -> tuple[pictures.Picture, pictures.Picture]:
     """Reference and test as an eye can compare them: light tone-mapped alike, geometry shaded."""
     if isinstance(comparison, RadianceComparison):
-        bright = pictures.brightness(reference["Combined"][..., :3])
-        return tuple(pictures.tone_mapped(side, bright) for side in (reference["Combined"][..., :3], comparison.test))
+        lit = reference["Combined"][..., :3]
+        bright = pictures.brightness(lit)
+        return pictures.tone_mapped(lit, bright), pictures.tone_mapped(comparison.test, bright)
     return pictures.shaded(reference), pictures.shaded(tests[0])
 
 
@@ -93,7 +94,7 @@ def decades(row: PassErrors) -> tuple[float, float]:
     return 10.0**low, 10.0 ** max(high, low + 2)
 
 
-def spread(values: NDArray) -> float:
+def largest_drawn(values: NDArray) -> float:
     """The end of a signed scale: what all but some outliers stay below."""
     return max(float(np.percentile(np.abs(values), 99.5)), 1e-12)
 
@@ -115,7 +116,7 @@ def _of_geometry(comparison: GeometryComparison) -> tuple[pictures.Picture, str,
 
 def _of_light(comparison: RadianceComparison) -> tuple[pictures.Picture, str, dict[str, Any]]:
     values = comparison.maps["Combined: difference"]
-    limit = spread(values)
+    limit = largest_drawn(values)
     words = f"Orange where Cycles is brighter, by {figure(limit)} at the full color, blue where it is darker"
     scale = {"kind": "signed", "low": -limit, "high": limit, "unit": "of light"}
     return _painted(pictures.signed(values, limit), pictures.signed_scale()), words, scale

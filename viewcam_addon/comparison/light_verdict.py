@@ -133,7 +133,7 @@ class RadianceComparison:
     stated: Pinhole | None = None
     search: Search | None = None
     renderer = "Cycles"
-    """Who made the test: light is compared with Cycles' alone."""
+    """The renderer of the test: light is compared with Cycles' alone."""
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..image import Image
+from ..image import BACKGROUND_DEPTH, Image
 from ..pinhole import Pinhole
 from . import tolerances
 from .coincident import Rest
@@ -94,7 +94,7 @@ class Rounding:
         self._rest = rest
         self._shift = _ray_shift(pinhole, reference)
         self._samples = samples
-        self.belongs = np.zeros(self._shift.shape)
+        self.belongs: NDArray = np.zeros(self._shift.shape)
         if "Object Index" in reference.passes:
             self.belongs = reference["Object Index"][..., 0]
         # What the light on a surface would be if it came from straight above, as far as the picture tells: the largest
@@ -145,7 +145,7 @@ def compare(sides: Sides, allowed: Allowance, belongs: NDArray) -> tuple[PassErr
     )
     judged = ~sides.broken & ~(apart & edges.ok)
     size = np.abs(sides.reference).max(axis=-1)
-    scale = np.maximum(size, max(_DARK * float(size.mean()), np.finfo(float).tiny))
+    scale = np.maximum(size, max(_DARK * float(size.mean()), float(np.finfo(float).tiny)))
     row = measure(
         sides.name, "relative", (error / scale)[judged], (allowed.one_rounding / scale)[judged], (allowed.floor / scale)[judged]
     )
@@ -177,7 +177,7 @@ def _ray_shift(pinhole: Pinhole, reference: Image) -> Array:
     depth = reference["Depth"].reshape(-1, 1)
     row, column = np.divmod(np.arange(len(depth)), pinhole.width)
     rays = pinhole.ray_directions(column, row)
-    hit = depth[:, 0] < tolerances.BACKGROUND_DEPTH
+    hit = depth[:, 0] < BACKGROUND_DEPTH
     along = -(rays @ pinhole.basis()[2])
     seen = {"Depth": depth, "Position": np.asarray(pinhole.eye) + rays * (depth[:, 0] / along)[:, None]}
     seen |= {"Magnitude": reference["Magnitude"].reshape(-1, 1)} if "Magnitude" in reference.passes else {}

@@ -157,7 +157,8 @@ def crop(
     shades: Sequence[pictures.Picture], size: tuple[int, int], column: int, row: int, words: str, around: int = 15
 ) -> Crop:
     """The surroundings of a pixel in both sides' pictures; size, column and row as for pictures.crop."""
-    return Crop(*(pictures.png_uri(pictures.crop(shade, size, column, row, around)) for shade in shades), words)
+    reference, test = (pictures.png_uri(pictures.crop(shade, size, column, row, around)) for shade in shades)
+    return Crop(reference, test, words)
 
 
 def with_powers(text: str) -> str:

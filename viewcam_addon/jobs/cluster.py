@@ -361,7 +361,7 @@ def _processes_of_this_package() -> Iterator[None]:
     """Let the processes that start meanwhile import this package by its own name, which inside Blender is another, and not run
     again the program that this process runs: it may be any script, and none that a worker needs."""
     parent, program = str(Path(__file__).parents[2]), vars(sys.modules["__main__"])
-    kept = {name: program.pop(name) for name in ("__file__", "__spec__") if name in program}
+    kept: dict[str, Any] = {name: program.pop(name) for name in ("__file__", "__spec__") if name in program}
     program["__spec__"] = None
     absent = parent not in sys.path
     if absent:

@@ -28,11 +28,11 @@ from .folder import Folder
 from .job import Job
 
 MODEL = ("sparse", "0")
-"""Where COLMAP and those who read its models look for one."""
+"""The folder in which COLMAP and those who read its models look for one."""
 
 
 SPLITS = ("train", "val", "test")
-"""Who reads the original NeRF's files or nerfstudio's lists asks for all three: val has the pictures of test."""
+"""The splits that readers of the original NeRF's files and of nerfstudio's lists want: val has the pictures of test."""
 
 _POINTS, _LONGEST_TRACK = 100_000, 10
 """Points at most, and pictures of each: as many as COLMAP finds in real pictures. All that see a point would be 200 MB of text
@@ -86,8 +86,10 @@ def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suf
     top, frames = _labeled(records)
     model, points = folder.path.joinpath(*MODEL), 0
     if {"depth_file_path", "mask_path"} <= frames[0].keys():
-        told = [(path, label_files.read(path)) for path in (folder.path / f"{name}.labels.json" for name in records)]
-        tracks = labels.tracks_of(told, cameras, max(1, min(labels.POINTS, _POINTS // len(told))), _LONGEST_TRACK)
+        files_of_labels = [(path, label_files.read(path)) for path in (folder.path / f"{name}.labels.json" for name in records)]
+        tracks = labels.tracks_of(
+            files_of_labels, cameras, max(1, min(labels.POINTS, _POINTS // len(files_of_labels))), _LONGEST_TRACK
+        )
         points = len(tracks.positions)
         for name, content in labels.contents(cameras, tracks).items():
             with written_whole(model / name) as temporary:
@@ -104,9 +106,9 @@ def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suf
             # The original NeRF adds .png, as does whoever reads its files.
             bare = [replace(camera, image=camera.name) for camera in itertools.compress(cameras, chosen)]
             files[f"transforms_{split}.json"] = (bare, {}, [{}] * len(bare))
-    for file, (shown, more, of_frames) in files.items():
+    for file, (views, more, of_frames) in files.items():
         with written_whole(folder.path / file) as temporary:
-            text = transforms.text(transforms.document(shown, more=more, of_frames=of_frames))
+            text = transforms.text(transforms.document(views, more=more, of_frames=of_frames))
             temporary.write_text(text, encoding="utf-8", newline="\n")
     of_points = f" and {points:,} points" if points else ""
     return f"dataset of {len(cameras)} pictures{of_points}: {folder.path / transforms.FILE} and {model}"
@@ -114,11 +116,11 @@ def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suf
 
 def _labeled(records: Mapping[str, Mapping[str, Any]]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """The keys at the top of transforms.json and those of each frame that say which labels all shots have."""
-    told = {name: record.get("labels", {}) for name, record in records.items()}
-    steps = {each["depth_steps"] for each in told.values() if each}
+    labels_of = {name: record.get("labels", {}) for name, record in records.items()}
+    steps = {each["depth_steps"] for each in labels_of.values() if each}
     top: dict[str, Any] = {}
     keys: dict[str, str] = {}
-    if all(f"{name}.depth.png" in each.get("files", ()) for name, each in told.items()):
+    if all(f"{name}.depth.png" in each.get("files", ()) for name, each in labels_of.items()):
         if len(steps) > 1:
             raise InputError(
                 "the shots' depths have different steps, and a dataset says one: write them again, with --overwrite"
@@ -126,7 +128,7 @@ def _labeled(records: Mapping[str, Mapping[str, Any]]) -> tuple[dict[str, Any], 
         unit = 1 / steps.pop()
         top = {"depth_unit_scale_factor": unit, "integer_depth_scale": unit}  # nerfstudio's and instant-ngp's
         keys = {"depth_file_path": "depth.png", "depth_path": "depth.png"}
-    if all(f"{name}.mask.png" in each.get("files", ()) for name, each in told.items()):
+    if all(f"{name}.mask.png" in each.get("files", ()) for name, each in labels_of.items()):
         keys["mask_path"] = "mask.png"
     return top, [{key: f"{name}.{ending}" for key, ending in keys.items()} for name in records]
 

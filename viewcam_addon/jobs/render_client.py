@@ -27,7 +27,7 @@ BLENDER = "VIEWCAM_BLENDER"
 """The variable that names the Blender."""
 
 ATTEMPTS = 3
-"""How many Blenders may crash in one shot until it counts as failed."""
+"""The number of Blenders that may crash in one shot until it counts as failed."""
 
 
 class ServedRenderer:

@@ -29,7 +29,7 @@ from .scene_labels import Labels
 _FORMAT, _VERSION = "virtual-pinhole-labels", 1
 
 _LARGEST = 1e100
-"""Of a label file's numbers: with larger ones nobody can compute. It lies far beyond what Blender's float32 can hold."""
+"""The largest number of a label file: nobody can compute with larger ones, and float32 holds none."""
 
 _LARGEST_ID = 2**24 - 1
 
@@ -37,7 +37,7 @@ _ARE_VALUES: dict[str, Callable[[NDArray[np.float32]], NDArray[np.bool_]]] = {
     "Depth": lambda depth: depth > 0,
     "Instance": lambda ids: (ids >= 0) & (ids <= _LARGEST_ID) & (ids == np.rint(ids)),
 }
-"""Which numbers a pass may hold, of those that would be an index or a divisor; nan is none."""
+"""The numbers that a pass may hold, of those that would be an index or a divisor; nan is none."""
 
 _UNKNOWN_FLOW = 1e10
 """The mark of Middlebury's format where no flow is known; everything above 1e9 counts as that."""

@@ -21,13 +21,14 @@ pixel."""
 def of_picture(instance: NDArray[np.int64], count: int) -> Masks:
     """The masks of what each pixel shows. instance : (height, width) numbers below `count`, −1 for none, rows from the
     bottom."""
+    height, width = instance.shape
     owner = instance[::-1].T.ravel()
     starts = np.flatnonzero(np.diff(owner, prepend=-2))
     ends = np.append(starts[1:], owner.size)
     owners = owner[starts]
     order = np.argsort(owners, kind="stable")
     order = order[np.searchsorted(owners[order], 0) :]
-    return _described(owners[order], starts[order], ends[order], instance.shape, count)
+    return _described(owners[order], starts[order], ends[order], (height, width), count)
 
 
 def of_windows(windows: Sequence[Window | None], shape: tuple[int, int]) -> Masks:

@@ -104,7 +104,8 @@ class Keeper:
         if (key := (name, matrix.tobytes())) not in self._alone:
             geometry = self.scene.geometries[name]
             geometry = replace(geometry, materials=np.zeros_like(geometry.materials))
-            middle = sum(self.box(name)) / 2
+            low, high = self.box(name)
+            middle = (low + high) / 2
             away = tuple(middle + np.array([0, 0, 1 + np.abs(middle).max()]))
             camera = Pinhole(tuple(middle), away, (0, 1, 0), 1, 1, 1)  # only so that rendering space's origin is near
             self._alone[key] = CoreScene(Scene(camera, {name: geometry}, (Object("", name, matrix),)), 1)

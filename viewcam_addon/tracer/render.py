@@ -182,9 +182,9 @@ class Tracer:
             for into, values in zip((depth, objects, primitives), hits, strict=True):
                 into[part] = values.reshape(columns[part].shape)
             if names:
-                found = unwritten((x.size,), names)
-                self._core.surface_at(found, columns[part].ravel(), rows[part].ravel())
-                for name, values in found.items():
+                arrays = unwritten((x.size,), names)
+                self._core.surface_at(arrays, columns[part].ravel(), rows[part].ravel())
+                for name, values in arrays.items():
                     passes[name][part] = values.reshape(*columns[part].shape, -1)
 
         bands = (range(first, min(first + BAND, len(columns))) for first in range(0, len(columns), BAND))

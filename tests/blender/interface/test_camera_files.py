@@ -68,19 +68,19 @@ def test_a_folder_of_cameras_becomes_one_collection_and_each_sees_what_the_file_
     assert scene.camera == objects[0]
 
 
-@pytest.mark.parametrize("made", ["EACH", "FLIGHT"])
-def test_the_empty_of_an_import_turns_and_scales_all_of_its_cameras(scene, tmp_path, made):
+@pytest.mark.parametrize("import_as", ["EACH", "FLIGHT"])
+def test_the_empty_of_an_import_turns_and_scales_all_of_its_cameras(scene, tmp_path, import_as):
     formats.save(around(3), tmp_path / "sparse", "colmap")
-    import_(tmp_path / "sparse", set_size=True, made=made)
+    import_(tmp_path / "sparse", set_size=True, import_as=import_as)
     blocks, (empty,) = imported("sparse"), [block for block in bpy.data.objects if block.type == "EMPTY"]
     assert empty.name == "sparse World" and all(block.parent == empty for block in blocks)
     empty.scale, empty.rotation_euler = (2, 2, 2), (0, 0, math.pi / 2)
     bpy.context.view_layer.update()
     for i, camera in enumerate(around(3)):
-        scene.frame_set(1 + i * (made == "FLIGHT"))
-        eye, found = camera.pinhole.eye, cameras.read(blocks[i * (made == "EACH")], scene)
-        assert found.eye == pytest.approx((-2 * eye[1], 2 * eye[0], 2 * eye[2]), abs=1e-5)
-        assert found.distance == pytest.approx(camera.pinhole.distance, rel=2.0**-20)
+        scene.frame_set(1 + i * (import_as == "FLIGHT"))
+        eye, pinhole = camera.pinhole.eye, cameras.read(blocks[i * (import_as == "EACH")], scene)
+        assert pinhole.eye == pytest.approx((-2 * eye[1], 2 * eye[0], 2 * eye[2]), abs=1e-5)
+        assert pinhole.distance == pytest.approx(camera.pinhole.distance, rel=2.0**-20)
 
 
 def test_without_being_asked_the_scene_keeps_size_and_camera_and_is_told_what_differs(camera_object, scene, tmp_path, capfd):

@@ -186,7 +186,7 @@ def test_light_is_compared_with_as_many_samples_as_it_takes(seen, add_lamp):
     try:
         assert bpy.ops.viewcam.compare_with_cycles() == {"FINISHED"}
     finally:
-        for name in ("level", "said", "clay"):
+        for name in ("level", "chosen_level", "clay"):
             settings.property_unset(name)
     outcome = proof.background.latest
     assert outcome.answer == SAME, outcome.verdict
@@ -232,7 +232,7 @@ def test_its_steps_tell_how_far_it_is(stand_in):
 def test_light_is_rendered_in_pictures_that_are_counted(stand_in):
     comparison = stand_in(level="path")
     assert comparison.progress() == (0, "Rendering with Cycles, 1 of 8")
-    with open(comparison.folder / "said.txt", "a", encoding="utf-8") as log:
+    with open(comparison.folder / "output.txt", "a", encoding="utf-8") as log:
         log.write('{"event": "step", "name": "rendering", "number": 4, "of": 8}\n')
         log.flush()
         assert comparison.progress() == (3 / 10, "Rendering with Cycles, 4 of 8")
@@ -244,12 +244,12 @@ def test_light_is_rendered_in_pictures_that_are_counted(stand_in):
 
 def test_a_search_for_a_bias_tells_how_much_longer_it_takes(stand_in):
     comparison = stand_in(level="path", find="0.5%")
-    with open(comparison.folder / "said.txt", "a", encoding="utf-8") as said:
-        said.write('{"event": "forecast", "samples": 256, "taken": 64, "seconds": 41.6}\n')
-        said.flush()
+    with open(comparison.folder / "output.txt", "a", encoding="utf-8") as output:
+        output.write('{"event": "forecast", "samples": 256, "taken": 64, "seconds": 41.6}\n')
+        output.flush()
         assert comparison.progress() == (1 / 4, "Rendering with Cycles, 1 of 8, about 42 s more")
-        said.write('{"event": "step", "name": "rendering", "number": 6, "of": 8}\n')
-        said.flush()
+        output.write('{"event": "step", "name": "rendering", "number": 6, "of": 8}\n')
+        output.flush()
         assert comparison.progress() == ((64 + 192 / 2) / 256, "Rendering with Cycles, 6 of 8, about 42 s more")
     comparison.cancel()
 

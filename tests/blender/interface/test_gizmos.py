@@ -144,7 +144,7 @@ def test_a_camera_that_is_deleted_while_it_is_dragged_ends_the_drag(posed_camera
 @pytest.mark.parametrize("automatic", [False, True])
 @pytest.mark.parametrize("keyed", ["eye", "look_at"])
 def test_auto_keying_keys_what_is_animated(posed_camera, scene, steps, automatic, keyed):
-    """As with Blender's own fields: a value without a curve gets none."""
+    """A value without a curve gets none, as with Blender's own fields."""
     group = posed_camera.virtual_pinhole
     group.keyframe_insert(keyed, frame=1)
     group.keyframe_insert(keyed, frame=20)

@@ -412,7 +412,7 @@ def test_undo_restores_values_and_camera_bit_for_bit(posed_camera, selected_cube
 
 
 def test_dolly_in_a_menu_asks_for_the_distance_and_does_nothing_before(posed_camera, stated, monkeypatch):
-    """Where it stood in the panel, a click was followed by nothing that could be seen."""
+    """A click on it, while it stood in the panel, was followed by nothing that could be seen."""
     before, asked = stated(), []
     operator = moving.VIEWCAM_OT_dolly_camera
     properties = SimpleNamespace(is_property_set=lambda name: False)

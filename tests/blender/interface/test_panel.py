@@ -281,7 +281,7 @@ SHOWN = {
 
 
 def test_nothing_but_a_dot_takes_room_from_the_lens(posed_camera):
-    """Of "112.5 mm" a sidebar as Blender opens it would show "112.5 m"."""
+    """A sidebar as Blender opens it would cut "112.5 mm" to "112.5 m"."""
     for unit in [item.identifier for item in fields()["lens_unit"].enum_items]:
         posed_camera.virtual_pinhole.lens_unit = unit
         widgets = drawn(panel.VIEWCAM_PT_sidebar, 292)
@@ -313,7 +313,7 @@ def test_a_field_is_dragged_and_shown_as_blenders_own_of_its_kind(fresh_blender,
 
 
 def test_the_lens_in_pixels_is_dragged_about_as_far_as_in_millimeters(fresh_blender):
-    """Of a picture of 1920 on a sensor of 36 mm. A pixel of the mouse is a hundredth of the step."""
+    """A picture of 1920 pixels lies on a sensor of 36 mm. A pixel of the mouse is a hundredth of the step."""
     sensor = bpy.types.Camera.bl_rna.properties["sensor_width"].default
     pixels, millimeters = fields()["distance"].step, fields()["focal_length"].step
     assert pixels / millimeters == pytest.approx(1920 / sensor, rel=0.1)
@@ -538,7 +538,7 @@ def test_drawing_states_the_camera_once_and_reads_it_once_for_the_read_outs(pose
     calls = []
     for name in ("stated", "read"):
         real = getattr(cameras, name)
-        monkeypatch.setattr(cameras, name, lambda *given, name=name, real=real: calls.append(name) or real(*given))
+        monkeypatch.setattr(cameras, name, lambda *arguments, name=name, real=real: calls.append(name) or real(*arguments))
     drawn(panel.VIEWCAM_PT_data)
     assert sorted(calls) == ["read", "stated"]
     calls.clear()
@@ -554,7 +554,9 @@ def test_drawing_looks_at_no_other_camera(posed_camera, add_camera, monkeypatch)
     looked_at = set()
     for name in ("stated", "read"):
         real = getattr(cameras, name)
-        monkeypatch.setattr(cameras, name, lambda block, *given, real=real: looked_at.add(block.name) or real(block, *given))
+        monkeypatch.setattr(
+            cameras, name, lambda block, *arguments, real=real: looked_at.add(block.name) or real(block, *arguments)
+        )
     for each in (panel.VIEWCAM_PT_data, panel.VIEWCAM_PT_data_readouts):
         drawn(each)
     assert looked_at == {"Camera"}
@@ -684,7 +686,7 @@ def test_a_shot_that_fails_is_said_in_its_own_words(settings, camera, monkeypatc
     summary = '{"shots": [{"name": "Hero", "error": "the disk is full"}]}'
     fails = "import json, pathlib, sys; out = json.loads(pathlib.Path(sys.argv[1]).read_text())['plan']['out'];"
     fails += "pathlib.Path(out, 'summary.json').write_text(sys.argv[2]); sys.exit(4)"
-    monkeypatch.setattr(comparing, "command", lambda *given: [sys.executable, "-c", fails, str(given[2]), summary])
+    monkeypatch.setattr(comparing, "command", lambda *arguments: [sys.executable, "-c", fails, str(arguments[2]), summary])
     with pytest.raises(RuntimeError, match="The disk is full"):
         bpy.ops.viewcam.write_labels()
 

@@ -20,7 +20,7 @@ def test_the_level_is_the_preferred_one_until_another_is_chosen(fresh_blender, m
     assert settings.level == "PATH"
     settings.level = "AUTO"
     assert settings.level == "AUTO"
-    settings.said = ""
+    settings.chosen_level = ""
 
 
 def test_the_render_menu_and_the_status_bar_are_as_before_without_the_add_on(registered_addon):

@@ -157,7 +157,9 @@ def test_after_a_run_without_a_contact_sheet_none_of_an_earlier_run_is_opened(tw
 def test_a_proof_of_each_picture_is_asked_for_by_one_box(two, stand_in, tmp_path, monkeypatch, check):
     (tmp_path / "go").touch()
     asked, stood_in = [], comparing.command
-    monkeypatch.setattr(comparing, "command", lambda *given: asked.append(plan.read(given[2])[1]) or stood_in(*given))
+    monkeypatch.setattr(
+        comparing, "command", lambda *arguments: asked.append(plan.read(arguments[2])[1]) or stood_in(*arguments)
+    )
     assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path), check=check) == {"FINISHED"}
     assert [how.outputs.check for how in asked] == [check]
 

@@ -31,12 +31,12 @@ def test_the_table_shows_light_as_the_scene_displays_it(scene, transform):
     scene.view_settings.exposure = 0.5
     light = np.exp2(np.random.default_rng(1).uniform(-10, 5, (32, 32, 3))).astype(np.float32)
     light[0, 0] = 0
-    found = looked_up(swipe.shades(scene), light.reshape(-1, 3))
+    shaded = looked_up(swipe.shades(scene), light.reshape(-1, 3))
     expected = displayed(scene, light)[..., :3].reshape(-1, 3)
-    off = np.abs(found - expected) * 255
+    off = np.abs(shaded - expected) * 255
     # Calibrated: both sides are rounded to 1/255, and a transform of three channels has edges between the table's numbers.
     assert off.mean() < 0.5 and np.quantile(off, 0.99) < 4 and off.max() < 16, (off.mean(), off.max())
-    assert np.abs(found - looked_up(swipe.shades(scene)[::-1], light.reshape(-1, 3))).mean() > 0.05, (
+    assert np.abs(shaded - looked_up(swipe.shades(scene)[::-1], light.reshape(-1, 3))).mean() > 0.05, (
         "a table upside down is as good"
     )
 

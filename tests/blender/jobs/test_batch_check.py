@@ -161,7 +161,7 @@ def test_a_sidecar_that_is_not_blenders_camera_is_caught(stage, batch, monkeypat
     from viewcam_addon.blender.jobs import renderer
 
     read = renderer.cameras.read
-    monkeypatch.setattr(renderer.cameras, "read", lambda *given: replace(read(*given), distance=90.09))
+    monkeypatch.setattr(renderer.cameras, "read", lambda *arguments: replace(read(*arguments), distance=90.09))
     checks = verdicts(batch(LEFT))["left"]
     assert not checks["passed"] and "magnified" in checks["verdict"], checks
 
@@ -181,7 +181,7 @@ def test_a_conversion_that_lost_the_four_values_is_caught(stage, batch, monkeypa
 
 @pytest.mark.parametrize("engine", ["CYCLES", "VIEWCAM"])
 def test_pictures_are_the_same_bytes_with_and_without_their_checks(stage, batch, engine):
-    """Where a check has most to change and to give back: bent normals, a holdout, depth of field, a world's volume, indices."""
+    """A check changes and restores most here: bent normals, a holdout, depth of field, a world's volume, indices."""
     bpy.data.objects["Cone"].is_holdout = True
     layer = bpy.context.view_layer
     layer.use_pass_object_index = layer.use_pass_material_index = layer.use_pass_normal = True
@@ -267,7 +267,7 @@ def test_what_geometry_nodes_move_with_the_active_camera_is_read_for_each_shot(s
     """Nothing in the file has changed from shot to shot, and the scene is another all the same."""
     read = []
     export = scene_files.export_scene
-    monkeypatch.setattr(scene_files, "export_scene", lambda *given: read.append(1) or export(*given))
+    monkeypatch.setattr(scene_files, "export_scene", lambda *arguments: read.append(1) or export(*arguments))
     shots = (LEFT, RIGHT, replace(LEFT, name="again"))
     assert all(each["passed"] for each in verdicts(batch(*shots)).values()) and len(read) == 1
     read.clear()

@@ -150,7 +150,7 @@ def test_labels_alone_are_those_beside_a_picture_and_nothing_is_rendered(stage, 
 
 def test_a_scene_that_stands_is_read_once_for_labels(stage, tmp_path, monkeypatch):
     exported, export = [], scene_files.export_scene
-    monkeypatch.setattr(scene_files, "export_scene", lambda *given: exported.append(1) or export(*given))
+    monkeypatch.setattr(scene_files, "export_scene", lambda *arguments: exported.append(1) or export(*arguments))
     shots = [Job(f"shot_{x}", eye=(x, -6, 2), look_at=(0, 0, 0.5), up=(0, 0, 1), d=90) for x in range(4)]
     shoot(tmp_path, shots, Outputs(picture=False, labels=("depth",)))
     assert len(exported) == 1
@@ -160,6 +160,6 @@ def test_a_scene_that_stands_is_read_once_for_labels(stage, tmp_path, monkeypatc
 
 def test_flow_along_an_animation_reads_each_frame_once(stage, tmp_path, monkeypatch):
     exported, export = [], scene_files.export_scene
-    monkeypatch.setattr(scene_files, "export_scene", lambda *given: exported.append(1) or export(*given))
+    monkeypatch.setattr(scene_files, "export_scene", lambda *arguments: exported.append(1) or export(*arguments))
     shoot(tmp_path, FRAMES, ALL)
     assert len(exported) == 5, "frames 0 to 4"

@@ -199,7 +199,7 @@ def test_outside_of_a_batch_our_engine_reads_the_scene_for_each_picture(stage, r
 
 
 def test_a_camera_moves_without_blender_looking_at_other_objects(stage, tmp_path):
-    """What Blender evaluates for the next shot is the batch's own camera: setting a pointer, say, would touch all objects."""
+    """Blender evaluates the batch's own camera alone for the next shot: setting a pointer, say, would touch all objects."""
     stand_still(stage)
     seen = []
 

@@ -80,7 +80,7 @@ def state():
 
 
 def _value(owner, prop):
-    """As a text. Matrices and bounds of objects are evaluated, and statistics are of the last render."""
+    """A property's value as a text. Matrices and bounds of objects are evaluated, and statistics are of the last render."""
     if prop.type == "COLLECTION" or prop.identifier in ("rna_type", "stereo_3d_format"):
         return None
     value = getattr(owner, prop.identifier)
@@ -486,7 +486,7 @@ def taken(folder, name):
 
 
 def close(have, wanted):
-    """As Blender's float32 numbers have it: half a dozen roundings of 2⁻²⁴ of lengths of 10 seen from 10."""
+    """Equality but for Blender's float32: half a dozen roundings of 2⁻²⁴ of lengths of 10 seen from 10."""
     points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
     actual, expected = have.project(points), wanted.project(points)
     error = np.hypot(actual[0] - expected[0], actual[1] - expected[1]).max()

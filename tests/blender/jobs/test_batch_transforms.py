@@ -91,7 +91,7 @@ def batch(tmp_path):
 
 @dataclass(frozen=True)
 class Camera:
-    """As both formats tell it, brought to x right, y down, z into the view."""
+    """A camera of either format, brought to x right, y down, z into the view."""
 
     to_camera: np.ndarray
     f: tuple[float, float]
@@ -290,10 +290,10 @@ def test_one_command_makes_depth_masks_and_points_that_lie_on_a_cube_in_its_colo
     bpy.context.object.data.materials.append(_shining((0, 1, 0)))
     assert batch(stage(), SHOTS[:3], "--transforms", "--labels", "depth,masks", "--test", "front") == 0
     assert " points: " in capfd.readouterr().out
-    told = json.loads((tmp_path / "out" / "transforms.json").read_text())
-    assert told["test_filenames"] == ["front.png"] and told["train_filenames"] == ["rolled.png", "above.png"]
+    document = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    assert document["test_filenames"] == ["front.png"] and document["train_filenames"] == ["rolled.png", "above.png"]
     keys = "depth_file_path", "mask_path", "depth_path"
-    assert all((tmp_path / "out" / frame[key]).is_file() for frame in told["frames"] for key in keys)
+    assert all((tmp_path / "out" / frame[key]).is_file() for frame in document["frames"] for key in keys)
     lines = [line.split() for line in (tmp_path / "out/sparse/0/points3D.txt").read_text().splitlines() if line[0] != "#"]
     points, colors = np.array([line[1:4] for line in lines], float), np.array([line[4:7] for line in lines], int)
     assert len(points) > 30 and np.abs(np.abs(points).max(axis=1) - 0.6).max() < 1e-6

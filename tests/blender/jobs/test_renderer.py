@@ -179,6 +179,15 @@ def test_a_file_saved_in_edit_mode_is_seen_as_in_a_render(blend, both_sides):
     assert len(next(iter(sides.exported.geometries.values())).triangles) == 12
 
 
+def test_a_file_saved_in_sculpt_mode_has_the_normals_of_a_mesh_on_both_sides(blend, both_sides):
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    bpy.ops.mesh.primitive_cone_add(vertices=5, depth=1)  # around each vertex are angles of other sizes
+    bpy.ops.object.shade_smooth()
+    bpy.ops.object.mode_set(mode="SCULPT")
+    sides = both_sides(blend=blend())
+    sides.check()
+
+
 def test_linked_objects_are_exported_and_numbered(blend, scene, camera_object, both_sides):
     material = bpy.data.materials.new("Shared")
     bpy.data.objects["Cube"].data.materials.append(material)
@@ -320,7 +329,7 @@ def test_for_the_least_level_a_scene_is_exported_once(blend, monkeypatch, lit_by
     read = []
     for module, name in ((export_geometry, "mesh_of"), (images, "picture_of")):
         function = getattr(module, name)
-        monkeypatch.setattr(module, name, lambda *given, f=function, name=name: read.append(name) or f(*given))
+        monkeypatch.setattr(module, name, lambda *arguments, f=function, name=name: read.append(name) or f(*arguments))
     exported = jobs.export(Job(blend=path, level="auto", recenter=recenter))
     assert sorted(read) == ["mesh_of"] + ["picture_of"] * (level != "geometry"), read
     assert (exported.ledger, list(exported.materials), len(exported.lamps)) == (

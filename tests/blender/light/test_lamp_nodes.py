@@ -196,7 +196,7 @@ def test_nodes_of_a_lamp_that_are_a_little_wrong_are_found(shone, monkeypatch, w
 
 @pytest.mark.parametrize("shape", ["RECTANGLE", "ELLIPSE"])
 def test_a_panel_with_a_picture_shows_it(fresh_blender, scene, camera, add_lamp, set_world, shape, read_passes, tmp_path):
-    """As the camera sees it, at every place; the way there begins at the clip's start; the panel is turned, and stretched."""
+    """The camera sees it right at every place; the way there begins at the clip's start; the panel is turned, and stretched."""
     from viewcam_addon.blender.jobs import renderer as jobs
     from viewcam_addon.jobs.job import Job
     from viewcam_addon.tracer import render

@@ -128,7 +128,7 @@ def lit_past_a_sheet(scene, camera, add, add_lamp, mesh_from):
     ],
 )
 def test_light_past_what_not_all_rays_see_is_taken_out_and_named(lit_past_a_sheet, tmp_path, read_passes, light, sheet, name):
-    """How much of it a picture has is Cycles' weights of importance sampling: 4 % less in a tile, or 14 times as much."""
+    """Cycles' weights of importance sampling decide how much of it a picture has: 4 % less in a tile, or 14 times as much."""
     lit_past_a_sheet(light, sheet)
     paths = [tmp_path / f"cycles-{number}.exr" for number in range(4)]
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=256), paths)

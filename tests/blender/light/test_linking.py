@@ -60,7 +60,7 @@ def test_a_collection_means_what_it_includes_or_all_that_it_does_not_exclude(
 )
 @pytest.mark.parametrize("kind", ["SUN", "POINT"])
 def test_cycles_shows_the_same_of_linked_lights(pictures, add_lamp, link, what, state, kind):
-    """Of what is shown p50 1e-6 and p99 2e-5, and nothing lit on one side only but at edges of shadows."""
+    """Light differs by 1e-6 (p50) and 2e-5 (p99), and nothing is lit on one side only but at edges of shadows."""
     size = {"angle": 0.0, "energy": 2.0} if kind == "SUN" else {"shadow_soft_size": 0.0, "energy": 900.0}
     lamp = add_lamp(kind, (0.5, 0.3, 4), (0.3, 0.4, 0), **size)
 

@@ -421,7 +421,7 @@ def test_a_node_that_is_a_little_wrong_is_found(floor, images, monkeypatch, wron
 def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(
     scene, camera, add, make_material, read_passes, tmp_path
 ):
-    """Of a grid that a modifier bends, and of one with a texture space of its own."""
+    """A modifier bends one grid; the other has a texture space of its own."""
     scene.render.resolution_x = scene.render.resolution_y = 48
     camera.location, camera.rotation_euler, camera.data.lens = (0.013, 0.029, 4.0), (0, 0, 0), 40.0
     material = make_material("Generated", "ShaderNodeEmission")

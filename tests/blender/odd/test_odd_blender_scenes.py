@@ -221,7 +221,7 @@ def test_stereoscopy_is_told(posed_camera, scene, odd):
 
 
 def test_a_marker_chooses_the_camera_of_its_frame(both_sides, posed_camera, add_camera, scene, odd):
-    """What a render shows from the marker's frame on, and what `viewcam check --frame` takes."""
+    """A render shows it from the marker's frame on, and `viewcam check --frame` takes it."""
     other = add_camera("Other")
     other.location = (0, 0, 8)
     bpy.ops.mesh.primitive_monkey_add(size=3)
@@ -421,7 +421,7 @@ def test_a_shift_is_kept_and_the_pose_sticks(posed_camera, odd):
     odd.check(posed_camera)
 
 
-def test_a_lens_below_one_millimetre_grows_with_its_sensor(posed_camera, odd):
+def test_a_lens_below_one_millimeter_grows_with_its_sensor(posed_camera, odd):
     posed_camera.virtual_pinhole.distance = 8
     odd.check(posed_camera)
 

@@ -569,7 +569,7 @@ def test_real_models(scene, camera, both_sides, models_folder, name):
 
 
 def bare_objects(count):
-    """As many triangles without a material, each a mesh of its own."""
+    """Objects of one triangle without a material, each a mesh of its own."""
     objects = []
     for _ in range(count):
         mesh = bpy.data.meshes.new("Bare")

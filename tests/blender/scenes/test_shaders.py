@@ -182,7 +182,7 @@ CURVES = {"rgb_curves": "color", "vector_curves": "vector", "float_curve": "valu
 @pytest.mark.parametrize("kind", CURVES)
 @pytest.mark.parametrize("extrapolate", [False, True])
 def test_curves_are_drawn_that_have_the_table_again(diffuse, image, kind, extrapolate):
-    """As straight lines between its entries. Calibrated: 5e-6, of float32 and the slope."""
+    """They are straight lines between its entries. Calibrated: 5e-6, of float32 and the slope."""
     table = bpy.data.images.new("Table", 257, 1, float_buffer=True, is_data=True)
     wanted = np.sin(np.linspace(0, 4, 257)[None, :, None] * (1.0, 1.5, 2.0) + 0.3).astype(np.float32) * 1.5
     wanted[..., 1:] = wanted[..., :1] if kind == "float_curve" else wanted[..., 1:]
@@ -512,7 +512,7 @@ def test_without_nodes_or_without_an_output_the_viewports_color_counts(diffuse):
 
 
 def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image):
-    """What Cycles is shown is what the tracer is given, or the shader below would be another."""
+    """Cycles is shown the nodes that the tracer has, or the shader below would be another."""
     material = sum_of(
         diffuse=Color(RED),
         emission=Color((1.0, 2.0, 3.0)),

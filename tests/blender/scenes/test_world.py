@@ -159,7 +159,7 @@ def test_an_image_that_is_missing_is_the_magenta_that_cycles_shows(set_world, ex
 
 
 def test_cycles_is_shown_a_constant_world_where_the_image_is_missing(set_world):
-    """Where it sampled it as light, it had some that scattered rays lose."""
+    """Sampled as light, it would give some that scattered rays lose."""
     world = set_world(strength=2.0)
     texture = world.node_tree.nodes.new("ShaderNodeTexEnvironment")
     world.node_tree.links.new(texture.outputs["Color"], background_of(world).inputs["Color"])

@@ -204,7 +204,7 @@ def test_what_an_image_cannot_stand_in_for_is_named(tree, export, obstacle, monk
 
 @pytest.mark.parametrize("kind", ["PREETHAM", "HOSEK_WILKIE", WITH_SUN])
 def test_cycles_shows_the_same_image_and_nearly_the_sky_itself(tree, camera_object, scene, read_passes, tmp_path, kind):
-    """Of a sky between two pixels the image is off by what it is curved there; the mean tells what a surface is lit by."""
+    """The image differs from the sky between two pixels by its curvature there; the mean tells what a surface is lit by."""
     sky = tree.add("ShaderNodeTexSky", sky_type=kind, sun_disc=False)
     tree.color(sky.outputs[0])
     scene.render.resolution_x, scene.render.resolution_y = 64, 48

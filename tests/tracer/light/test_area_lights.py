@@ -112,7 +112,7 @@ def test_every_sample_looks_where_rays_run_into_the_lamp(make_lighting, ellipse,
 @pytest.mark.parametrize("spread", [0.08, 1.0, 2.5])
 @pytest.mark.parametrize(("size", "ellipse", "height"), [((2, 3), False, 0.5), ((2, 3), True, 0.5), ((1e-3, 1e-3), False, 1.0)])
 def test_a_spread_is_a_grid_of_slats_that_costs_no_light(make_lighting, spread, size, ellipse, height):
-    """What leaves at an angle a falls as tan of half the spread less tan a, and all of it is what it would be without."""
+    """Light at an angle a falls as tan of half the spread less tan a, and all of it is what it would be without."""
     lamp = down(height, size=size, ellipse=ellipse, spread=spread)
     lighting = make_lighting(lamp)
     cosine = np.cos(spread / 2 * np.linspace(0.01, 1.2, 40))

@@ -118,7 +118,7 @@ def test_a_white_furnace_stays_white(name, roughness, degrees, behind):
 
 @pytest.mark.parametrize("name", ["ggx", "stretched", "velvet", "beckmann", "metal", "conductor", "lambert", "oren-nayar"])
 def test_light_goes_both_ways_alike(name):
-    """Of what is scattered more than once it does not, as in Cycles."""
+    """Light that is scattered more than once does not, as in Cycles."""
     shader = ROUGH[name]
     if shader.type == "metallic":
         shader = node("metallic", **dict(shader.inputs) | {"distribution": "ggx"})

@@ -114,7 +114,7 @@ def test_a_table_of_one_candela_is_a_plain_lamp(floor, kind, across, up):
 
 
 def test_between_the_angles_of_a_table_light_goes_on_as_it_grows(floor):
-    """Where three steps are even, Catmull's and Rom's cubics are straight; the floor is seen below 32°."""
+    """Catmull's and Rom's cubics are straight over three even steps; the floor is seen below 32°."""
     up = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 90.0]
     rendered, _, cosine = floor(replace(LAMP, emission=node("ies", text=ies_text([0.0], up, [angle + 10.0 for angle in up]))))
     plain, *_ = floor(replace(LAMP, power=(POWER / CANDELA,) * 3))
@@ -169,7 +169,7 @@ def test_a_lamp_that_nodes_color_everywhere_alike_is_that_colored_lamp(floor):
 
 @pytest.mark.parametrize("count", [2, 6])
 def test_lamps_with_nodes_light_what_each_does(floor, count):
-    """Of few lamps each is asked, of more one by chance, whose nodes are no part of the choice."""
+    """Each of few lamps is sampled, and of more one by chance, whose nodes are no part of the choice."""
     lamps = [replace(LAMP, name=str(number), emission=(WAY, SQUARED)[number % 2]) for number in range(count)]
     rendered = floor(*lamps, samples=1 if count == 2 else 256)[0]
     alone = count // 2 * (floor(lamps[0])[0] + floor(lamps[1])[0])

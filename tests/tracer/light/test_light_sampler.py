@@ -100,7 +100,7 @@ def test_many_lamps_of_all_kinds_give_the_sum_of_what_each_gives(make_lit, floor
 
 
 def test_the_one_of_many_lamps_that_is_near_is_asked_by_what_it_brings(lit):
-    """Of 64 lamps all but one are 100 m away: asked one time in 64, the noise of the near one would be 8
+    """One of 64 lamps is near, the others 100 m away: sampled one time in 64, the noise of the near one would be 8
     times the mean; it is 0.67 of it."""
     far = [Point(f"far {i}", position=(100 * np.cos(i), 100 * np.sin(i), 10), power=(10.0,) * 3) for i in range(63)]
     mean, error = lit(*far, Point("near", position=(3, 0, 3), power=(10.0,) * 3), samples=16)
@@ -159,9 +159,9 @@ def test_shining_surfaces_beside_lamps_are_found_as_often_as_it_takes(lit, make_
     square = make_mesh([(2, -1, 1), (2, 1, 1), (2, 1, 3), (2, -1, 3)], [(0, 2, 1), (0, 3, 2)])
     glow = ((square, sum_of(emission=Color((5.0,) * 3))),)
     lamp = Point("point", position=(-3, 0, 3), power=(50.0,) * 3)
-    (first, one), (second, two) = lit(lamp), lit(things=glow, samples=256)
+    (first, first_error), (second, two) = lit(lamp), lit(things=glow, samples=256)
     mean, error = lit(lamp, things=glow, samples=64)
-    assert error < 0.02 * mean and abs(mean - first - second) <= 4 * np.sqrt(one**2 + two**2 + error**2)
+    assert error < 0.02 * mean and abs(mean - first - second) <= 4 * np.sqrt(first_error**2 + two**2 + error**2)
 
 
 @pytest.mark.parametrize("kind", ["camera", "diffuse", "glossy", "transmission"])

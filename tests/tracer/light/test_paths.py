@@ -125,7 +125,7 @@ def test_the_world_is_hidden_by_what_diffuse_rays_see_and_not_by_what_shadow_ray
 
 
 def test_a_smooth_ball_in_a_white_world_loses_what_its_normals_send_into_it(ball, make_lit):
-    """Of the cosine lobe about N_s the part beyond the plane of N_g is (1 − N_s·N_g)/2; of a convex ball nothing else is."""
+    """The part of the cosine lobe about N_s beyond the plane of N_g is (1 − N_s·N_g)/2; a convex ball loses nothing else."""
     camera = Pinhole((0, -4, 1), (0, 0, 0), (0, 0, 1), 60, 32, 24)
     scene = make_lit(camera, (ball(12), lambert(1)), world=World((1, 1, 1)))
     passes, seen = render(scene, "path", 256, threads=1), render(scene)

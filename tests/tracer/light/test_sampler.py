@@ -63,7 +63,7 @@ def test_every_dimension_alone_is_stratified(seed, dimension):
 
 
 def test_any_two_dimensions_of_film_and_first_scattering_are_stratified_together_but_for_a_factor_of_16():
-    """Of 2ᵐ points, every elementary interval of 2⁻ᵐ⁺⁴ holds 16: t ≤ 4, for each two of the ten."""
+    """Every elementary interval of 2⁻ᵐ⁺⁴ holds 16 of 2ᵐ points: t ≤ 4, for each two of the ten."""
     numbers = sets(Sampler(3, 1024), np.arange(2), 1024, 0, FILM + SCATTERING)
     for a in range(len(numbers)):
         for b in range(a):
@@ -215,7 +215,7 @@ def test_these_tests_find_white_noise_equal_pixels_and_points_that_lack_their_pa
 
 
 def test_the_error_of_film_and_lamp_together_falls_faster_than_noise(errors_of):
-    """What padding from the start can't do: a product of both is as smooth as each."""
+    """Padding from the start can't do it: a product of both is as smooth as each."""
 
     def product(u):
         return np.exp(u[0] * u[3]) * (1 + u[1] * u[4]) - expected

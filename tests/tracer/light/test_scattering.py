@@ -159,7 +159,7 @@ def test_beyond_the_critical_angle_all_light_is_reflected():
 
 @given(SEEDS, RATIOS)
 def test_what_is_reflected_and_what_is_refracted_are_all_the_light_in_both_ways(seed, ratio):
-    """What goes through is from Fresnel's amplitudes, which the code does not use; R is the same from behind (Stokes)."""
+    """Fresnel's amplitudes, which the code does not use, give what goes through; R is the same from behind (Stokes)."""
     direction, normal, cosine = incident(np.random.default_rng(seed), flattest=1e-3)
     through, total = refracted(direction, normal, ratio)
     reflectance = fresnel(cosine, ratio)

@@ -135,7 +135,7 @@ def test_a_soft_falloff_makes_a_disc_that_faces_the_point(make_lighting, off_by,
 @settings(max_examples=30)
 @given(seed=SEEDS, radius=st.floats(1e-6, 3.0), soft=st.booleans())
 def test_every_sample_looks_where_rays_run_into_the_lamp_and_carries_its_radiance(make_lighting, seed, radius, soft):
-    """The same light over the same density for all samples: they are spread evenly over the solid angle."""
+    """Light over density is one value for all samples: they are even over the solid angle."""
     assume(abs(radius - 2) > 1e-6)  # on the sphere itself, where a rounding decides what is inside
     rng = np.random.default_rng(seed)
     center = unit(rng) * 2
@@ -265,7 +265,7 @@ def test_lamps_of_next_to_no_size_are_seen_as_numbers_or_not_at_all(make_lightin
 
 
 NEAR = (0, 0, 2), (0, 0.3, 1), 7 / (16 * np.pi) / np.hypot(0.3, 1)
-"""Where a lamp of the power 7 stands, the normal of the surface at the origin, and what it gets."""
+"""The place of a lamp of the power 7, the normal of the surface at the origin, and its irradiance."""
 
 
 def test_one_percent_of_a_constant_is_told(make_lighting, off_by):

@@ -216,7 +216,7 @@ def test_colors_that_are_not_finite_nowhere_come_from_uv_that_is_not():
         assert np.isfinite(hits).all() and hits.min() >= 0.25
 
 
-def shown(*materials, pass_name="Diffuse Color", images=None, uv=None, vertex_colors=None):
+def pixels_of(*materials, pass_name="Diffuse Color", images=None, uv=None, vertex_colors=None):
     """(3,) of each material, None being none: what a pass shows at a triangle of it, with one UV and one color all over."""
     triangle = Mesh(
         np.array([[-9.0, -9, 0], [9, -9, 0], [0, 9, 0]]),
@@ -237,8 +237,8 @@ def shown(*materials, pass_name="Diffuse Color", images=None, uv=None, vertex_co
 
 def test_each_surface_has_the_color_of_its_material_and_black_where_its_material_has_none():
     materials = None, sum_of(diffuse=RED), sum_of(emission=GREEN)
-    np.testing.assert_allclose(shown(*materials), [PLAIN_COLOR.rgb, RED.rgb, (0, 0, 0)], rtol=1e-7)
-    np.testing.assert_allclose(shown(*materials, pass_name="Emission"), [(0, 0, 0), (0, 0, 0), GREEN.rgb], rtol=1e-7)
+    np.testing.assert_allclose(pixels_of(*materials), [PLAIN_COLOR.rgb, RED.rgb, (0, 0, 0)], rtol=1e-7)
+    np.testing.assert_allclose(pixels_of(*materials, pass_name="Emission"), [(0, 0, 0), (0, 0, 0), GREEN.rgb], rtol=1e-7)
 
 
 def test_images_and_vertex_colors_multiply_the_color_where_their_material_is_and_nowhere_else():
@@ -246,7 +246,7 @@ def test_images_and_vertex_colors_multiply_the_color_where_their_material_is_and
     textured = sum_of(diffuse=Color((1.0, 0.5, 0.0), image="ramp", closest=True, vertex=True))
     of_red = sum_of(diffuse=RED)
     for u, expected in ((0.1, (0.5, 0.125, 0)), (0.9, (0.25, 0.0625, 0))):
-        actual = shown(textured, of_red, images=images, uv=(u, 0.5), vertex_colors=(1.0, 0.5, 0.25))
+        actual = pixels_of(textured, of_red, images=images, uv=(u, 0.5), vertex_colors=(1.0, 0.5, 0.25))
         np.testing.assert_allclose(actual, [expected, RED.rgb], rtol=1e-6)
 
 

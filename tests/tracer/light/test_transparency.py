@@ -46,7 +46,7 @@ def test_a_shadow_is_black_where_shadow_rays_do_not_go_through(make_mesh, make_l
 
 @pytest.mark.parametrize("cycles", [(4, 2), (5, 2)])
 def test_beyond_the_limit_all_is_dark(make_mesh, make_lit, cycles):
-    """As Cycles counts: of three panes before a light the last must not be more than the limit, or one more before 5.0."""
+    """The last of three panes before a light must not be beyond the limit, as Cycles counts, or one more before 5.0."""
     things = [(square(make_mesh, 0.5 + number / 4), surface("transparent")) for number in range(3)]
     for most in (1, 2, 3):
         glowing = (square(make_mesh, 0.0), sum_of(emission=Color((1, 1, 1))))

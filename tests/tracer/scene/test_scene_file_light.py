@@ -57,7 +57,7 @@ matrices = st.lists(st.floats(-1e6, 1e6), min_size=12, max_size=12).map(
     lambda numbers: np.vstack([np.reshape(numbers, (3, 4)), (0.0, 0.0, 0.0, 1.0)])
 )
 links = st.none() | st.just(frozenset())
-made = st.none() | st.deferred(lambda: nodes)
+value_nodes = st.none() | st.deferred(lambda: nodes)
 common = {
     "name": names,
     "hidden_from": rays,
@@ -66,7 +66,7 @@ common = {
     "receivers": links,
     "blockers": links,
 }
-common |= {"emission": made}
+common |= {"emission": value_nodes}
 round_lamps = common | {"power": rgb, "radius": st.floats(0, 1e6), "soft_falloff": st.booleans()}
 lamps = st.one_of(
     st.builds(Sun, **common, towards=vectors.filter(any), irradiance=rgb, angle=st.floats(0, math.pi)),
@@ -113,7 +113,7 @@ shaders = st.recursive(
     ),
     max_leaves=4,
 )
-materials = st.builds(Material, surface=shaders, displacement=made) | st.builds(
+materials = st.builds(Material, surface=shaders, displacement=value_nodes) | st.builds(
     sum_of,
     **{name: st.none() | colors for name in ("diffuse", "emission", "mirror", "glass", "refraction")},
     ior=st.floats(1e-3, 1e3),

@@ -19,7 +19,7 @@ from ...jobs.plan import Plan
 from .. import own_picture
 from . import comparing
 
-_SAID = "said.txt"
+_OUTPUT = "output.txt"
 
 
 def shot(camera_object: bpy.types.Object, scene: bpy.types.Scene, name: str, frame: int) -> Job:
@@ -70,7 +70,7 @@ class BackgroundBatch:
             self.folder.mkdir(parents=True)
             copy = self._temporary / f"{stem}.blend"
             comparing.save_copy(copy)
-            self._process = comparing.start(copy, scene, shots, self._temporary / _SAID, Plan(self.folder, outputs))
+            self._process = comparing.start(copy, scene, shots, self._temporary / _OUTPUT, Plan(self.folder, outputs))
         except OSError as error:
             self._clear()
             raise InputError(f"{self.folder} can't be written ({error.strerror}): choose another folder") from error
@@ -93,7 +93,7 @@ class BackgroundBatch:
         if status is None:
             return None
         self._process.end()
-        output = (self._temporary / _SAID).read_text(encoding="utf-8", errors="replace")
+        output = (self._temporary / _OUTPUT).read_text(encoding="utf-8", errors="replace")
         self._clear()
         return status, comparing.failure(output, status) if status else ""
 

@@ -20,7 +20,7 @@ from .. import datablocks, dataset_cameras, picture
 from . import clipboard, file_menu
 from .camera_options import READING, ReadingOptions, WorldOptions
 
-_DROPPED = ".json;.txt;.bin;.xml;.yaml;.yml;.fspy;.sfm;.xmp;.out;.npy;.csv;.pbrt;.pov"
+_DROPPED = ".json;.txt;.bin;.xml;.yaml;.yml;.fspy;.sfm;.xmp;.out;.nvm;.npy;.npz;.csv;.log;.pbrt;.pov"
 _MOST_NOTES = 12
 
 
@@ -32,7 +32,7 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, file_menu.IntoScene, bpy.types.O
 
     directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
-    made: bpy.props.EnumProperty(
+    import_as: bpy.props.EnumProperty(
         name="As",
         description="What becomes of several cameras",
         items=[
@@ -80,7 +80,7 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, file_menu.IntoScene, bpy.types.O
                 kinds.add(formats.recognized(path))
                 more, more_notes = read(path, context.scene, self.distance, self)
                 read_cameras, notes = read_cameras + more, notes + more_notes
-            as_flight = self.made == "FLIGHT" or (self.made == "BY_FILE" and kinds == {"trajectories"})
+            as_flight = self.import_as == "FLIGHT" or (self.import_as == "BY_FILE" and kinds == {"trajectories"})
             folder = paths[0] if paths[0].is_dir() else paths[0].parent
             imported = import_cameras.import_cameras(
                 read_cameras,

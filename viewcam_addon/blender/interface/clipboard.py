@@ -129,7 +129,7 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
             return self.execute(context)
         try:
             camera_object = bpy.data.objects.get(self.camera) or datablocks.camera_in(context)
-            read = self._found(text, camera_object, datablocks.scene_of(camera_object))
+            read = self._cameras_of(text, camera_object, datablocks.scene_of(camera_object))
             if len(read) == 1 or self.named:
                 return self.execute(context)
             cls.names, cls.question = [camera.name for camera in read], f"The text has {len(read)} cameras: name one of them"
@@ -149,17 +149,17 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         type(self).question = ""  # it is answered, and the panel of the last operation shows the same properties
         text = self.text or _clipboard()
-        camera = formats.choose(self._found(text, camera_object, scene), self.named or None)
+        camera = formats.choose(self._cameras_of(text, camera_object, scene), self.named or None)
         before = _present(camera_object, scene)
         findings = paste(camera, before, camera_object, scene, self.set_size)
-        self.report({"INFO"}, f"Pasted {_said(camera.pinhole, before)} on {camera_object.name}")
+        self.report({"INFO"}, f"Pasted {_differences(camera.pinhole, before)} on {camera_object.name}")
         is_lying = camera.pinhole.up == _Y_UP != before.up == preferences.up_axis()
         if is_lying and self.axes == "as_is" and formats.recognized(text) != OWN:
             findings.append("In this text y is up, and in the scene it is not: the arrow beside Paste has Paste Upright")
         for finding in findings:  # after it, since the status bar shows what was reported last
             self.report({"WARNING"}, finding)
 
-    def _found(self, text: str, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[formats.Camera]:
+    def _cameras_of(self, text: str, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[formats.Camera]:
         """The cameras of a text, in the picture that it states, else in the scene's at 100 %.
 
         What stands where the text says nothing is the camera as it is.
@@ -279,7 +279,7 @@ def _present(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole
     return cameras.as_it_stands(camera_object, scene, in_use=False)
 
 
-def _said(pinhole: Pinhole, before: Pinhole) -> str:
+def _differences(pinhole: Pinhole, before: Pinhole) -> str:
     """The differences of the new camera, in words."""
     names = [name for key, name in _NAMES.items() if getattr(pinhole, key) != getattr(before, key)]
     names += ["distance"] if pinhole.distance != before.distance else []

@@ -38,7 +38,7 @@ from ...tracer.scene.film import LEVELS, SAMPLES, seeds
 from .. import camera as cameras
 from .. import datablocks, preferences
 
-_RESULT, _SAID, _REPORT = "result.json", "said.txt", "report"
+_RESULT, _OUTPUT, _REPORT = "result.json", "output.txt", "report"
 _PICTURES = {"cycles": SIDES["test"], "tracer": SIDES["reference"], "difference": SIDES["difference"]}
 _COMPRESSED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 
@@ -145,13 +145,13 @@ class RunningComparison:
         difference = str(self.folder / _REPORT / _PICTURES["difference"])
         command = f"viewcam {dataclasses.replace(job, blend=copy).check_words()}"
         files = {"report": report, "difference": difference, "sides": report, "command": command}
-        return start(copy, scene, [job], self.folder / _SAID, files=files)
+        return start(copy, scene, [job], self.folder / _OUTPUT, files=files)
 
     def progress(self) -> tuple[float, str]:
         """The progress, from 0 to 1 in steps of unequal length, and the name of the step."""
         done, words = _step({"name": "rendering", "number": 1}, self._pictures)
         traced, taken, expected, left = 0.0, 0, 1, ""
-        for event in child_process.events_in(self._said().splitlines()):
+        for event in child_process.events_in(self._output().splitlines()):
             if event["event"] == "step":
                 done, words = _step(event, self._pictures)
             elif event["event"] == "progress":
@@ -197,7 +197,7 @@ class RunningComparison:
         of = (self._what, self._camera, self._seen)
         result = _read(self.folder / _RESULT)
         if "answer" not in result:
-            return Outcome(*of, None, failure(self._said(), status))
+            return Outcome(*of, None, failure(self._output(), status))
         folder, temporary = self.folder / _REPORT, self.folder
         if self._keep_in:
             try:
@@ -215,8 +215,8 @@ class RunningComparison:
         )
         return Outcome(*of, *verdict, folder, drawn.get("colors", ""), drawn.get("scale", {}), temporary)
 
-    def _said(self) -> str:
-        return (self.folder / _SAID).read_text(encoding="utf-8", errors="replace")
+    def _output(self) -> str:
+        return (self.folder / _OUTPUT).read_text(encoding="utf-8", errors="replace")
 
 
 def _step(event: Mapping[str, Any], pictures: int) -> tuple[int, str]:

@@ -44,7 +44,8 @@ def moved(pinhole: Pinhole, kind: str, amount: tuple[float, float]) -> Pinhole:
     reach = math.dist(pinhole.eye, pinhole.look_at)
     dollied = moves.dollied(pinhole, reach + amount[0]) if amount[0] else pinhole
     if kind == DOLLY_ZOOM:
-        dollied = replace(dollied, distance=tuple(each * (reach + amount[0]) / reach for each in pinhole.distance))
+        d_x, d_y = (each * (reach + amount[0]) / reach for each in pinhole.distance)
+        dollied = replace(dollied, distance=(d_x, d_y))
     return dollied
 
 
@@ -69,7 +70,8 @@ class Drag:
         self.start = stated or cameras.as_it_stands(camera_object, scene, in_use=False)
         self._before = kept.state(camera_object)
         self._camera, self._scene, self._kind = camera_object, scene, kind
-        self._mouse, self.amount, self.text, self.findings = (0.0, 0.0), (0.0, 0.0), "", []
+        self._mouse, self.amount, self.text = (0.0, 0.0), (0.0, 0.0), ""
+        self.findings: list[str] = []
 
     def move(self, right: float, upwards: float, precise: bool = False) -> None:
         """The mouse has gone so many pixels."""

@@ -120,7 +120,7 @@ class VIEWCAM_OT_write_labels(StartsForCamera, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.window_manager.virtual_pinhole_labels
-        return background.begin(self, lambda: Writing(self.one(context), context.scene, settings))
+        return background.begin(self, lambda: Writing(self.required_camera(context), context.scene, settings))
 
 
 class VIEWCAM_OT_cancel_labels(Cancels, bpy.types.Operator):

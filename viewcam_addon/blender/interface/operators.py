@@ -28,7 +28,7 @@ class NamesCamera:
         """The object that is meant, if there is one."""
         return bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
 
-    def one(self, context: bpy.types.Context) -> bpy.types.Object:
+    def required_camera(self, context: bpy.types.Context) -> bpy.types.Object:
         """The object that is meant, or InputError."""
         result = self.target_camera(context)
         if result is None:

@@ -48,13 +48,13 @@ def _on_view(settings: "ProofSettings", context: bpy.types.Context) -> None:
 class ProofSettings(bpy.types.PropertyGroup):
     """`window_manager.virtual_pinhole_proof`: how the next comparison is made."""
 
-    said: bpy.props.StringProperty(options={"HIDDEN"})
+    chosen_level: bpy.props.StringProperty(options={"HIDDEN"})
     level: bpy.props.EnumProperty(
         name="Level",
         description="How much of the scene is compared",
         items=LEVELS,
-        get=lambda group: _NAMES.index(group.said or preferences.get().default_level),
-        set=lambda group, number: setattr(group, "said", _NAMES[number]),
+        get=lambda group: _NAMES.index(group.chosen_level or preferences.get().default_level),
+        set=lambda group, number: setattr(group, "chosen_level", _NAMES[number]),
     )
     find: bpy.props.EnumProperty(
         name="Find",
@@ -139,7 +139,7 @@ class VIEWCAM_OT_compare_with_cycles(StartsForCamera, bpy.types.Operator):
             settings = context.window_manager.virtual_pinhole_proof
             folder = Path(bpy.path.abspath(settings.folder)) if settings.folder else None
             asked = settings.level.lower(), settings.find, settings.clay, folder
-            background.running = RunningComparison(self.one(context), context.scene, *asked)
+            background.running = RunningComparison(self.required_camera(context), context.scene, *asked)
         except InputError as error:
             self.report({"ERROR"}, datablocks.sentence(error))
             return False

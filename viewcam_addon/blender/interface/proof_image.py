@@ -38,7 +38,7 @@ _MARGIN, _LETTERS, _STRIP = 10, 12, (240, 12)  # points: around a label, its siz
 _SECONDS = 0.3  # from a picture to its packing, and from a new editor to its size
 _BELOW = 64  # points below the picture, for the legend
 
-_handlers = []
+_handlers: list[object] = []
 _loaded: Outcome | None = None
 
 
@@ -204,7 +204,7 @@ def _draw_labels() -> None:
 
 def _draw_legend(x: float, y: float, scale: float) -> None:
     """The strip of the difference's colors, with the ends of its scale below."""
-    legend = _loaded.scale
+    legend = _loaded.scale if _loaded else {}
     if not legend:
         return
     colors = (pictures.signed_scale() if legend["kind"] == "signed" else pictures.color_scale()) / 255.0

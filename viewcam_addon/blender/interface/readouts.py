@@ -66,7 +66,8 @@ def certain_up(stated: Pinhole) -> Triple:
     Where a coordinate axis is v but for the rounding of a float32 matrix, that axis.
     """
     v = stated.axes()[1]
-    axis = tuple(float(round(component)) for component in v)
+    x, y, z = (float(round(component)) for component in v)
+    axis = x, y, z
     return axis if max(abs(a - b) for a, b in zip(axis, v, strict=True)) <= findings.LARGEST_TURN else v
 
 
@@ -78,7 +79,8 @@ def vector(numbers: Triple) -> str:
 def rounded(numbers: Triple) -> Triple:
     """Numbers as they are shown: those that are less than a float32 step of the largest are 0."""
     step = 2.0**-23 * max(map(abs, numbers))
-    return tuple(number if abs(number) > step else 0.0 for number in numbers)
+    x, y, z = (number if abs(number) > step else 0.0 for number in numbers)
+    return x, y, z
 
 
 def distance_warning(stated: Pinhole) -> str | None:

@@ -33,7 +33,8 @@ _FRAGMENT = """
 vec3 displayed(ivec3 at) { return texelFetch(shades, ivec2(at.g * COLORS + at.r, at.b), 0).rgb; }
 void main() {
     vec4 here = texelFetch(light, ivec2(gl_FragCoord.xy), 0);
-    vec3 at = clamp(log2(max(here.rgb, 0.0) / LOWEST + 1.0) / STOPS, 0.0, 1.0) * float(COLORS - 1);
+    vec3 straight = here.a > 0.0 ? here.rgb / here.a : vec3(0.0);
+    vec3 at = clamp(log2(max(straight, 0.0) / LOWEST + 1.0) / STOPS, 0.0, 1.0) * float(COLORS - 1);
     ivec3 low = min(ivec3(at), COLORS - 2);
     vec3 share = at - vec3(low), sum = vec3(0.0);
     for (int corner = 0; corner < 8; corner++) {
@@ -57,7 +58,7 @@ class _Swipe:
         self.live, self.at, self.is_held, self.message = LiveView(), 0.5, False, ""
         self._shades = shades(scene)
         self._view_transform = _view_transform(scene)
-        self._shown: tuple | None = None  # the picture that is on the graphics card, and where
+        self._drawn: tuple | None = None  # the picture that is on the graphics card, and where
         self._words = ""  # of it
 
     def is_open(self) -> bool:
@@ -89,24 +90,24 @@ class _Swipe:
             self.message = message
             self.area.tag_redraw()
         if self._view_transform != (now := _view_transform(context.scene)):
-            self._view_transform, self._shades, self._shown = now, shades(context.scene), None
+            self._view_transform, self._shades, self._drawn = now, shades(context.scene), None
 
     def take_picture(self) -> None:
         """Bring the latest picture to the graphics card, between two drawings: within one, the rest of it would be lost."""
-        live, before = self.live, (self._shown, self._words)
+        live, before = self.live, (self._drawn, self._words)
         live.drawn = live.number  # before the picture, which may change meanwhile
         picture, self._words = live.picture, live.words()
-        if picture is not None and (self._shown is None or self._shown[0] is not picture):
-            self._shown = picture, _on_the_graphics_card(picture, self._shades)
-        if self._shown is not before[0] or self._words != before[1]:
+        if picture is not None and (self._drawn is None or self._drawn[0] is not picture):
+            self._drawn = picture, _on_the_graphics_card(picture, self._shades)
+        if self._drawn is not before[0] or self._words != before[1]:
             self.area.tag_redraw()
 
     def draw(self) -> None:
         """The picture left of the line, the line, and the two names, in the context's region."""
         context, line = bpy.context, self.line()
         scale, height = context.preferences.system.ui_scale, self.region.height
-        if self._shown and not self.message:
-            self._draw_picture(self._shown[1], line, height)
+        if self._drawn and not self.message:
+            self._draw_picture(self._drawn[1], line, height)
         proof_image.fill(line - scale, 0, 2 * scale, height, (0.0, 0.0, 0.0, 0.6))
         proof_image.fill(line - scale / 2, 0, scale, height, (1.0, 1.0, 1.0, 0.9))
         words = f"Reference: {self.message or self._words}"
@@ -118,6 +119,9 @@ class _Swipe:
         import gpu
         from gpu_extras.batch import batch_for_shader
 
+        # What the viewport shows must not be seen through what the reference does not.
+        gradients = bpy.context.preferences.themes[0].view_3d.space.gradients
+        proof_image.fill(0, 0, line, height, (*gradients.high_gradient, 1.0))
         across = line / self.region.width
         shader = gpu.shader.from_builtin("IMAGE")
         corners = [(0, 0), (line, 0), (line, height), (0, height)]
@@ -188,8 +192,8 @@ def _name(context: bpy.types.Context) -> str:
     shading, settings = context.space_data.shading, context.scene.render
     if shading.type != "RENDERED":
         return shading.bl_rna.properties["type"].enum_items[shading.type].name
-    found = settings.bl_rna.properties["engine"].enum_items.get(settings.engine)
-    return found.name if found else settings.engine
+    item = settings.bl_rna.properties["engine"].enum_items.get(settings.engine)
+    return item.name if item else settings.engine
 
 
 _running: _Swipe | None = None

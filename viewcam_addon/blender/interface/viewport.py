@@ -47,19 +47,18 @@ def pinhole_of(area: bpy.types.Area, like: Pinhole, scene: bpy.types.Scene) -> P
     if view.view_perspective == "ORTHO":
         raise InputError("the viewport is orthographic, no pinhole: switch it to perspective")
     _, v, w = rotation.from_quaternion(view.view_rotation).T
-    look_at = _pivot(space)
-    eye = look_at + view.view_distance * w
-    look_at, eye = tuple(look_at.tolist()), tuple(eye.tolist())
+    pivot = _pivot(space)
+    look_at, eye = tuple(pivot.tolist()), tuple((pivot + view.view_distance * w).tolist())
     region = [region for region in area.regions if region.type == "WINDOW"][-1]  # in a quad view the last one is the user's
     sides = zip((like.width, like.height), like.distance, (region.width, region.height), strict=True)
     largest = max(region.width, region.height)
-    zoom = min(side / distance * space.lens / _SENSOR * largest / camera_object for side, distance, camera_object in sides)
+    zoom = min(side / distance * space.lens / _SENSOR * largest / across for side, distance, across in sides)
     return replace(
         like,
         eye=eye,
         look_at=look_at,
         up=cameras.simplest_up(eye, look_at, v),
-        distance=tuple(zoom * distance for distance in like.distance),
+        distance=(zoom * like.distance[0], zoom * like.distance[1]),
     )
 
 

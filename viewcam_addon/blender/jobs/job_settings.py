@@ -95,7 +95,7 @@ class JobSettings:
         The frame comes first: a camera's values follow its animation there in the picture that they are set for.
         """
         self._go_to(*(self._time_of_file if shot.frame is None else (shot.frame, 0.0)))
-        wanted = self._of_file | dict(self._said(shot))
+        wanted = self._of_file | dict(self._values(shot))
         changed = [(owner, name) for (owner, name), value in wanted.items() if getattr(owner, name) != value]
         for owner, name in changed:
             setattr(owner, name, wanted[owner, name])
@@ -135,7 +135,7 @@ class JobSettings:
             self._scene.frame_set(frame, subframe=subframe)
             persistent_data.drop(self._scene)
 
-    def _said(self, shot: Job) -> Iterator[tuple[tuple[bpy.types.bpy_struct, str], object]]:
+    def _values(self, shot: Job) -> Iterator[tuple[tuple[bpy.types.bpy_struct, str], object]]:
         """The values that a shot sets, by owner and name of the property."""
         scene, render = self._scene, self._scene.render
         engine = self.engine_of(shot)

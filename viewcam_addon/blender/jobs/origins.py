@@ -219,7 +219,7 @@ def _caches_of_unbaked() -> set[tuple[str, int]]:
 
 def _is_cache_of(path: Path, caches: set[tuple[str, int]]) -> bool:
     match = _POINT_CACHE.fullmatch(path.name)
-    return bool(match) and (match[1], int(match[2])) in caches
+    return match is not None and (match[1], int(match[2])) in caches
 
 
 def _imports() -> Iterator[tuple[str, str]]:
@@ -301,8 +301,8 @@ def _colors() -> tuple[list[Path], Path]:
     except OSError:
         text = ""
     stated = _COLORS_FOLDERS.search(text)
-    folders = re.split(r"[:\n]", stated[1]) if stated else []
-    folders = [config.parent / os.path.expandvars(folder.strip(" \t-\"'")) for folder in ["", *folders]]
+    names_of_folders = re.split(r"[:\n]", stated[1]) if stated else []
+    folders = [config.parent / os.path.expandvars(folder.strip(" \t-\"'")) for folder in ["", *names_of_folders]]
     names = [os.path.expandvars("".join(match)) for match in _COLORS_FILE.findall(text)]
     tables = (folder / name for name in dict.fromkeys(names) for folder in dict.fromkeys(folders))
     return [config, *(table for table in tables if table.is_file())], config.parent

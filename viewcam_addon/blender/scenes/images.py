@@ -90,10 +90,10 @@ def image_of(picture: Picture, name: str, overrides: Overrides, packed: bool = T
     All renders of `overrides.lasting` share one. A Cycles that keeps its data tells images by their address, and shows the
     pixels of one that is gone where another one lies at its address.
     """
-    return overrides.lasting.shared(_made, picture, name, packed)
+    return overrides.lasting.shared(_new_image, picture, name, packed)
 
 
-def _made(overrides: Overrides, picture: Picture, name: str, packed: bool) -> bpy.types.Image:
+def _new_image(overrides: Overrides, picture: Picture, name: str, packed: bool) -> bpy.types.Image:
     height, width, channels = picture.shape
     image = bpy.data.images.new(
         name, width, height, alpha=channels == 4, float_buffer=not picture.srgb, is_data=not picture.srgb

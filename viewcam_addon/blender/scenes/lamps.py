@@ -219,8 +219,8 @@ def _strength(name: str, light: bpy.types.Light, emission: RGB, ledger: Ledger) 
     factor = light.energy * 2.0 ** getattr(light, "exposure", 0.0)
     strength = _times(tuple(light.color), factor)
     if getattr(light, "use_temperature", False):
-        strength = tuple(a * b for a, b in zip(strength, light.temperature_color, strict=True))
-    strength = tuple(a * b for a, b in zip(strength, emission, strict=True))
+        strength = _product(strength, light.temperature_color)
+    strength = _product(strength, emission)
     possible = shaders.possible(strength)
     if possible is None:
         ledger.note(name, "skipped", f"a light of the strength {', '.join(f'{value:g}' for value in strength)}")
@@ -265,5 +265,11 @@ def _note(name: str, light: bpy.types.Light, bounces: Bounces, ledger: Ledger) -
     ledger.set_for_cycles(settings, "is_caustics_light", False, stands_in=False)
 
 
+def _product(first: RGB, second: RGB) -> RGB:
+    red, green, blue = (a * b for a, b in zip(first, second, strict=True))
+    return red, green, blue
+
+
 def _times(rgb: RGB, factor: float) -> RGB:
-    return tuple(value * factor for value in rgb)
+    red, green, blue = rgb
+    return red * factor, green * factor, blue * factor

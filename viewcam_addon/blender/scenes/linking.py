@@ -81,13 +81,13 @@ def is_linked(block: bpy.types.Object) -> bool:
 def among(lights: Iterable[_Light], names: set[str]) -> tuple[_Light, ...]:
     """Lights whose receivers and blockers are without those that are no objects of these names; all of them are None again."""
 
-    def some(linked: _Names) -> _Names:
+    def remaining(linked: _Names) -> _Names:
         return None if linked is None or names <= linked else linked & names
 
     return tuple(
         light
         if light.receivers is None and light.blockers is None
-        else replace(light, receivers=some(light.receivers), blockers=some(light.blockers))
+        else replace(light, receivers=remaining(light.receivers), blockers=remaining(light.blockers))
         for light in lights
     )
 

@@ -84,10 +84,10 @@ def stand_in(overrides: Overrides, material: bpy.types.Material, reading: shader
     _add_surface(adder, output, reading)
 
 
-def _texts_of(made: Iterable[Node], overrides: Overrides) -> dict[str, bpy.types.Text]:
+def _texts_of(shader_nodes: Iterable[Node], overrides: Overrides) -> dict[str, bpy.types.Text]:
     """The texts that nodes ask for, in Blender, until the overrides end."""
     result = {}
-    for text in dict.fromkeys(node["text"] for node in made if "text" in KINDS[node.type].inputs):
+    for text in dict.fromkeys(node["text"] for node in shader_nodes if "text" in KINDS[node.type].inputs):
         result[text] = bpy.data.texts.new("IES")
         result[text].write(text)
         overrides.afterwards(bpy.data.batch_remove, [result[text]])
@@ -96,14 +96,14 @@ def _texts_of(made: Iterable[Node], overrides: Overrides) -> dict[str, bpy.types
 
 def _add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Reading) -> None:
     """Add the nodes that shaders.read would read so, and link them to a material's output."""
-    made = reading.material
-    if made.displacement is not None:
+    material = reading.material
+    if material.displacement is not None:
         raised = adder.add("ShaderNodeDisplacement", Midlevel=0.0, Scale=1.0)
         raised.space = "WORLD"
-        _color(adder, raised.inputs["Height"], made.displacement, reading)
+        _color(adder, raised.inputs["Height"], material.displacement, reading)
         adder.link(raised.outputs[0], output.inputs["Displacement"])
     # Without any light Cycles would draw nothing: not even the depth.
-    surface = made.surface or _node("diffuse", color=Color((0.0, 0.0, 0.0)))
+    surface = material.surface or _node("diffuse", color=Color((0.0, 0.0, 0.0)))
     adder.link(_shader(adder, surface, reading).outputs[0], output.inputs["Surface"])
 
 
@@ -155,8 +155,8 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             elif KINDS[node.type].inputs[name] not in (UV, GENERATED, POSITION, *OWN) or name in dict(node.inputs):
                 _color(adder, socket, node[name], reading)
     word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
-    found = [socket for socket in added.outputs if row.outputs.get(socket.identifier, "") == word]
-    return next((socket for socket in found if socket.enabled), found[0])
+    sockets = [socket for socket in added.outputs if row.outputs.get(socket.identifier, "") == word]
+    return next((socket for socket in sockets if socket.enabled), sockets[0])
 
 
 def _choose(node: bpy.types.Node, name: str, word: str) -> None:

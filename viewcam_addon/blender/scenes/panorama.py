@@ -5,6 +5,7 @@ One sample stands in the middle of each pixel of an equirectangular picture, who
 """
 
 import math
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -42,7 +43,7 @@ def main(library: str, name: str, out: str, width: str, frame: str, subframe: st
     skies = [node for node in nodes.all_of(tree) if _has_sun(node)]
     for sky in skies:
         sky.sun_disc = False
-    arrays = {}
+    arrays: dict[str, np.ndarray] = {}
     for side in ("seen", "light"):
         if side == "light" and not blind_to_camera(tree):
             arrays |= {"light": arrays["seen"], "light_suns": arrays["seen_suns"]}
@@ -92,7 +93,7 @@ class _Eye:
         render.resolution_percentage = 100
         file = render.image_settings
         file.file_format, file.color_mode, file.color_depth, file.exr_codec = "OPEN_EXR", "RGB", "32", "NONE"
-        render.filepath, render.use_file_extension = versions.literal_path(path), False
+        render.filepath, render.use_file_extension = versions.literal_path(Path(path)), False
 
     def around(self, width: int) -> Pixels:
         """(width / 2, width, 3) of all directions, its middle along x, rows from the bottom."""

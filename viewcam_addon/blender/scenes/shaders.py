@@ -166,43 +166,43 @@ class Tree:
         if not isinstance(source, Output) or source.node.type in _VOLUMES:
             return None
         if source.socket.type != "SHADER":
-            return Node("emission", (("color", self._shown(of)),))
+            return Node("emission", (("color", self._emission(of)),))
         kind = _AS.get(source.node.type, source.node.type)
-        found = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == kind), None)
-        if found is None:
+        row = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == kind), None)
+        if row is None:
             self._reason(source, "is not modeled")
             name = next((name for name in ("Base Color", "Color") if name in source.node.inputs), None)
             return Node("diffuse", (("color", self._color(source, name) if name else self.viewport),))
-        ours, shader = found
+        ours, shader = row
         for name, neutral in shader.neutral.items():
             if _counts(source, ours, name):
                 self._want(source, name, neutral)
         known = KINDS[ours].inputs
-        given: dict[str, object] = {}
+        inputs: dict[str, object] = {}
         for name, theirs in shader.inputs.items():
             if not _counts(source, ours, theirs) and constant_color(source, theirs) is None:
                 continue
-            if known[name] is TANGENT and not Node(ours, tuple(given.items())).is_stretched:
+            if known[name] is TANGENT and not Node(ours, tuple(inputs.items())).is_stretched:
                 continue
             if known[name] in OWN:
-                given |= self._normal(source, name, theirs)
+                inputs |= self._normal(source, name, theirs)
             elif known[name] is not None and source.input(theirs) is not None:
-                given[name] = self._input(source, theirs, known[name] if isinstance(known[name], float) else None)
-        if "rotation" in given and (constant_number(source, "Anisotropy") or 0.0) < 0.0:
-            given["rotation"] = _quarter_further(given["rotation"])
+                inputs[name] = self._input(source, theirs, known[name] if isinstance(known[name], float) else None)
+        if "rotation" in inputs and (constant_number(source, "Anisotropy") or 0.0) < 0.0:
+            inputs["rotation"] = _quarter_further(inputs["rotation"])
         for name in (name for name, default in known.items() if default is None):
             if (
                 ours == "add"
-                or given["factor"].varies
-                or given["factor"].rgb[0] not in {"first": (1.0,), "second": (0.0,)}[name]
+                or inputs["factor"].varies
+                or inputs["factor"].rgb[0] not in {"first": (1.0,), "second": (0.0,)}[name]
             ):
-                given[name] = self.surface(source.input(shader.inputs[name]))
-        return Node(ours, tuple((given | self._words(source, ours)).items()))
+                inputs[name] = self.surface(source.input(shader.inputs[name]))
+        return Node(ours, tuple((inputs | self._words(source, ours)).items()))
 
-    def _shown(self, of: Input) -> Color | Node:
+    def _emission(self, of: Input) -> Color | Node:
         """The emission of a surface whose shader is a color or a number."""
-        made = self._value_input(of, None)
-        return made if isinstance(made, Color | Node) else Color(made) if made and possible(made) else self.viewport
+        value = self._value_input(of, None)
+        return value if isinstance(value, Color | Node) else Color(value) if value and possible(value) else self.viewport
 
     def _color(self, output: Output, name: str | int) -> Color:
         rgb = constant_color(output, name)
@@ -305,10 +305,10 @@ class Tree:
                 height = _node("math", operation=operation, a=height, b=by)
         if not isinstance(height, Node):  # an image as it is, or the same everywhere
             height = _node("math", operation="multiply", a=height, b=1.0)
-        given = self._normal(output, "normal", "Normal").get("normal")
-        if given is None and output.node.space == "WORLD":
+        normal = self._normal(output, "normal", "Normal").get("normal")
+        if normal is None and output.node.space == "WORLD":
             return height
-        way = given or _node("geometry", output="normal")
+        way = normal or _node("geometry", output="normal")
         if output.node.space == "OBJECT":
             inwards = _node("vector_transform", vector=way, kind="normal", **{"from": "world", "to": "object"})
             way = _node("vector_transform", vector=inwards, **{"from": "object", "to": "world"})
@@ -335,8 +335,8 @@ class Tree:
         source = of and nodes.source(of)
         if isinstance(source, Output) and source.node.type == "BUMP" and _constant(source.input("Height")) is not None:
             return self._normal(source, name, "Normal")
-        made = self._value(source) if isinstance(source, Output) else None
-        return {name: made} if isinstance(made, Node) else {}
+        value = self._value(source) if isinstance(source, Output) else None
+        return {name: value} if isinstance(value, Node) else {}
 
     def _words(self, output: Output, ours: str) -> dict[str, str]:
         result = {}
@@ -354,15 +354,15 @@ class Tree:
         value = None if otherwise is None else constant_number(output, name)
         if value is None:
             source = nodes.source(output.input(name))
-            told, self.reading.reasons = self.reading.reasons, []
+            before, self.reading.reasons = self.reading.reasons, []
             result: Color | Node | None = self._color(output, name)
             if self.reading.reasons and isinstance(source, Output):
                 self.reading.reasons = []
                 result = self._value(source)
-            why, self.reading.reasons = self.reading.reasons, told
+            why, self.reading.reasons = self.reading.reasons, before
             if result is not None and not why:
                 return result
-            told += [reason for reason in why if reason not in told]
+            before += [reason for reason in why if reason not in before]
             return self.viewport if otherwise is None else Color((otherwise,) * 3)
         if isinstance(name, str) and name.endswith("Rotation"):
             value %= 1.0
@@ -381,11 +381,11 @@ class Tree:
             return None
         self._deep += 1
         try:
-            return self._made(output)
+            return self._value_of_node(output)
         finally:
             self._deep -= 1
 
-    def _made(self, output: Output) -> Color | Node | None:
+    def _value_of_node(self, output: Output) -> Color | Node | None:
         node = output.node
         if self._is_beside and {node.type, (node.type, output.socket.name)} & _FIXED:
             self._reason(output, "makes a height of what it says here alone")
@@ -406,31 +406,31 @@ class Tree:
             return self._ramp(output)
         if node.type == "NORMAL":
             return self._along(output)
-        found = value_nodes.row_of(output)
-        if found is None:
+        entry = value_nodes.row_of(output)
+        if entry is None:
             self._reason(output, "is not modeled")
             return None
-        told = len(self.reading.reasons)
-        ours, row = found
+        reasons_before = len(self.reading.reasons)
+        ours, row = entry
         words = value_nodes.given_words(output, ours, row)
         why = words if isinstance(words, str) else self._departure(output, ours)
         if why:
             self._reason(output, why)
             return None
-        given = dict(words)
+        inputs = dict(words)
         if "image" in KINDS[ours].inputs:
             if not self._shows(output):
                 return None
             image = node.image.original
-            given["image"] = Color(_WHITE, image.name_full)
+            inputs["image"] = Color(_WHITE, image.name_full)
             if ours == "image" and node.outputs["Alpha"].is_linked:
                 if why := images.alpha_obstacle(image):
                     self._reason(output, why)
                     return None
-                given["straight"] = images.is_multiplied(image)
+                inputs["straight"] = images.is_multiplied(image)
                 self.reading.alphas.add(image.name_full)
         if "table" in KINDS[ours].inputs:
-            given |= self._curves(output)
+            inputs |= self._curves(output)
         if ours == "ies":
             text = value_nodes.ies_text(node)
             try:
@@ -438,15 +438,15 @@ class Tree:
             except InputError as error:
                 self._reason(output, f"shows what {str(error).partition(': ')[0].removeprefix('it ')}")
                 return None
-            given["text"] = text
+            inputs["text"] = text
         for name, theirs in row.inputs.items():
             known = KINDS[ours].inputs[name]
             if known in OWN:
-                given |= self._normal(output, name, theirs)
+                inputs |= self._normal(output, name, theirs)
                 continue
             socket = value_nodes.input_of(node, theirs)
             if socket is None:
-                given[name] = (row.before[name],) * 3
+                inputs[name] = (row.before[name],) * 3
                 continue
             is_beside, self._is_beside = self._is_beside, self._is_beside or name == "height"
             read = self._value_input(Input(socket, output.groups), known)
@@ -454,13 +454,13 @@ class Tree:
             if read is None:
                 return None
             if known not in (UV, GENERATED, POSITION, INCOMING) or isinstance(read, Color | Node):
-                given[name] = read
+                inputs[name] = read
             elif (of_itself := self._of_itself(output, known)) is not None:
-                given[name] = of_itself
-            elif len(self.reading.reasons) > told:
+                inputs[name] = of_itself
+            elif len(self.reading.reasons) > reasons_before:
                 return None
         try:
-            result = Node(ours, tuple(given.items()))
+            result = Node(ours, tuple(inputs.items()))
         except InputError:
             self._reason(output, f"is computed by more than {MOST_NODES} others")
             return None
@@ -507,11 +507,11 @@ class Tree:
         way = _node("light_path", output="ray_length")
         squared = _node("math", operation="multiply", a=way, b=way)
         by: Node | None = {"Linear": way, "Constant": squared}.get(output.socket.name)
-        made = strength if by is None else _node("math", operation="multiply", a=strength, b=by)
+        value = strength if by is None else _node("math", operation="multiply", a=strength, b=by)
         if smooth != _ZERO:
             slower = _node("math", operation="add", a=squared, b=_node("math", operation="maximum", a=smooth, b=0.0))
-            made = _node("math", operation="multiply", a=made, b=_node("math", operation="divide", a=squared, b=slower))
-        return made if isinstance(made, Color | Node) else _node("math", operation="add", a=made, b=0.0)
+            value = _node("math", operation="multiply", a=value, b=_node("math", operation="divide", a=squared, b=slower))
+        return value if isinstance(value, Color | Node) else _node("math", operation="add", a=value, b=0.0)
 
     def _curves(self, output: Output) -> dict[str, object]:
         """The table that Cycles makes of a node's curves."""

@@ -22,9 +22,9 @@ def row_of(output: Output) -> tuple[str, BlenderNode] | None:
 
 def given_words(output: Output, ours: str, row: BlenderNode) -> dict[str, object] | str:
     """The words and flags of a node; or, where one is not modeled, that clause."""
-    found: dict[str, object] = {name: bool(getattr(output.node, theirs)) for name, theirs in row.flags.items()}
-    found |= {name: getattr(output.node, theirs) or row.unnamed for name, theirs in row.names.items()}
-    found |= {name: (float(getattr(output.node, theirs)),) * 3 for name, theirs in row.numbers.items()}
+    words: dict[str, object] = {name: bool(getattr(output.node, theirs)) for name, theirs in row.flags.items()}
+    words |= {name: getattr(output.node, theirs) or row.unnamed for name, theirs in row.names.items()}
+    words |= {name: (float(getattr(output.node, theirs)),) * 3 for name, theirs in row.numbers.items()}
     for name, theirs in row.words.items():
         word = getattr(output.node, theirs, None)
         if word is None:  # an older version, in which it is what is the default here
@@ -35,9 +35,9 @@ def given_words(output: Output, ours: str, row: BlenderNode) -> dict[str, object
         known = next((each for each in choices if row.word(each) == word), None)
         if known is None:
             return f"has the {name} {word.lower()}"
-        found[name] = known
+        words[name] = known
     word = row.outputs[output.socket.identifier]
-    return found if word is None else found | {"output": word}
+    return words if word is None else words | {"output": word}
 
 
 _TABLE = 256  # Cycles looks curves up in a table of one more

@@ -66,8 +66,8 @@ def world_of(
         ledger.call_for_cycles(original, _make_constant, radiance)
     if reasons:
         return World(radiance, hidden_from), ()
-    seen = None if (radiance, wrapped) == (backdrop, wrapped_there) else _made(backdrop, wrapped_there, pictures)
-    return replace(_made(radiance, wrapped, pictures), hidden_from=hidden_from, backdrop=seen), ()
+    seen = None if (radiance, wrapped) == (backdrop, wrapped_there) else _world(backdrop, wrapped_there, pictures)
+    return replace(_world(radiance, wrapped, pictures), hidden_from=hidden_from, backdrop=seen), ()
 
 
 def _rendered(
@@ -106,7 +106,7 @@ def _rendered(
     return result
 
 
-def _made(radiance: RGB, wrapped: "_Wrapped | None", pictures: dict[str, Picture] | None) -> World:
+def _world(radiance: RGB, wrapped: "_Wrapped | None", pictures: dict[str, Picture] | None) -> World:
     if wrapped is None:
         return World(radiance)
     if pictures is not None and wrapped.image.name_full not in pictures:

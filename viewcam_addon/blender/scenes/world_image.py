@@ -75,12 +75,12 @@ def rendered(world: bpy.types.World, scene: bpy.types.Scene) -> Rendered | None:
         try:
             another_blender.call("blender.scenes.panorama", [*arguments, repr(scene.frame_subframe)], _TIMEOUT)
             with np.load(out) as arrays:
-                return _made(world.name, {name: arrays[name] for name in arrays.files})
+                return _rendered(world.name, {name: arrays[name] for name in arrays.files})
         except (OSError, subprocess.TimeoutExpired):
             return None
 
 
-def _made(name: str, arrays: dict[str, NDArray]) -> Rendered:
+def _rendered(name: str, arrays: dict[str, NDArray]) -> Rendered:
     pictures = {f"{name} (rendered)": _picture(arrays["light"])}
     backdrop = None
     if arrays["seen"] is not arrays["light"] and not np.array_equal(arrays["seen"], arrays["light"]):

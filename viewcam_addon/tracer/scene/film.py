@@ -9,7 +9,7 @@ from . import values
 FILTERS = ("BOX", "BLACKMAN_HARRIS", "GAUSSIAN")
 
 LEVELS = ("geometry", "direct", "path")
-"""How much is modeled, the least first."""
+"""Amounts of what is modeled, the least first."""
 
 SAMPLES = 64
 """Samples a pixel, at the levels of light, where nobody says how many."""

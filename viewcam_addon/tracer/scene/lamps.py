@@ -27,7 +27,7 @@ RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 """The kinds of rays that things may be hidden from; lamps have no shadow."""
 
 MOST_LINKS = {"receivers": 64, "blockers": 26}
-"""How many different sets of objects the lights of a scene may have: bits of the core's numbers. Blender's own limit is 64."""
+"""The most different sets of objects that lights may have: bits of the core's numbers. Blender's own limit is 64."""
 
 LEAST_SPREAD = 1e-3
 """Radians; what is less spread is nearly a beam, whose light would be found by chance alone."""

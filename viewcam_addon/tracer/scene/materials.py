@@ -174,7 +174,8 @@ def _scaled(value: Color | Node, factor: float | None) -> Color | None:
     """None where light can't have that, or the core alone knows what it is."""
     if factor is None or isinstance(value, Node) or max(value.rgb) * factor > LARGEST_RADIANCE:
         return None
-    return replace(value, rgb=tuple(each * factor for each in value.rgb))
+    red, green, blue = value.rgb
+    return replace(value, rgb=(red * factor, green * factor, blue * factor))
 
 
 def _constant(value: Color | Node) -> float | None:

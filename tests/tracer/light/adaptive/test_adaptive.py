@@ -1,4 +1,4 @@
-"""As many samples as a wanted error takes: where they go, that the error is met, and that means stay right."""
+"""Samples up to a wanted error: where they go, that the error is met, and that means stay right."""
 
 import numpy as np
 import pytest
