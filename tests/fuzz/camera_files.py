@@ -11,6 +11,7 @@ import numpy as np
 
 from tests.cameras import test_hostile as documents
 from tests.cameras import test_mixed_files as mixed
+from tests.cameras import test_paths as paths
 from tests.cameras import test_read_only_formats as published
 from tests.cameras.conftest import CAMERAS
 from viewcam_addon import cameras
@@ -203,6 +204,10 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "nvisii": {"a.json": json.dumps(published.nvisii(known))},
         "infinigen": {"a.npz": _camview(known)},
         "fspy_exported": {"a.json": json.dumps(published.FSPY_EXPORTED)},
+        "supersplat": {"settings.json": json.dumps(paths.supersplat_viewer())},
+        "supersplat_project": {"a.ssproj": paths.ssproj(paths.supersplat_project())},
+        "earth_studio": {"a.json": json.dumps(paths.earth_studio((3.0, 4.0, 5.0)))},
+        "after_effects": {"a.jsx": paths.AFTER_EFFECTS},
         "opensfm": {"reconstruction.json": json.dumps(published.opensfm(known, k1=-0.1, k2=0.02))},
         "tum": {"a.txt": "".join(f"{i} 1 2 3 0 0 0 1\n" for i in range(5))},
         "kitti": {"a.txt": "1 0 0 1 0 1 0 2 0 0 1 3\n" * 3},

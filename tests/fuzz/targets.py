@@ -514,6 +514,7 @@ CAMERAS = (
     *("vtk", "textbook", "looks", "looks_gl", "looks_vtk", "text", "text_of_people", "colmap_lenses", "opencv_fisheye"),
     *("transforms_lenses", "nerfstudio_path", "open3d", "opensfm"),
     *("instant_ngp", "kubric", "nvisii", "infinigen", "fspy_exported"),
+    *("supersplat", "supersplat_project", "earth_studio", "after_effects"),
     *("realitycapture_table", "visualsfm", "mvsnet", "middlebury", "middlebury_pair", "neus", "kitti_calibration", "pmvs"),
     *("bop_sensor", "pose_files", "redwood", "replica"),
 )

@@ -55,6 +55,7 @@ from ..errors import InputError, several
 from ..files import written_whole
 from ..pinhole import Pinhole
 from . import (
+    after_effects,
     arkit,
     arrays,
     bop,
@@ -62,6 +63,7 @@ from . import (
     colmap,
     colmap_binary,
     distortion,
+    earth_studio,
     fspy,
     gaussian_splatting,
     gltf,
@@ -93,6 +95,7 @@ from . import (
     realitycapture,
     ros,
     sidecar,
+    supersplat,
     textbook,
     three_js,
     trajectories,
@@ -152,6 +155,9 @@ FORMATS: dict[str, ModuleType] = {
     "kubric": kubric,
     "nvisii": nvisii,
     "infinigen": infinigen,
+    "supersplat": supersplat,
+    "earth_studio": earth_studio,
+    "after_effects": after_effects,
     "open3d": open3d,
     "opensfm": opensfm,
     "ros": ros,
@@ -309,8 +315,7 @@ def recognized(source: str | Path | Source) -> str:
             f"the text is no camera that is understood, from its beginning {place} on: copy a whole camera, or write "
             "eye=1,2,3 look_at=0,0,0 up=0,0,1 d=1000"
         )
-    formats = ", ".join(FORMATS[name].TITLE for name in readable())
-    raise InputError(f"{source.name} is no camera that is understood: give one of {formats}")
+    raise InputError(f"{source.name} is no camera that is understood: give a file of {', '.join(readable())}")
 
 
 def write(cameras: Iterable[Camera], format: str, options: Options | None = None) -> str | dict[str, str | bytes]:
