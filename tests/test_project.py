@@ -123,10 +123,15 @@ TOP_LEVEL = {"blender_manifest.toml", "viewcam_addon", "tests", "sample_scenes",
 BUILD_FILES = {"__init__.py", "pyproject.toml", "Makefile", "LICENSE", "CONTRIBUTING.md", "hatch_build.py"}
 
 
+@functools.cache
+def tree_of(source: str) -> ast.Module:
+    return ast.parse(source)
+
+
 def imported_modules(source: str, package: tuple[str, ...]) -> set[str]:
     """The modules that `source` imports anywhere, dotted and absolute; `package` is where its relative imports start."""
     result = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree_of(source)):
         if isinstance(node, ast.Import):
             result |= {name.name for name in node.names}
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
@@ -170,9 +175,8 @@ def sources() -> list[Path]:
     return sorted(PACKAGE.rglob("*.py"))
 
 
-@functools.cache
 def parsed(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
+    return tree_of(path.read_text(encoding="utf-8"))
 
 
 def tracked_files() -> list[str]:
@@ -347,7 +351,7 @@ def poor_names(source: str) -> list[str]:
     if not is_british(source) and not any(each.search(source) for each in SPELLED_AS_NAMES):
         return []
     result = []
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree_of(source)):
         name = ""
         if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
             name = node.id if isinstance(node, ast.Name) else node.attr
@@ -443,7 +447,7 @@ METHODS = {"numbers", "precision"}
 def uses_of_the_property_group(source: str) -> list[str]:
     """The lines where `source` reads `….virtual_pinhole`, or takes or gives a PropertyGroup."""
     result = []
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree_of(source)):
         if isinstance(node, ast.Attribute) and node.attr in ("virtual_pinhole", "PropertyGroup"):
             result.append(f"{node.lineno}: {ast.unparse(node)}")
     return result

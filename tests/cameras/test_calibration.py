@@ -29,7 +29,7 @@ LENSES = {
     ),
 }
 CLOSE = 1e-3
-"""Pixels, as the issue of this option asks for. OpenCV ends its iterations at 1e-8 of the focal length and earlier."""
+"""Pixels, as `--distort` promises. OpenCV ends its iterations at 1e-8 of the focal length and earlier."""
 
 
 def own_places(plane):

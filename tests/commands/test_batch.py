@@ -112,6 +112,32 @@ def test_each_wrong_word_is_one_sentence_and_nothing_is_written(tmp_path, capfd,
     assert files(tmp_path) == ["FILE"]
 
 
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--distort", "shots.csv"], "shots.csv"),
+        (["--distort", "lens", "a", "b"], "a b are more: name one"),
+        (["--distort", "lens", "b"], "there is no camera 'b'"),
+        (["--distort", "lens", "--size", "64x36"], "--size is 64 × 36 and the camera of --distort has 320 × 180 pixels"),
+        (["--distort", "folded"], "the model folds there"),
+        (["--distort", "straight"], "no camera of straight has a lens that distorts"),
+        (["shots.csv", "--distort", "lens"], "the shot a has 64 × 36 pixels and the camera of --distort 320 × 180"),
+    ],
+    ids=str,
+)
+def test_what_can_not_be_distorted_is_one_sentence(tmp_path, capfd, monkeypatch, words, sentence):
+    monkeypatch.chdir(tmp_path)
+    Path("shots.csv").write_text(f"name,camera,width,height\na,{CAMERA},64,36\n")
+    for name, terms in {"lens": "-0.1 0 0 0", "folded": "-0.9 0 0 0", "straight": "0 0 0 0"}.items():
+        Path(name).mkdir()
+        Path(name, "cameras.txt").write_text(f"1 OPENCV 320 180 200 200 160 90 {terms}\n")
+        Path(name, "images.txt").write_text("1 1 0 0 0 0 0 4 1 a.png\n\n")
+        Path(name, "points3D.txt").write_text("")
+    shots = [] if words[0] == "shots.csv" else ["--orbit", "4"]
+    assert sentence in fails(capfd, CORNELL, *shots, *words, "--out", "OUT")
+    assert not Path("OUT").exists()
+
+
 def test_files_and_options_stand_in_any_order(tmp_path, capfd):
     (tmp_path / "shots.csv").write_text(f"name,camera\na,{CAMERA}\n")
     for number, words in enumerate(

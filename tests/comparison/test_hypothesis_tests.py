@@ -87,8 +87,8 @@ def sides_of(kind, rng, samples, each, seeds, claimed=1.0):
     reference, variance = kind(rng, samples)
     pictures = np.stack([kind(rng, each)[0] for _ in range(seeds)])
     test = pictures.mean(axis=0)
-    spread = pictures.var(axis=0, ddof=1) / seeds if seeds > 1 else np.full(TRUTH.shape, np.inf)
-    return Sides("Combined", reference, test, claimed * variance, spread, np.zeros((HEIGHT, WIDTH), bool))
+    test_variance = pictures.var(axis=0, ddof=1) / seeds if seeds > 1 else np.full(TRUTH.shape, np.inf)
+    return Sides("Combined", reference, test, claimed * variance, test_variance, np.zeros((HEIGHT, WIDTH), bool))
 
 
 def run(sides, samples, seeds):
@@ -128,7 +128,7 @@ def test_a_variance_told_too_small_is_found_out():
     """The test of the test: where the noise is larger than both sides tell, pixels must fail."""
     rng = np.random.default_rng(3)
     sides = sides_of(even, rng, 256, 32, 8)
-    lied = replace(sides, variance=sides.variance / 400, spread=sides.spread / 400)
+    lied = replace(sides, variance=sides.variance / 400, test_variance=sides.test_variance / 400)
     assert not run(lied, 256, 8)[0].ok
 
 
@@ -148,7 +148,9 @@ def test_a_bias_of_the_whole_picture_is_found_as_the_formula_says(share, least, 
     rng, trials, actual = np.random.default_rng(4), 200, 0
     for _ in range(trials):
         sides = sides_of(gray, rng, 256, 32, 8)
-        sides = replace(sides, **{name: getattr(sides, name)[..., :1] for name in ("reference", "test", "variance", "spread")})
+        sides = replace(
+            sides, **{name: getattr(sides, name)[..., :1] for name in ("reference", "test", "variance", "test_variance")}
+        )
         bias = share * visible_bias(sides, run(sides, 256, 8)[-1].limit)
         actual += not run(replace(sides, test=sides.test * (1.0 + bias)), 256, 8)[-1].ok
     # 200 trials: 0.5 ± 0.15 is four standard deviations of the binomial distribution.
@@ -226,8 +228,8 @@ def test_a_shift_of_cycles_filter_table_is_allowed_and_one_of_a_tenth_of_a_pixel
 
     def shifted(by):
         moved = np.clip((columns - by - 15.3 + 1.0) / 3.0, 0, 1)[..., None] + rng.normal(0, 1e-4, profile.shape)
-        spread = np.full(profile.shape, 0.5e-8)
-        sides = Sides("Combined", profile, moved, spread, spread, np.zeros((HEIGHT, WIDTH), bool))
+        variances = np.full(profile.shape, 0.5e-8)
+        sides = Sides("Combined", profile, moved, variances, variances, np.zeros((HEIGHT, WIDTH), bool))
         return all(test.ok for test in run(sides, 256, 8))
 
     assert shifted(0.0) and shifted(4.9e-4)

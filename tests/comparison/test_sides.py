@@ -29,11 +29,11 @@ def test_the_test_is_the_mean_of_its_pictures_and_its_spread_the_variance_of_tha
     widgets = sides(picture(Variance=drawn(3)), tests, "Combined")
     stack = np.stack([image["Combined"][..., :3] for image in tests]).astype(np.float64)
     assert widgets.test == pytest.approx(stack.mean(axis=0), rel=1e-12)
-    assert widgets.spread == pytest.approx(stack.var(axis=0, ddof=1) / 6, rel=1e-9)
+    assert widgets.test_variance == pytest.approx(stack.var(axis=0, ddof=1) / 6, rel=1e-9)
 
 
 def test_one_picture_tells_nothing_of_its_noise():
-    assert np.isinf(sides(picture(Variance=drawn(3)), [picture()], "Combined").spread).all()
+    assert np.isinf(sides(picture(Variance=drawn(3)), [picture()], "Combined").test_variance).all()
 
 
 def test_the_references_variance_is_its_pass_and_unknown_without_one():
@@ -104,7 +104,7 @@ def test_what_is_no_number_is_marked_and_spoils_nothing_else():
     for reference, tests in ((picture(broken), [picture(), picture()]), (picture(), [picture(broken), picture()])):
         actual = sides(reference, tests, "Combined")
         assert np.argwhere(actual.broken).tolist() == [[1, 2], [3, 3]]
-        assert np.isfinite(actual.difference).all() and np.isfinite(actual.spread).all()
+        assert np.isfinite(actual.difference).all() and np.isfinite(actual.test_variance).all()
 
 
 @pytest.mark.parametrize(

@@ -120,11 +120,10 @@ def test_every_field_has_a_check():
 
 OTHERS = {"blend": "a.blend", "trust": True, "seed": 7, "threads": 2, "error": 0.01, "device": "CUDA", "clay": True}
 OTHERS |= {"recenter": True, "strict": True, "scene": "b.json", "level": "path", "samples": 64, "width": 64, "height": 36}
-OTHERS |= {"calibration": CALIBRATION}
 
 
 def test_a_job_comes_back_from_json_as_it_was():
-    for each in (Job(), Job("a", **FOUR), Job("a", camera="Camera", **OTHERS)):
+    for each in (Job(), Job("a", **FOUR), Job("a", camera="Camera", **OTHERS, calibration=CALIBRATION)):
         assert Job.from_json(json.loads(json.dumps(each.to_json()))) == each
     assert Job().to_json() == {}
     with pytest.raises(InputError, match="no option 'cmera' of a job: give some of name, eye"):

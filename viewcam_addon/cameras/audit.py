@@ -179,8 +179,8 @@ def tracks_through(true: Sequence[Camera]) -> Tracks:
     """The tracks that true cameras, as a .blend's, have of points before them: evidence for cameras that should be the same."""
     random = np.random.default_rng(0)
     views = views_of(true)
-    spread = np.linalg.norm(views.eye - views.eye.mean(axis=0), axis=1).max()
-    reach = max(spread, 1e-6 * float(np.abs(views.eye).max()), 1.0 if len(true) == 1 else 0.0) or 1.0
+    farthest = np.linalg.norm(views.eye - views.eye.mean(axis=0), axis=1).max()
+    reach = max(farthest, 1e-6 * float(np.abs(views.eye).max()), 1.0 if len(true) == 1 else 0.0) or 1.0
     which = np.repeat(np.arange(len(true)), _SAMPLES)
     places = random.uniform(0, 1, (len(which), 2)) * views.size[which]
     points = views.points(which, places, reach * random.uniform(0.5, 2, len(which)))

@@ -94,7 +94,7 @@ def decades(row: PassErrors) -> tuple[float, float]:
     return 10.0**low, 10.0 ** max(high, low + 2)
 
 
-def spread(values: NDArray) -> float:
+def largest_drawn(values: NDArray) -> float:
     """The end of a signed scale: what all but some outliers stay below."""
     return max(float(np.percentile(np.abs(values), 99.5)), 1e-12)
 
@@ -116,7 +116,7 @@ def _of_geometry(comparison: GeometryComparison) -> tuple[pictures.Picture, str,
 
 def _of_light(comparison: RadianceComparison) -> tuple[pictures.Picture, str, dict[str, Any]]:
     values = comparison.maps["Combined: difference"]
-    limit = spread(values)
+    limit = largest_drawn(values)
     words = f"Orange where Cycles is brighter, by {figure(limit)} at the full color, blue where it is darker"
     scale = {"kind": "signed", "low": -limit, "high": limit, "unit": "of light"}
     return _painted(pictures.signed(values, limit), pictures.signed_scale()), words, scale

@@ -71,7 +71,7 @@ def _changed_light(reference: Image, tests: Sequence[Image], everything: Image, 
     """
     combined = next(iter(all_sides(reference, tests)))
     seeds = len(tests)
-    variance = seeds * (combined.spread if seeds > 1 else combined.variance)
+    variance = seeds * (combined.test_variance if seeds > 1 else combined.variance)
     before, after = (image["Combined"][..., :3].astype(np.float64) for image in (tests[0], everything))
     broken = ~(np.isfinite(before).all(axis=-1) & np.isfinite(after).all(axis=-1))
     before, after = (np.where(broken[..., None], 0.0, side) for side in (before, after))

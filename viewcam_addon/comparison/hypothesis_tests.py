@@ -202,7 +202,7 @@ def _pixel_variances(sides: Sides, freedom: tuple[int, int]) -> tuple[Array, Arr
     """The variance of each pixel's difference, inf where it is not known, and Welch's degrees of freedom."""
     variances = [
         np.where(sides.certain, 0.0, np.maximum(variance, noise.mean_around(variance)))
-        for variance in (sides.variance, sides.spread)
+        for variance in (sides.variance, sides.test_variance)
     ]
     total = variances[0] + variances[1]
     known = np.isfinite(total) & (total > 0.0)

@@ -79,7 +79,7 @@ def _view(comparison: RadianceComparison, name: str, values: np.ndarray) -> page
         return page.Tab(view, words, caption, {"image": pictures.png_uri(picture)}, legend)
     if kind == "difference":
         caption = f"Cycles minus Tracer: {_COLORS}."
-        limit, unit, allowed = difference.spread(values), "radiance", None
+        limit, unit, allowed = difference.largest_drawn(values), "radiance", None
     else:
         test = row.hypothesis_tests[1 if kind == "tiles" else 0]
         what = {"tiles": f"The difference of each of the {test.name}"}.get(kind, "The difference of each pixel")

@@ -32,7 +32,7 @@ class Appearance:
 def appearance(combined: Sides) -> tuple[Appearance, NDArray[np.float32] | None]:
     """The figures, and FLIP's map (height, width)."""
     mean, by_pixel = flip(combined.reference, combined.test)
-    noise = combined.variance + combined.spread
+    noise = combined.variance + combined.test_variance
     expected = _relative(noise, combined.reference) if np.isfinite(noise).all() else None
     return Appearance(_relative(combined.difference**2, combined.reference), expected, mean), by_pixel
 

@@ -135,7 +135,7 @@ def compare_quantities(
     samples, seeds = (samples_of(reference), test_samples or samples_of(tests[0])), len(tests)
     is_noisy = not quiet(combined.reference, combined.variance).all()
     # Where things shine as brightly as what is behind them, only the other passes have any.
-    is_noisy |= seeds > 1 and any(not quiet(sides.test, sides.spread).all() for sides in (combined, *unequal))
+    is_noisy |= seeds > 1 and any(not quiet(sides.test, sides.test_variance).all() for sides in (combined, *unequal))
     freedom = (len(anew) - 1 if anew else max(min(samples[0] or 2, VARIANCE_BATCHES) - 1, 1), max(seeds - 1, 1))
     if anew and samples[0]:
         samples = samples[0] * len(anew), samples[1]
@@ -191,8 +191,8 @@ def _noisy(
         row = replace(row, factor=scaled_passes)
     pixels, tiles = tests[0], tests[1]
     height, width = sides.broken.shape
-    spread = hypothesis_tests.over_pixels(hypothesis_tests.worst_channel(tiles.errors), (height, width), tiles.size)
-    drawn = {"difference": sides.difference.mean(axis=-1), "tiles": spread}
+    worst_tiles = hypothesis_tests.over_pixels(hypothesis_tests.worst_channel(tiles.errors), (height, width), tiles.size)
+    drawn = {"difference": sides.difference.mean(axis=-1), "tiles": worst_tiles}
     if pixels.errors.any():
         drawn["standard errors"] = hypothesis_tests.worst_channel(pixels.errors)
     return row, drawn
@@ -212,4 +212,4 @@ def _factor(sides: Sides, passes: Callable[[Sides], bool]) -> float | None:
     if min(reference, test) <= 0.0 or sides.broken.any():
         return None
     factor = test / reference
-    return factor if passes(replace(sides, test=sides.test / factor, spread=sides.spread / factor**2)) else None
+    return factor if passes(replace(sides, test=sides.test / factor, test_variance=sides.test_variance / factor**2)) else None

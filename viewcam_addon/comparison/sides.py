@@ -39,7 +39,7 @@ _MOST_DIGITS = 9
 class Sides:
     """One quantity on both sides, each (height, width, channels) float64, rows from the bottom.
 
-    spread : variance of `test`, which is a mean, from the test pictures' differences; inf where there is one picture only.
+    test_variance : of `test`, which is a mean, from the test pictures' differences; inf where there is one picture only.
     variance : variance of `reference`; inf where it is not known. broken : (height, width) bool, no number on one side or both;
     there both are 0. shared : variance of `reference` that its pixels may have shared with their neighbors, or 0. certain :
     (height, width, 1) bool, pixels that have no noise, whatever is beside them.
@@ -49,7 +49,7 @@ class Sides:
     reference: Array
     test: Array
     variance: Array
-    spread: Array
+    test_variance: Array
     broken: NDArray[np.bool_]
     shared: Array | float = 0.0
     certain: NDArray[np.bool_] | bool = False
@@ -138,7 +138,7 @@ def _is_certain(combined: Sides, emission: Sides) -> NDArray[np.bool_]:
     pixels count that nothing beside them outshines, as a pixel that is covered in part is outshone by one that is whole.
     """
     certain = _is_all(emission, combined) & ~combined.broken[..., None]
-    for values, variance in ((combined.reference, combined.variance), (combined.test, combined.spread)):
+    for values, variance in ((combined.reference, combined.variance), (combined.test, combined.test_variance)):
         brightest = values.max(axis=-1)
         outshone = largest_around(brightest) - brightest > _QUIET * FLOAT32 * brightest
         certain &= ~(outshone | (_noise(values, variance) > 0.0))[..., None]
@@ -168,16 +168,20 @@ def _variance(reference: Image) -> Array:
 
 
 def _sides(name: str, references: Sequence[Image], tests: Sequence[Image], variance: Array | None) -> Sides:
-    """variance : of the reference; None where the spread of several tells it."""
-    expected, own = _mean_and_spread(name, references)
-    mean, spread = _mean_and_spread(name, tests)
+    """variance : of the reference; None where that of several tells it."""
+    expected, own = _mean_and_variance(name, references)
+    mean, test_variance = _mean_and_variance(name, tests)
     broken = ~(np.isfinite(expected).all(axis=-1) & np.isfinite(mean).all(axis=-1))
     if broken.any():
-        expected, mean, spread, own = (np.where(broken[..., None], 0.0, array) for array in (expected, mean, spread, own))
-    return Sides(name, expected, mean, own if variance is None else np.broadcast_to(variance, expected.shape), spread, broken)
+        expected, mean, test_variance, own = (
+            np.where(broken[..., None], 0.0, array) for array in (expected, mean, test_variance, own)
+        )
+    return Sides(
+        name, expected, mean, own if variance is None else np.broadcast_to(variance, expected.shape), test_variance, broken
+    )
 
 
-def _mean_and_spread(name: str, images: Sequence[Image]) -> tuple[Array, Array]:
+def _mean_and_variance(name: str, images: Sequence[Image]) -> tuple[Array, Array]:
     """A quantity's mean over pictures with several seeds, and that mean's variance: inf where there is one picture only."""
     mean = np.zeros_like(values_of(images[0], name))
     squares, seeds = np.zeros_like(mean), len(images)

@@ -7,7 +7,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import temporary_settings
+from viewcam_addon.blender import temporary_settings, versions
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.blender.scenes import depsgraph
@@ -313,6 +313,20 @@ def test_a_file_whose_color_mode_its_format_does_not_know_is_rendered(crowded, t
     view_layer = crowded.view_layers[0]
     cycles.render(crowded, view_layer, crowded.camera, tmp_path / "picture.exr")
     assert settings.file_format == "JPEG" and settings.color_mode in ("BW", "RGB")
+
+
+def test_a_video_with_an_alpha_channel_is_given_back_with_its_codec(crowded):
+    settings, video = crowded.render.image_settings, crowded.render.ffmpeg
+    if hasattr(settings, "media_type"):
+        settings.media_type = "VIDEO"
+    settings.file_format = "FFMPEG"
+    video.format = video.codec = "WEBM"  # 4.2 makes it MKV as it comes back to videos, which knows no alpha
+    settings.color_mode = "RGBA"
+    with overridden() as overrides:
+        cycles.override_whole(overrides, settings)
+        versions.set_multilayer_file(settings)
+    kept = (settings.file_format, video.format, video.codec, settings.color_mode)
+    assert kept == ("FFMPEG", "WEBM", "WEBM", "RGBA")
 
 
 class _Device:

@@ -200,18 +200,20 @@ def _override_file(overrides: Overrides, scene: bpy.types.Scene, path: os.PathLi
 
 
 def override_whole(overrides: Overrides, settings: bpy.types.ImageFormatSettings) -> None:
-    """Give back all settings of the file together, since the kind of file changes what the others may be.
+    """Give back all settings of the file together, since the kind of file changes what the others may be, those of videos too.
 
     A file may hold one that its kind of file does not know, which reads as "": nobody can set that, Blender chooses another.
     """
-    names = [prop.identifier for prop in settings.bl_rna.properties if not prop.is_readonly]
-    names.sort(key=lambda name: ("media_type", "file_format").index(name) if name in ("media_type", "file_format") else 2)
-    before = {name: getattr(settings, name) for name in names}
-    unknown = {name for name, value in before.items() if value == "" and settings.bl_rna.properties[name].type == "ENUM"}
+    first = ("media_type", "file_format")  # Blender sets others of a video as it comes back to it, and these its colors
+    owners = (settings, settings.id_data.render.ffmpeg)
+    before = [(owner, p.identifier, p.type) for owner in owners for p in owner.bl_rna.properties if not p.is_readonly]
+    before.sort(key=lambda each: first.index(each[1]) if each[1] in first else 2 + (each[0] == settings))
+    values = [getattr(owner, name) for owner, name, _ in before]
 
     def give_back() -> None:
-        for name, value in before.items():
-            if name not in unknown and getattr(settings, name) != value:
-                setattr(settings, name, value)
+        for (owner, name, kind), value in zip(before, values, strict=True):
+            is_unknown = kind == "ENUM" and value == ""
+            if not is_unknown and getattr(owner, name) != value:
+                setattr(owner, name, value)
 
     overrides.afterwards(give_back)
