@@ -85,7 +85,7 @@ class ShowTheDiagramElsewhere(_WithoutTheSidebar):
     """The view plane is drawn close to the look-at point."""
 
     picture = "diagram.png"
-    shows, with_before = (0.0, 0.42, 0.78, 0.95), True
+    shows, with_before = (0.0, 0.42, 0.78, 0.935), True
 
     def by_hand(self):
         values().plane_at = 0.8
