@@ -253,7 +253,7 @@ class BlenderRenderer:
         return warnings
 
     def _of_shot(self, shot: Job) -> bpy.types.Object:
-        """The camera that a shot is of: the one that renders, which Blender may have chosen, or that in whose place it stands."""
+        """The camera that a shot is of: the one that renders, which Blender may have chosen, or whose place it takes."""
         return (self._of_file if shot.calibration else None) or self.scene.camera
 
     def _camera_of_values(self, like: bpy.types.Object | None = None) -> bpy.types.Object:
