@@ -21,7 +21,7 @@ from .source import Source
 
 _PLANES, _SEED = 2000, 0
 _MOST_POINTS = 20_000  # to count by, drawn by the seed
-_NEAR = 0.01  # of the points' extent: how far from the plane a point of the ground is. Chosen, as the three below; tried on made scenes
+_NEAR = 0.01  # of the points' extent: how far from the plane a point of the ground is. Chosen, as those below
 _TILT = np.cos(np.radians(45))  # of the ground's normal against the cameras' up
 _COMMON = 0.5  # length of the mean of the cameras' up from which on it is one
 _SHARE = 0.05  # of the points, which a plane needs for being the ground

@@ -157,7 +157,7 @@ class BlenderRenderer:
         evaluated = self.scene.camera.evaluated_get(datablocks.depsgraph_of(self.scene))
         self._taken = cameras.read(evaluated, self.scene)
         taken = record(self._taken, datablocks.camera_data_of(evaluated))
-        rendered = self._settings.rendered(bool(image)) | ({"camera": self._of_file.name} if self._of_file else {})
+        rendered = self._settings.rendered(bool(image)) | ({"camera": self._of_shot(shot).name} if self._of_file else {})
         if calibration := shot.calibration:
             if image and preview:
                 self._tracing.distort(image, preview, calibration, self._taken.plane)
@@ -179,7 +179,7 @@ class BlenderRenderer:
         InputError
             if the scene can't be exported, or the labels not be written.
         """
-        camera_object = self._of_file or self.scene.camera
+        camera_object = self._of_shot(shot)
         names = self._labels.write(self.scene, camera_object, self._taken, picture, kinds, depth_steps, shot)
         if "flow" in kinds:  # other frames were looked at
             persistent_data.drop(self.scene)
@@ -251,6 +251,10 @@ class BlenderRenderer:
             self._stated = None if self._of_file else stated
         self._settings.look_through(camera_object, job.is_of_scenes_camera)
         return warnings
+
+    def _of_shot(self, shot: Job) -> bpy.types.Object:
+        """The camera that a shot is of: the one that renders, which Blender may have chosen, or whose place it takes."""
+        return (self._of_file if shot.calibration else None) or self.scene.camera
 
     def _camera_of_values(self, like: bpy.types.Object | None = None) -> bpy.types.Object:
         """The camera for the four values; made for the first of them, since objects are numbered by name.
