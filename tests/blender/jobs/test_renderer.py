@@ -188,6 +188,27 @@ def test_a_file_saved_in_sculpt_mode_has_the_normals_of_a_mesh_on_both_sides(ble
     sides.check()
 
 
+@pytest.mark.parametrize("shader", ["ShaderNodeBsdfPrincipled", "ShaderNodeSubsurfaceScattering"])
+def test_a_scaled_mesh_with_light_below_its_surface_has_the_normals_of_any_other(blend, both_sides, shader):
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    bpy.ops.mesh.primitive_cone_add(vertices=5, depth=1)
+    bpy.ops.object.shade_smooth()
+    bpy.context.object.scale = (1.2, 0.6, 1.0)
+    material = bpy.data.materials.new("Skin")
+    material.use_nodes = True
+    tree = material.node_tree
+    node = tree.nodes.new(shader)
+    if "Subsurface Weight" in node.inputs:
+        node.inputs["Subsurface Weight"].default_value = 1.0
+    tree.links.new(node.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    bpy.context.object.data.materials.append(material)
+    sides = both_sides(blend=blend())
+    sides.check()
+    assert not sides.exported.ledger or all(entry.status == "exported" for entry in sides.exported.ledger), (
+        sides.exported.ledger
+    )
+
+
 def test_linked_objects_are_exported_and_numbered(blend, scene, camera_object, both_sides):
     material = bpy.data.materials.new("Shared")
     bpy.data.objects["Cube"].data.materials.append(material)

@@ -3,7 +3,8 @@
 Level geometry models no material. Most leave the passes of geometry alone; some do not: displacement moves the surface, bump
 and normal maps turn the Normal pass, and where a surface is transparent Cycles writes what lies behind. For the time of a
 comparison such a material gets a second output for Cycles, a diffuse surface of its viewport color; its own nodes stay as
-they are. At the levels of light the same is done to every material that the tracer only approximates, with the components that
+they are. So does one with subsurface scattering, for which Cycles only computes in another order; the ledger is silent. At
+the levels of light the same is done to every material that the tracer only approximates, with the components that
 shaders.py has found.
 """
 
@@ -210,8 +211,15 @@ def _times(adder: nodes.Adder, *factors: bpy.types.NodeSocket) -> bpy.types.Node
 
 
 def keep_normals(overrides: Overrides, material: bpy.types.Material) -> None:
-    """Keep Cycles from bending the normals of smooth surfaces, seen at a grazing angle, so far that they reflect."""
+    """Keep Cycles from bending the normals of smooth surfaces, seen at a grazing angle, so far that they reflect.
+
+    And from interpolating them before the object's scale has turned them, which it does in a mesh that only one object uses
+    if light scatters below its surface (ObjectManager::apply_static_transforms of intern/cycles/scene/object.cpp).
+    """
     overrides.set(material.cycles, "use_bump_map_correction", False)
+    tree = versions.node_tree(material)
+    if tree and any(map(_scatters_below, nodes.all_of(tree))) and not departures(material):
+        make_plain(overrides, material)
 
 
 def fill_empty_slots(overrides: Overrides, block: bpy.types.Object) -> None:
@@ -240,6 +248,12 @@ def _sees_through(node: bpy.types.Node) -> bool:
     """True if the node has an opacity that is not plainly 1."""
     alpha = node.inputs.get("Alpha") if node.type == "BSDF_PRINCIPLED" else None
     return alpha is not None and (alpha.is_linked or alpha.default_value != 1.0)
+
+
+def _scatters_below(node: bpy.types.Node) -> bool:
+    """True if Cycles takes the node for one that lets light scatter below the surface."""
+    weight = node.inputs.get("Subsurface Weight") if node.type == "BSDF_PRINCIPLED" else None
+    return node.type == "SUBSURFACE_SCATTERING" or (weight is not None and (weight.is_linked or weight.default_value > 0.0))
 
 
 def _is_turned(node: bpy.types.Node) -> bool:
