@@ -140,7 +140,7 @@ def of_cameras(read: Sequence[Camera], source: str, name: str | None = None) -> 
                 f" or {firsts[others[0]]}"
             )
     try:
-        result.cover  # noqa: B018
+        _ = result.cover  # refuses here, before anything is rendered
     except InputError as error:
         raise InputError(f"the camera {name or next(iter(bent))} of {source} can't be rendered: {error}") from None
     return result
