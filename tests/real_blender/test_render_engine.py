@@ -93,13 +93,15 @@ def test_escape_cancels_a_heavy_render_within_a_second(host, lit_file, tmp_path)
     assert statistics.median(seconds) < 1.0, seconds
 
 
-def test_in_rendered_shading_the_viewport_turns_and_light_comes_when_it_rests(real_blender, lit_file, tmp_path):
-    in_a_window(real_blender, "view", lit_file, tmp_path / "figures", simulated=True)
+@pytest.mark.parametrize("host", ["real"], indirect=True)
+def test_in_rendered_shading_the_viewport_turns_and_light_comes_when_it_rests(host, lit_file, tmp_path):
+    in_a_window(host, "view", lit_file, tmp_path / "figures", simulated=True)
     assert json.loads((tmp_path / "figures").read_text())["pictures"] > 0
 
 
-def test_a_swipe_shows_the_reference_as_the_scene_displays_it_and_leaves_nothing(real_blender, lit_file, tmp_path):
-    in_a_window(real_blender, "swipe", lit_file, tmp_path / "figures", simulated=True)
+@pytest.mark.parametrize("host", ["real"], indirect=True)
+def test_a_swipe_shows_the_reference_as_the_scene_displays_it_and_leaves_nothing(host, lit_file, tmp_path):
+    in_a_window(host, "swipe", lit_file, tmp_path / "figures", simulated=True)
     figures = json.loads((tmp_path / "figures").read_text())
     # In the mean, of 1/255: the table of the view transform, and four roundings on the way to the screen. Calibrated: 1.0 of a
     # Cornell box at 16 samples. Right of the line stands another picture: 40 there.
