@@ -61,7 +61,8 @@ def test_the_zip_holds_the_extension_and_its_wheels_and_nothing_else(extension_z
     # OpenEXR's and MarkupSafe's for each Python of Blender 4.2 to 5.2, the core's, Jinja2's and tqdm's for all.
     assert sorted(f"./{name}" for name in names if name.endswith(".whl")) == sorted(manifest["wheels"])
     assert len(manifest["wheels"]) == 9
-    assert extension_zip.stat().st_size < 8e6, f"the zip has {extension_zip.stat().st_size} bytes"
+    # 6.9 of its 8.0 MB are wheels: a fourth OpenEXR, or a picture among the modules, would be seen.
+    assert extension_zip.stat().st_size < 9e6, f"the zip has {extension_zip.stat().st_size} bytes"
 
 
 def test_it_installs_from_the_shell(real_blender):
