@@ -3,7 +3,7 @@
 #   make quick         lint and the tests that need neither Blender nor processes nor many samples; under a minute
 #   make test          lint and the tests that are quick to run, with the newest bpy wheel for the Python found; below five minutes
 #   make test-fresh    make demo and make test on a bare Debian 12 of its own, as a newcomer has them; needs root
-#   make test-exhaustive  the rest of them: whole pictures, whole clusters, and what takes minutes: 10⁸ rays, a million hostile numbers
+#   make test-exhaustive  the rest of them: whole pictures, whole clusters, and what takes minutes: 10⁸ rays, hundreds of thousands of hostile numbers
 #   make test-sanitizers  the core compiled with sanitizers, and what its tests find of addresses, undefined behavior and threads
 #   make test-matrix   the tests with Blender 4.2 (and 5.2 where there is a Python 3.13) as wheels; those of Blender with 4.5 and 5.0
 #   make test-light    whole pictures of light, 1024 samples a pixel, against Cycles of each of these

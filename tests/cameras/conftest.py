@@ -52,7 +52,7 @@ def only_numbers():
 
 @pytest.fixture
 def openusd_in_this_process(monkeypatch, tmp_path):
-    """Stages that are ours are read by the same code as others, without a process for each: half a second (test_usd.py has it)."""
+    """Stages that are ours are read by the same code as others, without the process of half a second that test_usd.py has."""
 
     def read(name, path, text, size, values):
         pytest.importorskip("pxr")

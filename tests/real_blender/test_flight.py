@@ -1,4 +1,4 @@
-"""Each fifth of a flight's 250 frames in a real Blender: live, by F12, and baked with the add-on disabled, all the same picture.
+"""Each fifth of a flight's 250 frames in a real Blender: live, by F12, and baked without the add-on, all the same picture.
 
 Eye, look-at, up and d are keyed, a target moves, and both cameras pass straight down: one with canonical axes, one with its
 roll held (flight_in_blender.py).
