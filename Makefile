@@ -118,15 +118,18 @@ test-matrix: $(MATRIX:%=test-wheel-%)
 
 # What a version can change: what touches Blender; with the oldest and the newest, which have NumPys of their own, the quick ones;
 # with the newest, which has a Python of its own, processes. Of the newest, tests/blender runs inside the real one, but for lights
-# (test-blender). Between the oldest and the newest, batches, lights and what is slow are left out of 4.5: 5.0 has them, and
-# test-light what Cycles shades.
+# and batches (test-blender). What is slow of lights the newest has alone, what is slow of batches the oldest. Between the two, 4.5
+# has what versions.py tells apart: scenes, pictures, animation; 5.0 has the rest, and test-light what Cycles shades. The faults
+# that are made on purpose, and the sample scenes, are the oldest's, whose files the latter are.
 TOUCHING_BLENDER = tests/blender tests/test_crashes.py \
 	$(shell grep -lE 'importorskip\("bpy"\)' tests/test_*.py tests/commands/test_*.py tests/comparison/test_*.py | grep -v test_project)
-tests-4.5 = $(TOUCHING_BLENDER) --ignore=tests/blender/jobs --ignore=tests/blender/light
+tests-4.5 = tests/blender $(foreach each,interface jobs light,--ignore=tests/blender/$(each))
 without-4.5 = $(empty) and not slow
 tests-5.0 = $(TOUCHING_BLENDER)
-tests-4.2 = $(TOUCHING_BLENDER) $(QUICK)
-tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender,$(TOUCHING_BLENDER)) $(QUICK) tests/jobs
+SLOW_LIGHT := $(shell grep -lE '^pytestmark = .*slow' tests/blender/light/*.py) tests/blender/test_light_by_light.py
+tests-4.2 = $(TOUCHING_BLENDER) $(QUICK) $(SLOW_LIGHT:%=--ignore=%)
+without-5.2 = $(empty) and (blender or not slow)
+tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender tests/test_leftovers.py tests/comparison/test_sabotage_on_cycles.py,$(TOUCHING_BLENDER)) $(QUICK) tests/jobs
 
 # Few examples of each property: make test has the many, and what a version changes, it changes for most of them. What is slow
 # begins first (tests/conftest.py), so that no process ends with it alone.
