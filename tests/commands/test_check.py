@@ -154,7 +154,21 @@ def test_a_search_for_a_bias_ends_with_the_first_round_of_a_wrong_picture(tmp_pa
 @pytest.mark.skipif(sys.platform == "win32", reason="processes are killed here as POSIX has it")
 def test_killed_in_its_middle_and_continued_by_two_workers_it_is_the_same_byte_for_byte(tmp_path):
     pytest.importorskip("distributed")
-    words = [sys.executable, "-m", "viewcam_addon", "check", FLIGHT, "--frames", "1..4", *SMALL, "--level", "path", "--samples", "8", "--clay"]
+    words = [
+        sys.executable,
+        "-m",
+        "viewcam_addon",
+        "check",
+        FLIGHT,
+        "--frames",
+        "1..4",
+        *SMALL,
+        "--level",
+        "path",
+        "--samples",
+        "8",
+        "--clay",
+    ]
     variables = os.environ | {"PYTHONPATH": str(ROOT)}
     alone, out = tmp_path / "alone", tmp_path / "out"
     subprocess.run([*words, "--report", alone], env=variables, check=True)
