@@ -30,8 +30,9 @@ endif
 PYTHON_FOUND = $(if $(PYTHON),$(PYTHON),$(error Python 3.11 or 3.13 is needed, the only ones that bpy 5 has wheels for: install one or say make PYTHON=...))
 PROJECT = pyproject.toml blender_manifest.toml .ci/environment.py hatch_build.py $(shell find viewcam_addon/tracer/core -name '*.h' -o -name '*.cpp')
 PYTEST = env -u BLENDER $(1)/bin/python -m pytest
-# A file's tests stay together, since they share what is dear to make. At most four, for each may need a gigabyte or two.
-PARALLEL = $(PYTEST) --numprocesses=auto --maxprocesses=4 --dist=loadfile
+# Each process begins with a part of the list as it stands, so that a file's tests share what is dear to make, and ends with what is
+# left of another's. At most four, for each may need a gigabyte or two.
+PARALLEL = $(PYTEST) --numprocesses=auto --maxprocesses=4 --dist=worksteal
 
 demo: .venv/demo
 	.venv/bin/viewcam demo
@@ -56,7 +57,7 @@ test-fresh:
 
 # What is slow and needs Blender, the oldest and the newest run: test-matrix and test-blender.
 test-exhaustive: .venv/test
-	$(call PARALLEL,.venv) --numprocesses=3 --dist=worksteal -m "exhaustive or (slow and not blender)"
+	$(call PARALLEL,.venv) --numprocesses=3 -m "exhaustive or (slow and not blender)"
 
 # GCC's sanitizers, which come with it: preloaded, since Python itself is compiled without them.
 sanitizers-address = address,undefined
@@ -134,7 +135,7 @@ tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-ou
 # Few examples of each property: make test has the many, and what a version changes, it changes for most of them. What is slow
 # begins first (tests/conftest.py), so that no process ends with it alone.
 test-wheel-%: .venvs/%/ready
-	$(call PARALLEL,.venvs/$*) --no-loadscope-reorder --hypothesis-profile=quick -m "not exhaustive and not light and not speed$(without-$*)" $(tests-$*)
+	$(call PARALLEL,.venvs/$*) --hypothesis-profile=quick -m "not exhaustive and not light and not speed$(without-$*)" $(tests-$*)
 
 test-light: $(MATRIX:%=test-light-%)
 
