@@ -67,7 +67,7 @@ preload-thread = $(shell g++ -print-file-name=libtsan.so)
 # What goes wrong between threads shows where there are some; the rest is tried on one.
 tests-address = tests/tracer/test_c_interface.py tests/tracer/test_leaks.py tests/tracer/test_render.py tests/tracer/test_triangles.py \
 	tests/tracer/light/test_textbook.py tests/tracer/light/test_textures.py
-calls-address = VIEWCAM_FUZZ_CALLS=300
+calls-address = VIEWCAM_FUZZ_CALLS=150
 tests-thread = tests/tracer/test_intersection.py tests/tracer/test_render.py tests/tracer/test_render_light.py -k "thread or triangle_takes or stops_within"
 test-sanitizers: test-sanitizer-address test-sanitizer-thread
 
