@@ -33,6 +33,13 @@ _LONG = 4 * 3600  # seconds
 """The time limit of what takes minutes by its nature."""
 
 
+def pytest_ignore_collect(collection_path, config):
+    """All of tests/benchmarks is marked: where it is not asked for, the libraries of charts need not be imported."""
+    if collection_path.name == "benchmarks" and {"not exhaustive", "not speed"} <= set(config.option.markexpr.split(" and ")):
+        return True
+    return None
+
+
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
     for item in items:
