@@ -18,7 +18,6 @@ Time-uniform, nonparametric, nonasymptotic confidence sequences, Annals of Stati
 sample, and are wider for looks that nobody makes; rounds of one size, of which there would be a thousand.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -26,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..image import Image
-from .hypothesis_tests import BLOCKS, WHOLE
+from .hypothesis_tests import BLOCKS, SIZES, least_findable
 from .light_verdict import FALSE_ALARMS, RadianceComparison, Search
 
 TOTALS = (16, 64, *(256 * 2**doubled for doubled in range(9)))
@@ -87,11 +86,8 @@ def _least(comparison: RadianceComparison) -> tuple[float, float]:
     """The least bias that would be found if it is everywhere, and in a typical block alone; 0 without noise."""
     if not comparison.is_noisy:
         return 0.0, 0.0
-    tests = {test.size: test for test in comparison.rows[0].hypothesis_tests}
-    everywhere = tests[WHOLE].typical_findable
-    if not math.isfinite(everywhere):
-        everywhere = min(float(test.findable.min()) for test in tests.values())
-    return everywhere, tests[BLOCKS].typical_findable
+    tests = comparison.rows[0].hypothesis_tests
+    return least_findable(tests), tests[SIZES.index(BLOCKS)].typical_findable
 
 
 def _pooled(before: Image, now: Image, share: float) -> Image:
