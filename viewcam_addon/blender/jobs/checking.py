@@ -33,6 +33,7 @@ from ...tracer.scene.film import LEVELS, SAMPLES, seeds
 from ...tracer.scene.levels import least_level
 from .. import datablocks
 from ..rendering import cycles, displayed, exr
+from ..scenes import features
 from ..scenes.export import Lighting
 from ..temporary_settings import numbered_indices
 from . import persistent_data, pictures
@@ -86,7 +87,8 @@ class Checker:
             camera = None if job.is_of_scenes_camera else camera_object
             ledger, render = export.ledger, functools.partial(cycles.render, scene, stage.view_layer, camera)
             render(image, ledger.remedies.values(), job.threads, keep=True)
-            everything = self._files.folder / "everything.exr" if export.scene.not_modeled else None
+            has_more = export.scene.not_modeled and not features.lacks_gas(scene)
+            everything = self._files.folder / "everything.exr" if has_more else None
             if everything:
                 render(everything, ledger.remedies_of_everything, job.threads, keep=True, everything=True)
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
@@ -187,6 +189,7 @@ class Checker:
 
         lighting = Lighting(exported.lamps, exported.world, exported.film, exported.bounces)
         has_more = exported.not_modeled and job.engine not in ("EEVEE", "WORKBENCH") and not job.recenter
+        has_more &= not features.lacks_gas(stage.scene)
         stage.render(job, paths, lighting, rendering, keep=True, everything=everything if has_more else None)
 
     def _forecast(self, undecided: dict[str, Any], taken: int, latest: int, seconds: float) -> None:
