@@ -189,7 +189,7 @@ class Checker:
 
         lighting = Lighting(exported.lamps, exported.world, exported.film, exported.bounces)
         has_more = exported.not_modeled and job.engine not in ("EEVEE", "WORKBENCH") and not job.recenter
-        has_more &= not features.lacks_gas(stage.scene)
+        has_more = has_more and not features.lacks_gas(stage.scene)
         stage.render(job, paths, lighting, rendering, keep=True, everything=everything if has_more else None)
 
     def _forecast(self, undecided: dict[str, Any], taken: int, latest: int, seconds: float) -> None:
