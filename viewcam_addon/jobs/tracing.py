@@ -344,7 +344,7 @@ def _distort(image: str, preview: str, calibration: dict[str, Any], cut: dict[st
     from .. import png
 
     of, plane = Calibration.from_json(calibration), ViewPlane(**cut)
-    images.rewrite(image, lambda pixels, is_data: of.distorted(pixels, plane, nearest=is_data))
+    images.rewrite(image, lambda pixels, is_data: of.distorted(pixels, plane, nearest=is_data), of.plane)
     pixels = of.distorted(png.decoded(Path(preview).read_bytes()), plane)
     with written_whole(preview) as temporary:
         temporary.write_bytes(png.encoded(pixels if pixels.shape[2] > 2 else pixels[..., 0]))

@@ -70,7 +70,7 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
         told_in.unlink(missing_ok=True)
     for each in others:
         if each.suffix == ".exr":
-            image.write(each, labels.image)
+            image.write(each, labels.image, is_bent=labels.lens is not None)
             continue
         ending = each.name.removeprefix(f"{path.stem}.")
         content = _content(ending, passes[FILES[ending]][::-1], depth_steps)
