@@ -126,7 +126,7 @@ class Rig:
     @cached_property
     def _firsts(self) -> dict[Calibration, str]:
         """The first camera of each calibration."""
-        return {calibration: name for name, calibration in reversed(self.by_name.items())}
+        return {calibration: name for name, calibration in [*self.by_name.items()][::-1]}
 
     def of(self, *names: str | None) -> Calibration:
         """The calibration of the camera that has the first of the names that one has, or else that all cameras share.
