@@ -87,8 +87,8 @@ def distances(picture, frame, document, model):
     expected = (places[inside] - 0.5).astype(np.float32)
     blurred = cv2.GaussianBlur(picture.astype(np.float32), (0, 0), 1)  # OpenCV's gradients are of two pixels apart
     criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 50, 1e-4)
-    found = cv2.cornerSubPix(blurred, expected[:, None].copy(), (7, 7), (-1, -1), criteria)[:, 0]
-    return np.linalg.norm(found - expected, axis=-1)
+    corners = cv2.cornerSubPix(blurred, expected[:, None].copy(), (7, 7), (-1, -1), criteria)[:, 0]
+    return np.linalg.norm(corners - expected, axis=-1)
 
 
 @pytest.mark.parametrize(("model", "numbers"), [("OPENCV", OPENCV), ("OPENCV_FISHEYE", FISHEYE)])
