@@ -328,8 +328,8 @@ class _Server:
             for name, frame in frames.items()
         }
         bent = Lens.from_json(lens) if lens else None
-        how = {"threads": threads, "keepers": self._keepers, "lens": bent, "annotations": annotations}
-        labels = label(scenes.pop("here"), kinds, **scenes, **how)
+        here, how = scenes.pop("here"), (threads, self._keepers, bent, annotations)
+        labels = label(here, kinds, scenes.get("previous"), scenes.get("next"), *how)
         return [path.name for path in files.write(Path(picture), labels, depth_steps)]
 
     def _scene(self, path: str) -> "Scene":
