@@ -243,7 +243,7 @@ def test_depth_maps_say_that_right_cameras_are_right(filmed):
 
 
 def test_depth_maps_that_a_lens_has_bent_tell_the_lens_and_no_focal_length():
-    """As a batch with --distort makes them; taken for a pinhole's they fitted best with a focal length 1.02 times too long."""
+    """A batch with --distort makes such; taken for a pinhole's they fitted best with a focal length 1.02 times too long."""
     views = views_of(a_filmed_scene(count=3))
     verdict = _audited(views, Depths([depth_map(views, i, distortion.opencv({"k1": -0.2})) for i in range(3)]))
     assert verdict.kind == "lens_left_out", verdict

@@ -82,7 +82,7 @@ def keypoint_names(pictures: Sequence[tuple[Path, Document]]) -> dict[str, list[
 
 
 def _keypoints(instance: Document, names: Sequence[str]) -> Document:
-    """What an annotation says of the keypoints of its category; nothing where that has none."""
+    """The keys of an annotation for the keypoints of its category; none where that has none."""
     if not names:
         return {}
     points = {point["name"]: point for point in instance.get("keypoints", ())}
