@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import listed
 from ..pinhole import Pinhole
-from .answer import Answer, NotModeled, answered, percent_of
+from .answer import NOTHING, Answer, NotModeled, answered, percent_of
 from .coincident import TakenOut
 from .hypothesis_tests import CONTOURS, PIXELS, WHOLE, HypothesisTest, Place
 from .noise_free import Edges
@@ -158,7 +158,7 @@ class RadianceComparison:
                 False, "Different here", f"{_difference(worst[0])}{_hint(worst[0])}{others}{_without(self)}.", self.not_modeled
             )
         if self.is_empty:
-            return answered(False, "Nothing to compare", _nothing_left(self.taken_out), self.not_modeled)
+            return answered(False, NOTHING, _nothing_left(self.taken_out), self.not_modeled)
         if not self.is_noisy:
             row = combined.noise_free
             text = (

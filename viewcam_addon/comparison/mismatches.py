@@ -286,9 +286,8 @@ def settle(
     doubtful = agreement.roundings(expected, seen) > tolerances.ROUNDINGS[0]
     asked = np.flatnonzero((borders | differs | doubtful) & tolerances.is_hit(expected))
     kinds, expected = kinds.copy(), {name: values.copy() for name, values in expected.items()}
-    agreement = replace(
-        agreement, slopes={name: slope.copy() for name, slope in agreement.slopes.items()}, enlargement=np.ones(len(kinds))
-    )
+    slopes, enlargement = {name: slope.copy() for name, slope in agreement.slopes.items()}, np.ones(len(kinds))
+    agreement = replace(agreement, slopes=slopes, enlargement=enlargement)
     pixels, objects = [NOWHERE.columns], [NOWHERE.objects]
     for start in range(0, len(asked), _CENTERS):
         batch = asked[start : start + _CENTERS]
@@ -306,8 +305,8 @@ def settle(
         for name, values in expected.items():
             values[pixel[other]] = traced[name][other, : values.shape[1]]
         if "Normal Enlargement" in traced:
-            agreement.enlargement[batch] = traced["Normal Enlargement"][nearest, 0]
-        for name, slope in agreement.slopes.items():
+            enlargement[batch] = traced["Normal Enlargement"][nearest, 0]
+        for name, slope in slopes.items():
             own = here.slope(traced, name)
             slope[batch] = np.maximum(slope[batch], own[nearest])
             slope[pixel[other]] = own[other]
