@@ -132,12 +132,13 @@ class Scene {
             if (some == 4) finish_triangles();
         }
         if (some) finish_triangles();
-        for (int i = 0; i < count; i++) {
-            found[i].slot = objects[hits[i].object].first_slot + found[i].material;
-            found[i].material = slots[found[i].slot].material;
-            found[i].object = hits[i].object;
-            found[i].primitive = hits[i].primitive;
-        }
+        for (int i = 0; i < count; i++) name(found[i], hits[i].object, hits[i].primitive);
+    }
+    // The surfaces of four triangles, of which not all may be others.
+    void interactions(const TriangleSurfaces& surfaces, const TriangleHit (&hits)[4], Interaction (&found)[4]) const {
+        Interaction* const to[] = {&found[0], &found[1], &found[2], &found[3]};
+        surfaces.interactions(to);
+        for (int i = 0; i < 4; i++) name(found[i], uint32_t(hits[i].object - objects.data()), hits[i].triangle);
     }
     Interaction interaction(const Ray& ray, const Hit& hit) const {
         const Ray* one = &ray;
@@ -200,6 +201,14 @@ class Scene {
     }
 
    private:
+    // Tells an interaction whose it is, once it has the number of its material in the object.
+    void name(Interaction& found, uint32_t object, uint32_t primitive) const {
+        found.slot = objects[object].first_slot + found.material;
+        found.material = slots[found.slot].material;
+        found.object = object;
+        found.primitive = primitive;
+    }
+
     struct Merged {
         uint32_t visible;
         TriangleBvh triangles;
