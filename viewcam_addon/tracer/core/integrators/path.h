@@ -175,7 +175,8 @@ class PathIntegrator {
         int slots[4], samples[4];
         const Path* paths[4];
         SurfacePoint<double4> at;
-        Vec3x4 weight;
+        Vec3x4 incoming, weight;
+        double4 footprint;  // where materials ask for that
     };
     struct Block {
         const CameraSamples* samples;
@@ -312,7 +313,7 @@ class PathIntegrator {
     }
     // Whether what a path has met has a wide material; `point` receives what scattering needs.
     bool meets_wide(const Hit& hit, WidePoint& point) const {
-        if (coincident_ > 0 || has_pixels_) return false;
+        if (coincident_ > 0) return false;
         const Object& object = scene_.objects[hit.object];
         auto mesh = std::get_if<TriangleMesh>(&scene_.geometries[object.geometry]);
         if (!mesh) return false;
@@ -604,16 +605,21 @@ class PathIntegrator {
         }
         TriangleSurfaces surfaces(hits, 4, origin, direction);
         four.at = surfaces.points();
-        if (depth == 1) direction = normalize(direction);
+        four.incoming = depth == 1 ? normalize(direction) : direction;
+        if (has_pixels_) four.footprint = gather4([&](int i) {
+            Interaction point;
+            point.position = lane(four.at.position, i), point.t = surfaces.t()[i], point.object = uint32_t(hits[i].object - scene_.objects.data());
+            return shading(point, *four.paths[i], {}, depth - 1).footprint();
+        });
         if (!made_of.varies()) {
-            BSDFOf<double4> bsdf = made_of.bsdf(ShadingPoints{four.at, direction, scene_.illumination.version, nullptr});
+            BSDFOf<double4> bsdf = made_of.bsdf(ShadingPoints{four.at, four.incoming, scene_.illumination.version, nullptr});
             return scatter_wide(four, bsdf, depth, onwards, block);
         }
         Interaction points[4];
         scene_.interactions(surfaces, hits, points);
-        auto point = [&](int i) { return shading(points[i], *four.paths[i], lane(direction, i), depth - 1); };
+        auto point = [&](int i) { return shading(points[i], *four.paths[i], lane(four.incoming, i), depth - 1); };
         const ShadingPoint each[] = {point(0), point(1), point(2), point(3)};
-        BSDFOf<double4> bsdf = made_of.bsdf(ShadingPoints{four.at, direction, scene_.illumination.version, each});
+        BSDFOf<double4> bsdf = made_of.bsdf(ShadingPoints{four.at, four.incoming, scene_.illumination.version, each});
         scatter_wide(four, bsdf, depth, onwards, block);
     }
     void scatter_wide(const WidePaths& four, BSDFOf<double4>& bsdf, int depth, int& onwards, Block& block) const {
@@ -696,6 +702,7 @@ class PathIntegrator {
             next.category = after(path.category, next.diffuse, depth);
             next.weight = left, next.pdf = sampled.pdf[i];
             next.ray = {lane(origin, i), lane(sampled.direction, i), 0, INFINITE};
+            if (has_pixels_) next.width = four.footprint[i], next.spread = depth == 1 ? scene_.camera.spread(lane(four.incoming, i)) : path.spread;
             next.may_touch = path.touches;
         }
     }
@@ -746,7 +753,7 @@ class PathIntegrator {
             shadowed.light = diffuse[i], shadowed.other = other[i], shadowed.has_other = others >> i & 1;
             shadowed.sample = four.samples[i], shadowed.category = after(path.category, true, depth);
             shadowed.traced = traced >> i & 1, shadowed.shadow_rays = choice.light[i]->shadow_rays;
-            if (transparent_) shadowed.ray = {SHADOW, false, false, depth, path.passed, path.scattered};
+            if (transparent_) shadowed.ray = {SHADOW, false, false, depth, path.passed, path.scattered, 0, has_pixels_ ? four.footprint[i] : 0};
             if (shadowed.traced) block.shadow_rays[slot].set(place, {lane(origin, i), lane(sample.direction, i), 0, end[i]});
         }
     }

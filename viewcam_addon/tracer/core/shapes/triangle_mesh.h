@@ -216,7 +216,8 @@ class TriangleSurfaces {
         b2_ = max(min(b2_, splat4(1.0) - b1_), splat4(0.0));
     }
 
-    // Where the rays meet them.
+    // Where the rays meet them: along the rays, and the points.
+    double4 t() const { return t_; }
     [[gnu::always_inline]] SurfacePoint<double4> points() const {
         long4 solid = is_solid();
         double4 side = this->side();
