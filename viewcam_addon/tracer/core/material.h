@@ -36,8 +36,8 @@ struct Material {
     // Whether it has normals of its own.
     bool is_bumped() const { return bumped_; }
     // Whether the BSDFs of four points can be made at once, and whether the points' own values are needed for that.
-    bool is_wide() const { return wide_ && scatters() && !emits() && !transparent_ && !bumped_ && !VIEWCAM_ISA::is_bumped(normal); }
-    bool varies() const { return std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.varies; }); }
+    bool is_wide() const { return wide_ && scatters() && !emits() && !transparent_ && !VIEWCAM_ISA::is_bumped(normal); }
+    bool varies() const { return bumped_ || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.varies; }); }
     // Whether it asks for the tangents of a UV map.
     bool needs_tangents() const {
         return normal_on_tangents || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.on_tangents; });

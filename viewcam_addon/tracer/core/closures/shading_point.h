@@ -116,8 +116,7 @@ struct ShadingPoint {
     double number_of_node(uint32_t node) const;
 };
 
-// Four points of one material, whose closures have no normals of their own. each: all that is known of a point, or null where all
-// inputs are the same everywhere.
+// Four points of one material. each: all that is known of a point, or null where all inputs are the same everywhere and ask for no normal.
 struct ShadingPoints {
     const SurfacePoint<double4>& point;
     Vec3x4 incoming;
@@ -130,7 +129,9 @@ struct ShadingPoints {
     double4 number(const Color& color) const {
         return color.varies() ? gather4([&](int i) { return each[i].number(color); }) : splat4(number_of(color.rgb));
     }
-    Vec3x4 normal(const Color&) const { return point.shading; }
+    Vec3x4 normal(const Color& given) const {
+        return each ? gather4([&](int i) { return each[i].normal(given); }) : point.shading;
+    }
     Vec3x4 specular(const Vec3x4& normal) const { return VIEWCAM_ISA::specular_normal(incoming, point.normal, normal); }
     Vec3x4 specular_normal(const Color& given) const { return specular(normal(given)); }
     long4 is_smooth(const MicrofacetsOf<double4>& facets) const { return is_mirror(facets, version); }
