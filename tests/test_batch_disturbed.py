@@ -18,6 +18,8 @@ from batch_folders import assert_same
 
 @pytest.mark.exhaustive
 class TestWheel(disturbed.Disturbances):
+    KILLS = 8  # of which the fifth is at the start
+
     @pytest.fixture(scope="class")
     @classmethod
     def blender(cls):

@@ -1,7 +1,7 @@
 """Hostile numbers against every public function of pinhole.py and intrinsics.py: a right answer or one sentence, nothing else.
 
 Each function has an attack below: it calls the function with what a `Source` gives it and looks at the answer. Hypothesis is
-one source; the exhaustive tests draw 100,000 times from a fast one. A public function without an attack fails a test.
+one source; the exhaustive tests draw 20,000 times from a fast one. A public function without an attack fails a test.
 """
 
 import inspect
@@ -378,7 +378,7 @@ def test_what_is_no_number_is_shown_in_one_short_line():
         Pinhole(np.array([[1.0, 2.0, 3.0]]), (0, 0, 0), (0, 0, 1), 500, 64, 48)
 
 
-TRIES = 100_000
+TRIES = 20_000
 
 
 @pytest.mark.exhaustive
@@ -387,14 +387,14 @@ TRIES = 100_000
     [attack for attack in dict.fromkeys(ATTACKS.values()) if attack is not what_many_numbers_give],
     ids=lambda attack: attack.__name__,
 )
-def test_a_hundred_thousand_random_and_hostile_inputs_to_each_function(attack):
+def test_twenty_thousand_random_and_hostile_inputs_to_each_function(attack):
     source = Random(seed=2)
     for _ in range(TRIES):
         attack(source)
 
 
 @pytest.mark.exhaustive
-def test_a_hundred_thousand_random_and_hostile_rays_points_and_poses_at_once():
+def test_twenty_thousand_random_and_hostile_rays_points_and_poses_at_once():
     source, many = Random(seed=3), 10_000
     for _ in range(TRIES // many):
         camera = some_camera(source)

@@ -1,12 +1,14 @@
 """Cameras of all kinds that formats must hold, points to see them by, and what float arithmetic allows a picture to err."""
 
 import contextlib
+import json
 import math
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
+from viewcam_addon import usd_stage
 from viewcam_addon.cameras import Camera, own
 from viewcam_addon.pinhole import Pinhole
 
@@ -46,6 +48,19 @@ def numbers_alone() -> Iterator[None]:
 def only_numbers():
     with numbers_alone():
         yield
+
+
+@pytest.fixture
+def openusd_in_this_process(monkeypatch, tmp_path):
+    """Stages that are ours are read by the same code as others, without the process of half a second that test_usd.py has."""
+
+    def read(name, path, text, size, values):
+        pytest.importorskip("pxr")
+        request = {"size": size, "values": values, "unpacked": str(tmp_path)}
+        request |= {"path": str(path.absolute())} if path else {"text": text}
+        return json.loads(json.dumps(usd_stage._read(request)))
+
+    monkeypatch.setattr(usd_stage, "read", read)
 
 
 def points_before(pinhole: Pinhole, count: int = 40, seed: int = 1) -> np.ndarray:

@@ -13,7 +13,7 @@ from viewcam_addon.errors import InputError
 
 from .conftest import CAMERAS, allowed, picture_error, points_before
 
-pytestmark = pytest.mark.usefixtures("only_numbers")
+pytestmark = pytest.mark.usefixtures("only_numbers", "openusd_in_this_process")
 
 UNMIRRORED = [name for name, pinhole in CAMERAS.items() if not pinhole.mirrored]
 UNSHIFTED = [name for name in UNMIRRORED if "shift" not in name and name != "off_the_picture"]

@@ -19,6 +19,8 @@ from viewcam_addon.pinhole import Pinhole
 
 from .conftest import CAMERAS, numbers_alone, points_before
 
+pytestmark = pytest.mark.usefixtures("openusd_in_this_process")
+
 SETTINGS = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 FLOAT64, FLOAT32 = 2.0**-53, 2.0**-24
 

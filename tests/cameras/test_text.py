@@ -250,7 +250,7 @@ def test_any_text_is_read_or_refused_in_a_sentence(text):
         assert all(isinstance(camera.pinhole, Pinhole) for camera in cameras_read)
 
 
-LENGTH = 250_000
+LENGTH = 100_000
 HUGE = {
     **{repr(piece): piece * (LENGTH // len(piece)) for piece in PIECES},
     "a long word": "a" * LENGTH,
@@ -292,14 +292,14 @@ HUGE = {
 
 
 @pytest.mark.parametrize("name", HUGE)
-def test_a_quarter_of_a_million_characters_takes_no_time(name):
+def test_a_hundred_thousand_characters_take_no_time(name):
     started = time.process_time()
     try:
         cameras.read(HUGE[name], options=Options(size=(640, 360), base=BASE))
     except InputError as error:
         assert len(str(error)) < 1200
-    # 0.25 s at most were measured on an idle machine; what is quadratic takes minutes at a million, and a sixteenth here.
-    assert time.process_time() - started < 2
+    # 0.1 s at most were measured on an idle machine; what is quadratic takes minutes at a million, and a hundredth here.
+    assert time.process_time() - started < 1
 
 
 # ---- simulators and differentiable renderers

@@ -43,6 +43,7 @@ def read(text, options=GIVEN):
     return cameras.read(text, options=options)
 
 
+@pytest.mark.usefixtures("openusd_in_this_process")
 @pytest.mark.parametrize(
     ("head", "eye", "right"),
     [
@@ -61,6 +62,7 @@ def test_a_stage_says_its_unit_and_what_points_up(head, eye, right):
     assert camera.pinhole.distance == pytest.approx((35 / 36 * 640,) * 2, rel=1e-6)  # which counts in no unit
 
 
+@pytest.mark.usefixtures("openusd_in_this_process")
 def test_what_is_chosen_comes_on_top_of_what_the_stage_says():
     text = stage(head='metersPerUnit = 0.01\n upAxis = "Y"')
     (twice,) = read(text, Options(size=(640, 360), scale=1000, axes="y_up"))
@@ -69,6 +71,7 @@ def test_what_is_chosen_comes_on_top_of_what_the_stage_says():
     assert turned.pinhole.eye == pytest.approx((3, 4.5, -1.5), rel=1e-15)
 
 
+@pytest.mark.usefixtures("openusd_in_this_process")
 @pytest.mark.parametrize("name", ["plain", "shifted_and_not_square", "telephoto"])
 def test_what_was_written_with_y_up_is_the_same_camera_whether_that_is_chosen_or_not(name):
     written_cameras = [Camera("a", CAMERAS[name])]
@@ -125,8 +128,15 @@ ARCS = {
 }
 
 
-@pytest.mark.parametrize("arc", ARCS)
-@pytest.mark.parametrize("outside", OUTSIDE, indirect=True)
+# Each of them as a reference, and by each of the other arcs those that a program could open.
+OUTSIDE_BY_ARC = [(each, "references") for each in OUTSIDE] + [
+    (each, arc)
+    for arc in ("payloads", "layers", "variants")
+    for each in ("an absolute path of a stage", "a path that leaves the folder", "a link that leads out")
+]
+
+
+@pytest.mark.parametrize(("outside", "arc"), OUTSIDE_BY_ARC, indirect=["outside"])
 def test_no_stage_opens_what_lies_outside_of_its_folder_or_is_no_file(folder, outside, arc):
     inside, head = (part.format(outside) for part in ARCS[arc])
     text = stage(inside, f'metersPerUnit = 1\n upAxis = "Z"\n {head}')

@@ -63,7 +63,7 @@ class Compared:
 # Trials that fail with a probability of 0.01 each have more failures than these once in a thousand (binomial distribution).
 TRIALS = [
     pytest.param(15, 2, id="15", marks=pytest.mark.slow),
-    pytest.param(1000, 21, id="1000", marks=pytest.mark.exhaustive),
+    pytest.param(200, 8, id="200", marks=pytest.mark.exhaustive),
 ]
 
 

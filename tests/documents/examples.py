@@ -4,8 +4,8 @@ A block of sh is as many examples as it has commands. They run in the page's ord
 and `blender` are the ones under test, and the files that the pages speak of are small scenes (scenes.py). Any other block is an
 example as a whole: programs are run, lists of shots and scenes rendered.
 
-test_examples.py runs all of them with a wheel, tests/real_blender/test_documents.py in the real Blender: a page is a test, for
-what stands further down in it needs what was done above.
+A page is a test, for what stands further down in it needs what was done above. Pages of `blender`'s commands are followed in
+the real Blender (tests/real_blender/test_documents.py), all others with a wheel (test_examples.py): each page once.
 """
 
 import json
@@ -52,11 +52,6 @@ NOT_RUN = {
 """Commands that no test runs, and why."""
 
 ZIP = "virtual_pinhole-VERSION-PLATFORM.zip"
-ONLY_REAL = {f"blender --command extension install-file -r user_default -e {ZIP}": "a wheel installs no extension so"}
-"""Commands that only a real Blender has, and why."""
-
-ONLY_WHEEL = "vp.check("  # which runs a Python that has bpy; Blender's own has none
-
 WRITTEN = {
     ("docs/farm.md", "yaml"): "tests/jobs/test_cluster.py has a farm that is configured so",
     ("docs/ci.md", "yaml"): "tests/test_pytest_plugin.py does what its steps do",
@@ -94,16 +89,19 @@ def of_page(page: str, text: str) -> list[Example]:
     return result
 
 
-def is_run(example: Example, real: bool) -> bool:
-    """True if a test runs it, in a real Blender or with a wheel."""
-    only_shown = (example.page, example.language) in WRITTEN
-    is_possible = ONLY_WHEEL not in example.text if real else example.text not in ONLY_REAL
-    return not only_shown and example.text not in NOT_RUN and is_possible
+def is_run(example: Example) -> bool:
+    """True if a test runs it."""
+    return (example.page, example.language) not in WRITTEN and example.text not in NOT_RUN
 
 
 def pages(real: bool) -> list[str]:
-    """The pages of which something is run."""
-    return list(dict.fromkeys(example.page for example in examples() if is_run(example, real)))
+    """The pages of which something is run in the real Blender, whose commands are `blender`'s alone, or with a wheel."""
+    run = [example for example in examples() if is_run(example)]
+    programs: dict[str, set[str]] = {example.page: set() for example in run}
+    for example in run:
+        if example.language == "sh":
+            programs[example.page].add(example.text.split()[0])
+    return [page for page, names in programs.items() if (names == {"blender"}) == real]
 
 
 def _commands(block: str) -> list[str]:
@@ -144,11 +142,11 @@ class Reader:
         if extension:
             shutil.copy(extension, self._files / ZIP)
 
-    def follow(self, page: str, real: bool) -> None:
+    def follow(self, page: str) -> None:
         """Run all of a page's examples; AssertionError with each that does not do what the page says."""
         failed = []
         for example in examples():
-            if example.page == page and is_run(example, real):
+            if example.page == page and is_run(example):
                 try:
                     self.run(example)
                 except (AssertionError, ValueError) as error:
@@ -228,21 +226,10 @@ def with_wheel(folder: Path) -> Reader:
 
 
 def with_blender(folder: Path, program: str, user_folder: Path, extension: Path) -> Reader:
-    """A reader who has a real Blender and the extension in it: what runs in the shell runs inside that Blender.
-
-    But for a cluster's own programs, which Blender's Python does not have: they stay in the shell, and that Blender renders.
-    """
+    """A reader who has a real Blender and the extension in it."""
     path = os.environ["PATH"]  # the program may be a script that looks for a blender of its own
     blender = f'PATH="{path}" exec "{program}" "$@"'
-    viewcam = f"""case "$*" in *--workers*)
-export PYTHONPATH="{ROOT}" VIEWCAM_BLENDER="{folder / "programs" / "blender"}"
-exec "{sys.executable}" -m viewcam_addon "$@" ;;
-esac
-command=$1; shift
-case $command in
-render|compare|camera|labels) exec blender -q -b --command viewcam $command "$@" ;;
-*) file=$1; shift; exec blender -q -b "$file" --command viewcam $command "$@" ;;
-esac"""
+    viewcam = "exit 127"  # none of these pages has it
     python = ["sh", "-c", 'program=$1; shift; exec blender -b --python-exit-code 9 --python "$program" -- "$@"', "sh"]
     package = "bl_ext.user_default.virtual_pinhole.viewcam_addon"
     return Reader(folder, blender, viewcam, python, {"BLENDER_USER_RESOURCES": str(user_folder)}, package, extension)

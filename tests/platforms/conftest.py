@@ -1,6 +1,5 @@
 """Pythons of other platforms, emulated (.ci/emulated.py), and what this machine computes, to compare with."""
 
-import importlib.util
 import json
 import subprocess
 import sys
@@ -9,24 +8,16 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path[:0] = [str(ROOT), str(ROOT / ".ci")]  # hatch_build, emulated, extension
 HASHES = Path(__file__).with_name("picture_hashes.py")
 LONGEST = 1500
 """Seconds: a machine of two cores that has other work, too."""
 
 
-def loaded(name: str):
-    """A module of .ci."""
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, ROOT / ".ci" / f"{name}.py")
-        sys.modules[name] = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(sys.modules[name])
-    return sys.modules[name]
-
-
 @pytest.fixture(scope="session")
 def run_emulated():
     """run_emulated(platform, arguments…) → what Python printed there; fails the test if its exit status is another."""
-    emulated = loaded("emulated")
+    import emulated
 
     def run(platform, *arguments, status=0, **variables):
         child = emulated.start(platform, *arguments, **variables)
@@ -35,12 +26,6 @@ def run_emulated():
         return printed
 
     return run
-
-
-@pytest.fixture(scope="session")
-def of_windows():
-    """The path as programs of Windows have it."""
-    return loaded("emulated").of_windows
 
 
 @pytest.fixture(scope="session")
@@ -55,6 +40,16 @@ def sample_scenes(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def hashes_here(sample_scenes):
-    """The hashes of the sample scenes' pictures on this machine: 'scene level pass' → hash."""
+    """Hashes of the sample scenes' pictures and of the core's functions on this machine: 'scene level pass' → hash."""
     done = subprocess.run([sys.executable, HASHES, "2", *sample_scenes], check=True, capture_output=True, text=True)
     return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="session")
+def hashes_there(run_emulated):
+    """hashes_there(platform, threads, scene files): the same as hashes_here, on another platform."""
+
+    def run(platform, threads, scenes):
+        return json.loads(run_emulated(platform, HASHES, threads, *scenes).splitlines()[-1])
+
+    return run

@@ -11,6 +11,7 @@ import types
 import zipfile
 from pathlib import Path
 
+import extension
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -34,9 +35,6 @@ def loaded(name: str, path: Path) -> types.ModuleType:
     sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
-
-
-extension = loaded("viewcam_ci_extension", ROOT / ".ci" / "extension.py")
 
 
 class Installer:

@@ -15,7 +15,6 @@ import pytest
 pytestmark = [pytest.mark.platforms, pytest.mark.timeout(3600)]
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-HASHES = Path(__file__).with_name("picture_hashes.py")
 CORNELL, STUDIO = ROOT / "sample_scenes" / "cornell.blend", ROOT / "sample_scenes" / "studio.blend"
 BLENDERS = ["4.2", "5.0"]
 DATASETS = {"coco": "coco.json", "panoptic": "panoptic.json", "bop": "bop", "colmap": "colmap", "kitti": "kitti"}
@@ -105,21 +104,22 @@ def viewcam(run_emulated):
 @pytest.fixture(scope="session")
 def windows_wheels():
     """The wheels that the Windows zip brings along, the core's among them."""
-    sys.path.insert(0, str(ROOT / ".ci"))
     import extension
 
     return [*extension.pure_wheels(), *extension.wheels_of("windows-x64"), extension.core_wheel("windows-x64", ROOT / "wheels")]
 
 
 @pytest.mark.parametrize("threads", [2, 8])
-def test_smoke_the_core_s_pictures_have_linux_bits_in_threads(run_emulated, sample_scenes, hashes_here, threads):
-    there = json.loads(run_emulated("windows-4.2", HASHES, threads, *sample_scenes).splitlines()[-1])
+def test_smoke_the_core_s_pictures_have_linux_bits_in_threads(sample_scenes, hashes_here, hashes_there, threads):
+    there = hashes_there("windows-4.2", threads, sample_scenes)
     different = [name for name in hashes_here if there[name] != hashes_here[name]]
     assert there.keys() == hashes_here.keys() and not different, f"{len(different)} of {len(there)}: {different}"
 
 
-def test_smoke_the_zip_s_wheels_are_installed_and_used_as_4_2_does(run_emulated, of_windows, windows_wheels, tmp_path):
+def test_smoke_the_zip_s_wheels_are_installed_and_used_as_4_2_does(run_emulated, windows_wheels, tmp_path):
     """The wheels of Python 3.11 are installed; and a file is checked with them and no other packages than Blender's own."""
+    from emulated import of_windows
+
     wheels = [of_windows(wheel) for wheel in windows_wheels if re.search("cp311|py3", wheel.name)]
     script = Path(__file__).with_name("wheels_in_blender.py")
     printed = run_emulated("windows-4.2-bare", script, of_windows(tmp_path / "local"), *wheels)
@@ -160,14 +160,13 @@ def test_the_studio_s_reference_labels_and_datasets_have_linux_bytes(viewcam, bl
     assert different_files(tmp_path / "linux", tmp_path / "windows") == []
 
 
-def test_none_of_fifty_processes_crashes_in_two_to_eight_threads(run_emulated, sample_scenes, hashes_here):
+def test_none_of_fifty_processes_crashes_in_two_to_eight_threads(sample_scenes, hashes_here, hashes_there):
     """A loader places a thread's storage amiss in some processes only."""
     (cornell,) = (path for path in sample_scenes if path.stem == "cornell")
     expected = {name: value for name, value in hashes_here.items() if name.startswith(("cornell ", "function "))}
     for run in range(50):
         threads = 2 + run % 7
-        there = json.loads(run_emulated("windows-5.0", HASHES, threads, cornell).splitlines()[-1])
-        assert there == expected, f"in {threads} threads, run {run}"
+        assert hashes_there("windows-5.0", threads, [cornell]) == expected, f"in {threads} threads, run {run}"
 
 
 KILLED = """

@@ -2,7 +2,7 @@
 
 import bpy
 from artist_hands import FOLDER, choose_in_the_file_browser, picture, room, warnings
-from panel_in_a_window import NOWHERE, camera, click, press, region, values, window
+from hands_in_a_window import NOWHERE, camera, click, press, region, values, window
 from tour_hands import SIDEBAR, VIEWPORT, call, drag, find, look, push, settle, strike, until
 
 

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import bpy
-from panel_in_a_window import NOWHERE, camera, move, region, window
+from hands_in_a_window import NOWHERE, camera, move, region, window
 from tour_hands import PROPERTIES, SIDEBAR, call, drag, find, photograph, settle, until
 
 FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])

@@ -3,7 +3,7 @@
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python artist_in_a_window.py -- FOLDER [PICTURES]
 
 FOLDER : where rendered pictures and reports go. PICTURES : where pictures of the window go; without it none are taken.
-What each part of the add-on does beyond that day is in panel_, handles_, proof_ and cameras_in_a_window.py.
+What each part of the add-on does beyond that day is in tour_, handles_, proof_ and cameras_in_a_window.py.
 Leaves with status 0, or 5 and a traceback.
 """
 
@@ -19,7 +19,7 @@ import artist_lens
 import artist_moves
 import artist_photo
 import artist_proof
-from panel_in_a_window import open_the_panels, start
+from hands_in_a_window import open_the_panels, start
 
 # What would send an artist away again, and what is tried of it. Each part goes on where the one before it has ended.
 DAY = {
@@ -63,4 +63,4 @@ def steps():
     print("done: the day", flush=True)
 
 
-start(steps, interval=0.01)
+start(steps)

@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 from artist_hands import PULL, in_properties, picture, pulled, room, show
-from panel_in_a_window import camera, click, is_at_its_values, press, region, values, window
+from hands_in_a_window import camera, click, is_at_its_values, press, region, values, window
 from tour_hands import PROPERTIES, SIDEBAR, find, look, push, type_into, write
 
 EMPTY_SCENE_LENS = 50.0

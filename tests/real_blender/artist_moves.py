@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from artist_hands import PULL, picture, warnings
 from bpy_extras.object_utils import world_to_camera_view
-from panel_in_a_window import NOWHERE, camera, is_at_its_values, move, press, region, same, state, strike, values, window
+from hands_in_a_window import NOWHERE, camera, is_at_its_values, move, press, region, same, state, strike, values, window
 from tour_hands import find, push, unfold
 
 

@@ -5,7 +5,7 @@ import math
 import bpy
 import numpy as np
 from artist_hands import FOLDER, picture, room
-from panel_in_a_window import NOWHERE, press, region, window
+from hands_in_a_window import NOWHERE, press, region, window
 from tour_hands import match_photo, push_undo, seen, settle, undo
 
 LENS = 42.0

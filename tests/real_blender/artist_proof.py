@@ -4,7 +4,7 @@ import time
 
 import bpy
 from artist_hands import FOLDER, picture, room
-from panel_in_a_window import NOWHERE, camera, press, window
+from hands_in_a_window import NOWHERE, camera, press, window
 from tour_hands import call, settle, until
 
 PATIENCE = 120  # seconds that one comparison may take on a busy machine

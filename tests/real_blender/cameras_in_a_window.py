@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
-from panel_in_a_window import NOWHERE, click, open_the_panels, press, region, start, window
+from hands_in_a_window import NOWHERE, click, open_the_panels, press, region, start, window
 from tour_hands import VIEWPORT, call, find, photograph, push_undo, redo, settle, undo, until
 
 FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
@@ -173,4 +173,4 @@ def steps():
         print(f"done: {part.__name__}", flush=True)
 
 
-start(steps, interval=0.02)
+start(steps)

@@ -20,8 +20,8 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 sys.path.append(str(Path(__file__).parent))
+from hands_in_a_window import ROW, move, region, start, window
 from mathutils import Euler
-from panel_in_a_window import ROW, move, region, start, window
 from tour_hands import SCREEN_HEIGHT
 
 PART, FILE, OUT = sys.argv[sys.argv.index("--") + 1 :]

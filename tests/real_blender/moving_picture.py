@@ -13,7 +13,7 @@ import bpy
 
 sys.path.append(str(Path(__file__).parent))
 import tour_step
-from panel_in_a_window import move, region, show_the_panel, start, window
+from hands_in_a_window import move, region, show_the_panel, start, window
 from tour_hands import VIEWPORT, begin, call, find, on_screen, photograph
 
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
@@ -86,4 +86,4 @@ def steps():
     print("done: the moving picture", flush=True)
 
 
-start(steps, interval=0.01)
+start(steps)

@@ -15,7 +15,7 @@ from pathlib import Path
 import bpy
 
 sys.path.append(str(Path(__file__).parent))
-from panel_in_a_window import NOWHERE, press, region, start, window
+from hands_in_a_window import NOWHERE, press, region, start, window
 from tour_hands import SIDEBAR, VIEWPORT, call, hide_the_sidebar, match_photo, photograph, seen, settle, until
 from tour_step import room
 
@@ -210,4 +210,4 @@ def steps():
 
 
 STEPS = (photo_match, preferences, export, reference_over_eevee, reference_in_the_viewport, proof)
-start(steps, interval=0.01)
+start(steps)

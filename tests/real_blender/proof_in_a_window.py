@@ -19,7 +19,7 @@ from pathlib import Path
 import bpy
 
 sys.path.append(str(Path(__file__).parent))
-from panel_in_a_window import NOWHERE, click, move, press, region, start, unfold, window
+from hands_in_a_window import NOWHERE, click, move, press, region, start, unfold, window
 from tour_hands import SIDEBAR, look, photograph
 
 FILE, FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])

@@ -40,13 +40,8 @@ def test_what_stands_in_braces_is_an_event_and_the_last_tells_the_status(real_bl
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--out", "OUT"], "which shots is not said"),
-        (["none.csv", "--out", "OUT"], "none.csv"),
-        (["--out", "OUT", "none.csv"], "none.csv"),
-        (["--orbit", "3"], "--out"),
-        (["--orbit", "3", "--workers", "0", "--out", "OUT"], "'0'"),
+        (["--orbit", "3", "--workers", "0", "--out", "OUT"], "'0'"),  # before the file is looked at
         (["--orbit", "3", "--camera", "Camra", "--out", "OUT"], "'Camra'"),
-        (["--orbit", "3", "--out", CORNELL], "can't be a folder"),
     ],
 )
 def test_each_wrong_word_is_one_sentence(real_blender, tmp_path, words, message):
@@ -106,7 +101,6 @@ def test_a_blender_without_dask_says_what_to_install_and_renders_nothing(real_bl
 # --- A batch's pictures are those of `blender -b FILE -f N`, to the bit in every channel: what a pipeline rendered before it
 
 
-SCENES = "sample_scenes"
 # Small, few samples, 32 bits; everything else as the artist has it.
 SMALL = """
 import bpy
@@ -126,20 +120,16 @@ def channels(path):
 
 
 @pytest.mark.parametrize("engine", ["CYCLES", "VIEWCAM"])
-@pytest.mark.parametrize("name", ["flight", "studio"])
-def test_frames_of_a_batch_are_those_of_f(real_blender, tmp_path, name, engine):
-    """One camera moves by its keyed values (flight), one stands (studio)."""
+def test_frames_of_a_batch_are_those_of_f(real_blender, tmp_path, engine):
+    """The camera moves by its keyed values."""
     blend, frames = tmp_path / "small.blend", (3, 40)
     script = SMALL.format(engine=engine, blend=str(blend))
-    check(real_blender.run("-b", f"{SCENES}/{name}.blend", "--python-exit-code", "9", "--python-expr", script))
+    check(real_blender.run("-b", "sample_scenes/flight.blend", "--python-exit-code", "9", "--python-expr", script))
     check(real_blender.run("-b", blend, "-o", tmp_path / "f_###", "-f", "{},{}".format(*frames)))
     shots = tmp_path / "shots.csv"
-    camera = "import bpy; print('CAMERA', bpy.context.scene.camera.name)"
-    output = real_blender.run("-b", blend, "--python-expr", camera).stdout
-    (camera,) = [line.removeprefix("CAMERA ") for line in output.splitlines() if line.startswith("CAMERA ")]
     # Backwards and once more: what is kept from one frame is in the way of another, if it is.
-    rows = [f"{place}_{frame:03},{camera},{frame}" for place, frame in enumerate((*frames, frames[0]))]
-    shots.write_text("\n".join(["name,camera,frame", *rows]))
+    rows = [f"{place}_{frame:03},{frame}" for place, frame in enumerate((*frames, frames[0]))]
+    shots.write_text("\n".join(["name,frame", *rows]))
     check(real_blender.run("-b", blend, "--command", "viewcam", "batch", shots, "--out", tmp_path / "batch"))
     for place, frame in enumerate((*frames, frames[0])):
         by_f, other = channels(tmp_path / f"f_{frame:03}.exr"), channels(tmp_path / "batch" / f"{place}_{frame:03}.exr")
@@ -147,8 +137,7 @@ def test_frames_of_a_batch_are_those_of_f(real_blender, tmp_path, name, engine):
         others = {key: int((by_f[key] != other[key]).sum()) for key in by_f if not np.array_equal(by_f[key], other[key])}
         assert not others, f"frame {frame}: pixels that differ, by channel: {others}"
     first, second = (channels(tmp_path / f"f_{frame:03}.exr") for frame in frames)
-    if name == "flight":
-        assert any(not np.array_equal(first[key], second[key]) for key in first), "two frames are one picture"
+    assert any(not np.array_equal(first[key], second[key]) for key in first), "two frames are one picture"
 
 
 def check(outcome):

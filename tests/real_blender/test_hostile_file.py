@@ -11,7 +11,7 @@ ARMS = Path(__file__).parents[1] / "blender" / "test_opening.py"
 SMALL = ("--size", "16x16", "--samples", "1")
 
 
-@pytest.fixture(params=["driver", "registered_text", "freestyle_script"])
+@pytest.fixture(params=["driver", "registered_text"])
 def hostile(request, tmp_path):
     """(the file, the folder of what it has done), armed by the wheel of Blender."""
     environment = {**os.environ, "PYTHONPATH": str(ARMS.parents[2])}

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from panel_in_a_window import NOWHERE, press, window
+from hands_in_a_window import NOWHERE, press, window
 from tour_hands import call, key_over, push, type_into
 from tour_step import Step, camera, is_at_its_values, room, values
 

@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 import bpy
-from panel_in_a_window import move, press, region, window
+from hands_in_a_window import move, press, region, window
 from tour_hands import call, push, unfold
 from tour_step import UPPER_PART, Step, camera, is_at_its_values, room, values
 

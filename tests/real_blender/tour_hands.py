@@ -1,6 +1,6 @@
 """An artist's hand in a real Blender with a window: finds a button and clicks it, types, drags, looks at the screen.
 
-Everything is a generator that a timer steps (panel_in_a_window.py), so that Blender handles the events and draws in between. No
+Everything is a generator that a timer steps (hands_in_a_window.py), so that Blender handles the events and draws in between. No
 coordinate of a button is assumed: the mouse moves over the panel, and Blender is asked which property or operator it is on.
 Where a button stood the last time is looked at first.
 """
@@ -12,8 +12,8 @@ import bpy
 import tour_step
 from bpy_extras.object_utils import world_to_camera_view
 from bpy_extras.view3d_utils import location_3d_to_region_2d
+from hands_in_a_window import NOWHERE, click, move, open_the_panels, press, region, window
 from mathutils import Euler, Vector
-from panel_in_a_window import NOWHERE, click, move, open_the_panels, press, region, window
 
 SIDEBAR, PROPERTIES, VIEWPORT = ("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW"), ("VIEW_3D", "WINDOW")
 SCREEN_HEIGHT = 2000

@@ -17,7 +17,7 @@ sys.path.append(str(Path(__file__).parent))
 import tour
 import tour_step
 from bpy_extras.view3d_utils import location_3d_to_region_2d
-from panel_in_a_window import move, region, start, window
+from hands_in_a_window import move, region, start, window
 from tour_hands import SIDEBAR, VIEWPORT, begin, beside, lowest_button, photograph, push_undo, redo, survey_the_rest, undo
 
 FOLDER, *WANTED = sys.argv[sys.argv.index("--") + 1 :] or [None]
@@ -117,4 +117,4 @@ def steps():
     print("done: the tour", flush=True)
 
 
-start(steps, interval=0.01)
+start(steps)

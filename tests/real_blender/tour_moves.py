@@ -4,9 +4,9 @@ import math
 
 import bpy
 import numpy as np
-from panel_in_a_window import region
+from hands_in_a_window import region
 from tour_hands import call, hide_the_sidebar, push, unfold
-from tour_step import Step, axes, camera, is_at_its_values, select, values
+from tour_step import SIZE, Step, axes, camera, is_at_its_values, select, values
 
 
 class _Move(Step):
@@ -101,6 +101,10 @@ class FromTheCurrentView(_Move):
         np.testing.assert_allclose(values().look_at, view.view_location, atol=1e-6)
         np.testing.assert_allclose(axes(), view.view_rotation.to_matrix(), atol=1e-6)
         is_at_its_values()
+        if not bpy.app.background:  # the matrix with which the viewport is drawn, which nothing but a window draws
+            lens = min(view.window_matrix[i][i] * pixels / 2 for i, pixels in enumerate(SIZE))
+            # float32: the matrix, its lens and sensor, and the property.
+            np.testing.assert_allclose(values().numbers()[3], lens, rtol=8 * 2**-24)
 
 
 class Dolly(_Move):

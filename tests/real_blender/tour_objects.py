@@ -1,7 +1,7 @@
 """The tour: the camera as an object among objects, by Blender's own keys. tests/blender/odd has many more of these."""
 
 import bpy
-from panel_in_a_window import NOWHERE, press
+from hands_in_a_window import NOWHERE, press
 from tour_hands import call
 from tour_step import Step, select, state, values
 

@@ -2,7 +2,7 @@
 
 import bpy
 import numpy as np
-from panel_in_a_window import NOWHERE, click, press
+from hands_in_a_window import NOWHERE, click, press
 from tour_hands import key_over, on_screen, strike
 from tour_step import UPPER_PART, Step, axes, camera, is_at_its_values, select, values
 

@@ -2,7 +2,7 @@
 
 import bpy
 import numpy as np
-from panel_in_a_window import region, window
+from hands_in_a_window import region, window
 from tour_hands import VIEWPORT, drag, hide_the_sidebar, on_screen
 from tour_step import Step, is_at_its_values, room, select, values
 

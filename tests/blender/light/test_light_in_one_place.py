@@ -37,7 +37,7 @@ def room(scene, camera, add, add_lamp, mesh_from):
         add(painted(mesh_from("uv_sphere", radius=0.6), (0.7, 0.7, 0.2)), "Ball", (1.4, 1.4, 0.8))
         add(painted(mesh_from("plane", size=8), (0.3, 0.5, 0.4)), "Wall", (0, 4, 0), rotation_euler=(1.4, 0, 0))
         add_lamp("SUN", (0, 0, 5), (0.5, 0.2, 0), energy=3.0, angle=0.2)
-        scene.render.resolution_x, scene.render.resolution_y = 96, 64
+        scene.render.resolution_x, scene.render.resolution_y = 72, 48
 
     return make
 
@@ -56,7 +56,7 @@ def test_light_on_surfaces_in_one_place_is_taken_out_and_named(room, tmp_path, r
     assert set(comparison.taken_out.names) == {"Floor", kind.capitalize()}
     assert 0.02 < comparison.taken_out.pixels.mean() < 0.9
     assert 0.02 < comparison.not_modeled.share < 0.9 and set(comparison.not_modeled.names) == {"Floor", kind.capitalize()}
-    brighter = tuple(replace(lamp, irradiance=tuple(1.03 * x for x in lamp.irradiance)) for lamp in exported.lamps)
+    brighter = tuple(replace(lamp, irradiance=tuple(1.06 * x for x in lamp.irradiance)) for lamp in exported.lamps)
     assert not compared(replace(exported, lamps=brighter), level, tests, exported).passed
 
 
@@ -111,7 +111,7 @@ def lit_past_a_sheet(scene, camera, add, add_lamp, mesh_from):
         else:
             lamp = add_lamp("AREA", (0, 0, 4), energy=300.0, size=4.0)
             lamp.name, lamp.data.use_shadow = "Lamp", light != "shadowless"
-        scene.render.resolution_x, scene.render.resolution_y = 96, 64
+        scene.render.resolution_x, scene.render.resolution_y = 48, 32
 
     return make
 
@@ -140,7 +140,7 @@ def test_light_past_what_not_all_rays_see_is_taken_out_and_named(lit_past_a_shee
     assert comparison.not_modeled.names == (name,)
     if light != "shadowless":  # which the ledger tells as approximated already
         assert "but for 1 shadow that not all rays see" in comparison.sentence and "not modeled" not in comparison.sentence
-    brighter = [replace(image, passes={**image.passes, "Combined": 1.03 * image["Combined"]}) for image in tests]
+    brighter = [replace(image, passes={**image.passes, "Combined": 1.06 * image["Combined"]}) for image in tests]
     assert not compared(exported, "direct", brighter).passed
 
 
@@ -152,7 +152,7 @@ def lit_from_the_ceiling(scene, camera, add, add_lamp, mesh_from):
         add(mesh_from("plane", size=4), "Floor", (0, 0, -1))
         add(mesh_from("plane", size=4), "Ceiling", (0, 0, 2), rotation_euler=turned)
         add_lamp("AREA", (0, 0, 2), turned, energy=100.0)
-        scene.render.resolution_x, scene.render.resolution_y = 96, 64
+        scene.render.resolution_x, scene.render.resolution_y = 48, 32
 
     return make
 
