@@ -197,7 +197,7 @@ inline void bsdf(const ViewcamClosure& closure, int version, size_t count, const
     }
 }
 // What the last of some nodes makes on a floor, z up, whose UV is (u, v): given: (count, 6), the unit way that a path came along, u,
-// v, and whether the floor is met from behind. out: (count, 4), a colour or vector, and the number that it is.
+// v, and whether the floor is met from behind. out: (count, 4), a color or vector, and the number that it is.
 inline void nodes(const Scene& scene, size_t count, const double* given, double* out) {
     const Illumination& light = scene.illumination;
     if (light.nodes.all.empty()) throw std::invalid_argument("there is no node");

@@ -96,7 +96,7 @@ struct Material {
             weight *= factor.rest ? 1.0 - value : value;
         }
         if (!any(weight > 0.0)) return;
-        std::visit([&](const auto& closure) { if constexpr (requires { closure.add_to(bsdf, at, grey(weight)); }) closure.add_to(bsdf, at, grey(weight)); }, one.closure);
+        std::visit([&](const auto& closure) { if constexpr (requires { closure.add_to(bsdf, at, gray(weight)); }) closure.add_to(bsdf, at, gray(weight)); }, one.closure);
     }
     // The mean over images, and above 0 where these may be.
     static double mean_weight(const WeightedClosure& one, const std::vector<Texture>& textures) {

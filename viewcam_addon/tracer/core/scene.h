@@ -284,9 +284,9 @@ class Scene {
         const Bvh& bvh = spheres ? spheres->bvh : triangles_[object.geometry].bvh;
         Bounds box;
         if (bvh.root == NOTHING || object.flat) return box;
-        Vec3 half = bvh.half / bvh.scale, reach = abs(bvh.centre) + half;
+        Vec3 half = bvh.half / bvh.scale, reach = abs(bvh.center) + half;
         double rounding = 16 * DOUBLE_ROUNDING * (object.stretched(max_component(reach)) + max_component(abs(object.to_world.translation())));
-        Vec3 middle = object.to_world.point(bvh.centre), size;
+        Vec3 middle = object.to_world.point(bvh.center), size;
         for (int row = 0; row < 3; row++) {
             const double* m = object.to_world.m[row];
             double sum = std::fabs(m[0]) * half.x + std::fabs(m[1]) * half.y + std::fabs(m[2]) * half.z + rounding;
@@ -411,7 +411,7 @@ inline Vec3 tangent_within(const ShadingPoint& at, Vec3 direction) {
     return cross(normal, safe::normalized(cross(at.to_world_normal(direction), normal)));
 }
 inline Vec3 ShadingPoint::tangent_round(int axis) const {
-    Vec3 out = generated() - grey(0.5);
+    Vec3 out = generated() - gray(0.5);
     return tangent_within(*this, axis == 0 ? Vec3{0, -out.z, out.y} : axis == 1 ? Vec3{-out.z, 0, out.x} : Vec3{-out.y, out.x, 0});
 }
 inline Vec3 ShadingPoint::tangent_along(const std::string& uv) const {

@@ -74,7 +74,7 @@ inline double schlick_seen(double roughness, double cosine) {
 // What more than one scattering makes of a lobe whose mean Fresnel term is given: its albedo is multiplied by `albedo`, and the
 // lobe itself by `lobe` on top of that.
 template <class T> struct MultipleScatteringOf {
-    Vec3Of<T> albedo = grey(splat<T>(1));
+    Vec3Of<T> albedo = gray(splat<T>(1));
     T lobe = splat<T>(1);
 
     static MultipleScatteringOf of(AlbedoOf<T> single, Vec3Of<T> fresnel) {

@@ -1,6 +1,6 @@
 // What closures become at a point of a surface: the BSDF, a sum of lobes, what it gives off and what it lets straight through.
 //
-// A path takes one lobe only, chosen in proportion to the lobes' colours, and its weight is divided by that share: where there
+// A path takes one lobe only, chosen in proportion to the lobes' colors, and its weight is divided by that share: where there
 // is one lobe, it is taken and nothing is random. Glass is two lobes, shared out by Fresnel's equations.
 #pragma once
 #include <concepts>
@@ -20,9 +20,9 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-// One line a kind of lobe. Each has a colour (the most that it sends on), KIND (by which objects and lights hide and by which
+// One line a kind of lobe. Each has a color (the most that it sends on), KIND (by which objects and lights hide and by which
 // bounces are counted), DELTA (whether its direction is no matter of chance), IS_DIFFUSE (whether passes count it so), eval, pdf
-// and sample; `importance` where what it scatters is not its colour. Those of four points at once are templates.
+// and sample; `importance` where what it scatters is not its color. Those of four points at once are templates.
 template <class T> struct LobeOf {
     using Kinds = std::variant<LambertOf<T>, OrenNayarOf<T>, SpecularReflectionOf<T>, MicrofacetReflectionOf<T>>;
 };

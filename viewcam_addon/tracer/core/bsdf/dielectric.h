@@ -16,7 +16,7 @@ inline Vec3 refracted(Vec3 incoming, Vec3 normal, double ratio) {
     return across - normal * std::sqrt(1 - squared);
 }
 
-// The part of unpolarised light that a clear surface reflects; the rest is refracted.
+// The part of unpolarized light that a clear surface reflects; the rest is refracted.
 // cosine: of the angle between ray and normal, 0 to 1. ratio: as of `refracted`.
 template <class T> inline T fresnel(T cosine, T ratio) {
     T excess = ratio * ratio - 1.0, squared = excess + cosine * cosine;

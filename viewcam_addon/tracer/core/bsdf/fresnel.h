@@ -1,9 +1,9 @@
 // Fresnel terms: which part of light a facet reflects, by the cosine of the angle between ray and facet.
 //
 // One line a term in the variant. The scaled dielectric is what Cycles makes of glass and of Principled's specular, a Fresnel
-// curve that is stretched between a colour at normal incidence and white at grazing; F82 is Kutz, Hasan and Edmondson's model of
+// curve that is stretched between a color at normal incidence and white at grazing; F82 is Kutz, Hasan and Edmondson's model of
 // metals (Novel Aspects of the Adobe Standard Material, 2021) with the tint at 82°. `mean` is twice the integral of c F(c), which
-// light that is scattered among facets more than once is coloured by; the fit for dielectrics is Kulla and Conty's (2017).
+// light that is scattered among facets more than once is colored by; the fit for dielectrics is Kulla and Conty's (2017).
 #pragma once
 #include <variant>
 
@@ -17,8 +17,8 @@ template <class T> inline Vec3Of<T> unit_range(Vec3Of<T> x) { return {unit_range
 inline double mix(double a, double b, double t) { return a + (b - a) * t; }
 inline double4 mix(double4 a, double4 b, double4 t) { return a + (b - a) * t; }
 template <class T> inline Vec3Of<T> mix(Vec3Of<T> a, Vec3Of<T> b, Scalar<T> t) { return a + (b - a) * t; }
-inline Vec3 grey(double value) { return {value, value, value}; }
-inline Vec3x4 grey(double4 value) { return {value, value, value}; }
+inline Vec3 gray(double value) { return {value, value, value}; }
+inline Vec3x4 gray(double4 value) { return {value, value, value}; }
 
 // Of the index of refraction, what is reflected straight back; and the index that reflects so much.
 template <class T> inline T f0_of(T ior) {
@@ -40,44 +40,44 @@ template <class T> inline T fresnel_progress(T reflectance, T ior) {
 }
 
 struct NoFresnel {
-    template <class T> Vec3Of<T> at(T) const { return grey(splat<T>(1)); }
+    template <class T> Vec3Of<T> at(T) const { return gray(splat<T>(1)); }
 };
 
 // ratio: as of `fresnel`.
 template <class T> struct DielectricFresnelOf {
     T ratio;
-    Vec3Of<T> at(T cosine) const { return grey(fresnel(cosine, ratio)); }
+    Vec3Of<T> at(T cosine) const { return gray(fresnel(cosine, ratio)); }
 };
 
 // Of a surface that reflects nothing but where Snell's law lets no light through.
 template <class T> struct TotalReflectionOf {
     T ratio;
-    Vec3Of<T> at(T cosine) const { return grey(select(Mask<T>(fresnel(cosine, ratio) < 1.0), T{}, splat<T>(1))); }
+    Vec3Of<T> at(T cosine) const { return gray(select(Mask<T>(fresnel(cosine, ratio) < 1.0), T{}, splat<T>(1))); }
 };
 
 template <class T> struct ScaledDielectricOf {
     T ratio;
     Vec3Of<T> f0;
-    Vec3Of<T> at(T cosine) const { return mix(f0, grey(splat<T>(1)), fresnel_progress(fresnel(cosine, ratio), ratio)); }
+    Vec3Of<T> at(T cosine) const { return mix(f0, gray(splat<T>(1)), fresnel_progress(fresnel(cosine, ratio), ratio)); }
 };
 
 template <class T> struct F82Of {
     Vec3Of<T> f0, b;
 
-    static F82Of of(Vec3Of<T> f0, Vec3Of<T> tint) { return {f0, near_grazing(f0) * (grey(splat<T>(1)) - tint) * splat<T>(LIFT)}; }
+    static F82Of of(Vec3Of<T> f0, Vec3Of<T> tint) { return {f0, near_grazing(f0) * (gray(splat<T>(1)) - tint) * splat<T>(LIFT)}; }
     // The curve with these values at 0° and at the angle whose cosine is 1/7.
     static F82Of through(Vec3Of<T> f0, Vec3Of<T> f82) { return {f0, (near_grazing(f0) - f82) * splat<T>(LIFT)}; }
 
     Vec3Of<T> at(T cosine) const {
         T s = unit_range(1.0 - cosine), s5 = s * s * s * s * s;
-        return unit_range(mix(f0, grey(splat<T>(1)), s5) - b * (cosine * s5 * s));
+        return unit_range(mix(f0, gray(splat<T>(1)), s5) - b * (cosine * s5 * s));
     }
-    Vec3Of<T> mean() const { return mix(f0, grey(splat<T>(1)), splat<T>(1.0 / 21)) - b / splat<T>(126); }
+    Vec3Of<T> mean() const { return mix(f0, gray(splat<T>(1)), splat<T>(1.0 / 21)) - b / splat<T>(126); }
 
    private:
     static constexpr double K = 7776.0 / 16807;           // (6/7)⁵
     static constexpr double LIFT = 7.0 * 117649 / 46656;  // 7 / (6/7)⁶
-    static Vec3Of<T> near_grazing(Vec3Of<T> f0) { return mix(f0, grey(splat<T>(1)), splat<T>(K)); }
+    static Vec3Of<T> near_grazing(Vec3Of<T> f0) { return mix(f0, gray(splat<T>(1)), splat<T>(K)); }
 };
 
 // A metal's complex index of refraction. exact: as from Blender 5.0 on; before, an approximation for large ones.

@@ -26,7 +26,7 @@ template <class T> struct MicrofacetLobeOf {
     // About how much light it scatters, which lobes are chosen by: never nothing where there may be something.
     T albedo(Vec3Of<T> scattered) const {
         constexpr double LEAST = 0.05;
-        Vec3Of<T> part = color * (grey(splat<T>(LEAST)) + unit_range(scattered) * splat<T>(1 - LEAST));
+        Vec3Of<T> part = color * (gray(splat<T>(LEAST)) + unit_range(scattered) * splat<T>(1 - LEAST));
         return part.x + part.y + part.z;
     }
 };
@@ -71,7 +71,7 @@ struct MicrofacetTransmission : MicrofacetLobeOf<double> {
     static constexpr bool DELTA = false, IS_DIFFUSE = false;
     double ratio;
 
-    double importance() const { return albedo(grey(1) - reflectance(fresnel, wi.z)); }
+    double importance() const { return albedo(gray(1) - reflectance(fresnel, wi.z)); }
     Vec3 eval(Vec3 to_light) const { return eval_local(frame.to_local(to_light)); }
     double pdf(Vec3 to_light) const { return pdf_local(frame.to_local(to_light)); }
     LobeSample sample(Vec2 u) const {
@@ -90,7 +90,7 @@ struct MicrofacetTransmission : MicrofacetLobeOf<double> {
         double squared = dot(bent, bent);
         Vec3 h = bent / std::sqrt(squared);
         double in = dot(wi, h), out = dot(wo, h), spread = ratio * ratio / squared * std::fabs(in * out);
-        Vec3 let_through = grey(1) - reflectance(fresnel, std::fabs(in));
+        Vec3 let_through = gray(1) - reflectance(fresnel, std::fabs(in));
         return color * let_through * (facets.d(h) * facets.g(wi, wo) / wi.z * spread);
     }
     double pdf_local(Vec3 wo) const {

@@ -31,7 +31,7 @@ template <class T> struct OrenNayarOf {
         if (!any(lit)) return {};
         T t = dot(to_viewer, to_light) - light * viewer;
         t = select(Mask<T>(t > 0.0), t / max(light, viewer), t);
-        return select(lit, color * ((grey(a + b * t) + multiple * (1.0 - albedo_under(light))) * light), Vec3Of<T>{});
+        return select(lit, color * ((gray(a + b * t) + multiple * (1.0 - albedo_under(light))) * light), Vec3Of<T>{});
     }
     T pdf(Vec3Of<T> to_light) const { return max(dot(normal, to_light), T{}) / PI; }
     LobeSampleOf<T> sample(Vec2Of<T> u) const {

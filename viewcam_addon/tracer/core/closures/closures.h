@@ -20,7 +20,7 @@ struct EmissionClosure {
     Vec3 mean_emission(const std::vector<Texture>& textures) const { return color.mean(textures) * strength.mean(textures); }
 };
 
-// Surfaces, or parts of them, that light goes straight through: the path goes on as if they were not there, but for a colour.
+// Surfaces, or parts of them, that light goes straight through: the path goes on as if they were not there, but for a color.
 struct TransparentClosure {
     static constexpr const char* NAME = "transparent";
     static constexpr uint32_t KINDS = 0;
@@ -31,7 +31,7 @@ struct TransparentClosure {
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const { bsdf.let_through(weight * at.color(color)); }
 };
 
-// Reflection of one colour by facets without a Fresnel term: a mirror where it is not rough.
+// Reflection of one color by facets without a Fresnel term: a mirror where it is not rough.
 struct GlossyClosure {
     static constexpr const char* NAME = "glossy";
     static constexpr uint32_t KINDS = GLOSSY;
@@ -64,7 +64,7 @@ struct MetallicClosure {
     Color color, edge_tint, ior, extinction, roughness, normal;
     Anisotropy anisotropy;
     Distribution distribution;
-    bool physical;  // by index of refraction and extinction instead of two colours
+    bool physical;  // by index of refraction and extinction instead of two colors
 
     explicit MetallicClosure(const Inputs& in)
         : color(in["color"]), edge_tint(in["edge_tint"]), ior(in["ior"]), extinction(in["extinction"]), roughness(in["roughness"]), normal(in["normal"]),

@@ -75,7 +75,7 @@ inline void add_refraction(BSDF& bsdf, const ShadingPoint& at, Vec3 color, Vec3 
                            double ratio) {
     constexpr double UNBENT = 1e-4;
     if (at.is_smooth(facets) || std::fabs(ratio - 1) < UNBENT) {
-        Vec3 let_through = grey(1) - reflectance<double>(fresnel, -dot(normal, at.incoming));
+        Vec3 let_through = gray(1) - reflectance<double>(fresnel, -dot(normal, at.incoming));
         bsdf.add(SpecularTransmission{color * let_through, normal, at.incoming, ratio});
         return;
     }

@@ -42,7 +42,7 @@ struct PrincipledClosure {
     template <class At> void add_to(BSDFAt<At>& bsdf, const At& at, Vec3Of<NumberOf<At>> weight) const {
         using T = NumberOf<At>;
         Vec3Of<T> base = max(at.color(base_color), 0), tint = max(at.color(specular_tint), 0), clamped = unit_range(base), none;
-        Vec3Of<T> shading = at.normal(this->normal), normal = at.specular(shading), white = grey(splat<T>(1));
+        Vec3Of<T> shading = at.normal(this->normal), normal = at.specular(shading), white = gray(splat<T>(1));
         T cosine = -dot(normal, at.incoming), index = max(at.number(ior), splat<T>(LEAST_IOR));
         FacetsOf<T> round = distribution.facets(at.number(roughness)), facets = anisotropy.of(at, shading, round);
 
@@ -65,7 +65,7 @@ struct PrincipledClosure {
                 Vec3 through{std::sqrt(clamped.x), std::sqrt(clamped.y), std::sqrt(clamped.z)};  // it is gone through twice
                 double ratio = at.ratio(index);
                 ScaledDielectric fresnel{ratio, unit_range(tint * f0_of(index))};
-                add_glass(bsdf, at, weight * share, normal, round, ratio, fresnel, grey(1), through, distribution.multiple);
+                add_glass(bsdf, at, weight * share, normal, round, ratio, fresnel, gray(1), through, distribution.multiple);
                 weight *= 1 - share;
             }
         T level = max(at.number(specular_level), T{}), f0 = f0_of(index), eta = index;
@@ -89,7 +89,7 @@ struct PrincipledClosure {
     bool emits_nothing() const { return emission_color.is_black() || emission_strength.is_black(); }
     // What scattering more than once multiplies an albedo and a lobe by.
     template <class T> struct Scattering {
-        Vec3Of<T> albedo = grey(splat<T>(1)), lobe = grey(splat<T>(1));
+        Vec3Of<T> albedo = gray(splat<T>(1)), lobe = gray(splat<T>(1));
 
         static Scattering of(const MultipleScatteringOf<T>& more) { return {more.albedo, more.albedo * more.lobe}; }
     };
@@ -118,7 +118,7 @@ struct PrincipledClosure {
         Scattering<double> scattered;
         double reflected = fresnel(cosine, eta);
         if (at.version >= CYCLES_4_3) {
-            scattered = Scattering<double>::of(multiple_reflection(at, normal, facets, grey(mean_fresnel(eta))));
+            scattered = Scattering<double>::of(multiple_reflection(at, normal, facets, gray(mean_fresnel(eta))));
             if (eta > 1) reflected = mix(f0_of(eta), 1, fresnel_progress_seen(eta, roughness_of(facets), cosine));
         }
         add_reflection(bsdf, at, weight * share * scattered.lobe, normal, facets, DielectricFresnel{eta});

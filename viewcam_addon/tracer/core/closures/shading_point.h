@@ -15,7 +15,7 @@ namespace viewcam::VIEWCAM_ISA {
 // The versions of Blender whose Cycles computes materials in ways of its own: what is meant is the newest that is not newer.
 enum CyclesVersion { CYCLES_4_2 = 402, CYCLES_4_3 = 403, CYCLES_5_0 = 500, CYCLES_5_1 = 501, CYCLES_5_2 = 502 };
 
-// What values are: as a number, a colour counts by its luminance and a vector by its mean.
+// What values are: as a number, a color counts by its luminance and a vector by its mean.
 enum class Gives { NUMBER, COLOR, VECTOR };
 
 // Of Rec. 709's primaries.
@@ -45,7 +45,7 @@ struct ShadingPoint {
     const Scene* scene = nullptr;
     RayState ray;
 
-    // What an input is given here; as light, and of a colour the luminance.
+    // What an input is given here; as light, and of a color the luminance.
     Vec3 value(const Color& color) const { return color.node == NONE ? color.at(textures, point) : value_of_node(color.node); }
     Vec3 color(const Color& color) const {
         if (color.node == NONE) return color.at(textures, point);

@@ -133,7 +133,7 @@ class PathIntegrator {
     }
 
    private:
-    // Light may grow with every scattering by colours beyond 1; with no more than this, no square of it is infinite.
+    // Light may grow with every scattering by colors beyond 1; with no more than this, no square of it is infinite.
     static constexpr double MOST_WEIGHT = 1e40;
     // Scatterings before a path may be ended by chance. Sooner, it costs more noise than it saves time.
     static constexpr int CERTAIN = 3;

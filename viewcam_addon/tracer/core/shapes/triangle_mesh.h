@@ -311,7 +311,7 @@ class TriangleSurfaces {
 
     // The vertices' normals in the world, interpolated, of any length; 0 without any.
     Vec3x4 smooth_normal() const {
-        // Cycles turns those of a mesh that only one object uses into the world before it interpolates, and normalises them
+        // Cycles turns those of a mesh that only one object uses into the world before it interpolates, and normalizes them
         // there; those of a shared mesh it interpolates in object space.
         double4 inverse[3][3];
         for (int row = 0; row < 3; row++)
