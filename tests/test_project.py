@@ -342,7 +342,7 @@ BRITISH += "|initialis|normalis|optimis|organis|quantis|rasteris|recognis|regula
 
 
 def is_british(text: str) -> bool:
-    text = text.replace("CANCELLED", "").lower().replace("cancellation", "")  # Blender's own word, and one that is American, too
+    text = text.replace("CANCELLED", "").lower().replace("cancellation", "")  # both are American
     return any(stem in text for stem in BRITISH.split("|"))
 
 

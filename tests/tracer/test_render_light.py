@@ -128,9 +128,14 @@ WIDE = {
     "matte": node("diffuse", color=RED),
     "rough": node("diffuse", color=BLUE, roughness=0.7),
     "plastic": node("principled", base_color=RED, normal=node("bump", height=node("noise"), distance=0.1)),
-    "painted": node("principled", base_color=OUTWARDS, metallic=0.4, roughness=OUTWARDS, specular_ior_level=0.8, diffuse_roughness=0.3),
+    "painted": node(
+        "principled", base_color=OUTWARDS, metallic=0.4, roughness=OUTWARDS, specular_ior_level=0.8, diffuse_roughness=0.3
+    ),
     "brushed": node(
-        "mix", factor=0.3, first=node("metallic", roughness=0.3), second=node("glossy", color=BLUE, distribution="multiscatter_ggx")
+        "mix",
+        factor=0.3,
+        first=node("metallic", roughness=0.3),
+        second=node("glossy", color=BLUE, distribution="multiscatter_ggx"),
     ),
 }
 
