@@ -276,7 +276,7 @@ class Tracer:
 
     @functools.cached_property
     def _smooth(self) -> list[tuple[int, NDArray, Mesh]]:
-        """Of each object that has corner normals its first instance, their (k, 4, 4) matrices, and its mesh."""
+        """Each object with corner normals: its first instance, the (k, 4, 4) matrices of all, and its mesh."""
         geometries = [self._scene.geometries[placed.geometry] for placed in self._scene.objects]
         counts = [len(placed.matrices) for placed in self._scene.objects]
         of_objects = zip(np.cumsum([0, *counts]), self._scene.objects, geometries, strict=False)
