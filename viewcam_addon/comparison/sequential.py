@@ -1,16 +1,17 @@
 """A group sequential test: light compared in rounds of samples, until a bias of a wanted size would have been found.
 
 Each round adds samples on both sides, with seeds of its own, to those of the rounds before, so that nothing is thrown away: 16
-a pixel after the first, which tells what is wrong by much; then as many as could decide at all, 256 for a bias of 0.5 %, since a
-round costs more than such few samples; and then twice as many after each, up to 65,536. All hypothesis tests are made after each. Pictures that differ end it. The others are the same as soon as the test of
-all of Combined would have found a picture that is off by the wanted share everywhere, with the probability
-hypothesis_tests.POWER. In the whole most noise cancels; so there are some samples at least, for what is wrong in a few pixels
-alone. Where so few pixels have light that their sum tells nothing, the tile or pixel that tells most decides.
+a pixel after the first, which tells what is wrong by much; then as many as could decide at all, 256 for a bias of 0.5 %, since
+a round costs more than such few samples; and then twice as many after each, up to 65,536. All hypothesis tests are made after
+each. Pictures that differ end it. The others are the same as soon as the test of all of Combined would have found a picture
+that is off by the wanted share everywhere, with the probability hypothesis_tests.POWER. In the whole most noise cancels; so
+there are some samples at least, for what is wrong in a few pixels alone. Where so few pixels have light that their sum tells
+nothing, the tile or pixel that tells most decides.
 
-Who looks eleven times, as often as there are totals, has eleven chances of a false alarm. The false alarms that are promised are spent over the looks
-(Lan and DeMets, Discrete sequential boundaries for clinical trials, Biometrika 70, 1983), an eleventh on each. That their sum
-is an upper bound is Boole's inequality, which holds however the looks depend on one another, whatever the noise is, and
-whichever of them is the last; to stop with *the same* can raise no alarm.
+Who looks eleven times, as often as there are totals, has eleven chances of a false alarm. The false alarms that are promised
+are spent over the looks (Lan and DeMets, Discrete sequential boundaries for clinical trials, Biometrika 70, 1983), an eleventh
+on each. That their sum is an upper bound is Boole's inequality, which holds however the looks depend on one another, whatever
+the noise is, and whichever of them is the last; to stop with *the same* can raise no alarm.
 
 Rejected: the boundaries of Pocock (1977) and of O'Brien and Fleming (1979), a little lower because they take the rounds' sums
 to be normal, which the noise of light is not at a level of 10⁻⁹; confidence sequences (Howard, Ramdas, McAuliffe and Sekhon,

@@ -107,7 +107,8 @@ class Tracing(child_process.ServerOnDemand):
         of geometry `pixels` compared, `position` in pixels, `share_of_tolerance` of each pass where it is largest,
         `mismatches`, and `conversion`, the stated camera against this one; of light its `samples` and `quantities`. None is
         what was not compared. Of a job that finds a bias there are `undecided` and `seconds` alone until the last round, where
-        `undecided` has `expected` and `following` of light_verdict.Search; then a report's folder gets the pictures of all rounds.
+        `undecided` has `expected` and `following` of light_verdict.Search; then a report's folder gets the pictures of all
+        rounds.
 
         Raises
         ------
