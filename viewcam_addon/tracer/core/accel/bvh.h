@@ -185,7 +185,7 @@ class Builder {
                     for (int axis = 0; axis < 3; axis++) {
                         mine.low[bin[axis]][axis] = min(mine.low[bin[axis]][axis], low);
                         mine.high[bin[axis]][axis] = max(mine.high[bin[axis]][axis], high);
-                        mine.count[bin[axis]][axis]++;
+                        mine.count[bin[axis]][axis] += 1;
                     }
                 }
             });
@@ -229,14 +229,14 @@ class Builder {
             count += bins.count[bin];
             return area;
         };
-        auto leaves = [&](uint4 count) { return __builtin_convertvector(int4((count + (leaf_size_ - 1)) >> leaf_shift_), float4); };
+        auto leaves = [&](uint4 count) { return __builtin_convertvector(int4((count + splat4(leaf_size_ - 1)) >> splat4(leaf_shift_)), float4); };
         for (int bin = BINS - 1; bin > 0; bin--) right_area[bin] = add(bin), right_count[bin] = count;
         std::fill(low, low + 3, EMPTY_LOW), std::fill(high, high + 3, EMPTY_HIGH), count = uint4{};
         float4 least = {FAR, FAR, FAR, FAR};
         int4 best{};
         for (int bin = 1; bin < BINS; bin++) {
             float4 cost = add(bin - 1) * leaves(count) + right_area[bin] * leaves(right_count[bin]);
-            int4 better = int4(count != 0) & int4(right_count[bin] != 0) & int4(cost < least);
+            int4 better = int4(count != uint4{}) & int4(right_count[bin] != uint4{}) & int4(cost < least);
             least = better ? cost : least;
             best = better ? int4{bin, bin, bin, bin} : best;
         }
@@ -253,7 +253,7 @@ class Builder {
     }
 
     uint32_t leaf_size_;  // a power of two
-    int leaf_shift_ = std::countr_zero(leaf_size_);
+    uint32_t leaf_shift_ = uint32_t(std::countr_zero(leaf_size_));
     std::atomic<int> spare_;
 };
 
