@@ -30,8 +30,9 @@ endif
 PYTHON_FOUND = $(if $(PYTHON),$(PYTHON),$(error Python 3.11 or 3.13 is needed, the only ones that bpy 5 has wheels for: install one or say make PYTHON=...))
 PROJECT = pyproject.toml blender_manifest.toml .ci/environment.py hatch_build.py $(shell find viewcam_addon/tracer/core -name '*.h' -o -name '*.cpp')
 PYTEST = env -u BLENDER $(1)/bin/python -m pytest
-# A file's tests stay together, since they share what is dear to make. At most four, for each may need a gigabyte or two.
-PARALLEL = $(PYTEST) --numprocesses=auto --maxprocesses=4 --dist=loadfile
+# Each process begins with a part of the list as it stands, so that a file's tests share what is dear to make, and ends with what is
+# left of another's. At most four, for each may need a gigabyte or two.
+PARALLEL = $(PYTEST) --numprocesses=auto --maxprocesses=4 --dist=worksteal
 
 demo: .venv/demo
 	.venv/bin/viewcam demo
@@ -56,7 +57,7 @@ test-fresh:
 
 # What is slow and needs Blender, the oldest and the newest run: test-matrix and test-blender.
 test-exhaustive: .venv/test
-	$(call PARALLEL,.venv) --numprocesses=3 --dist=worksteal -m "exhaustive or (slow and not blender)"
+	$(call PARALLEL,.venv) --numprocesses=3 -m "exhaustive or (slow and not blender)"
 
 # GCC's sanitizers, which come with it: preloaded, since Python itself is compiled without them.
 sanitizers-address = address,undefined
@@ -66,7 +67,7 @@ preload-thread = $(shell g++ -print-file-name=libtsan.so)
 # What goes wrong between threads shows where there are some; the rest is tried on one.
 tests-address = tests/tracer/test_c_interface.py tests/tracer/test_leaks.py tests/tracer/test_render.py tests/tracer/test_triangles.py \
 	tests/tracer/light/test_textbook.py tests/tracer/light/test_textures.py
-calls-address = VIEWCAM_FUZZ_CALLS=300
+calls-address = VIEWCAM_FUZZ_CALLS=150
 tests-thread = tests/tracer/test_intersection.py tests/tracer/test_render.py tests/tracer/test_render_light.py -k "thread or triangle_takes or stops_within"
 test-sanitizers: test-sanitizer-address test-sanitizer-thread
 
@@ -118,20 +119,23 @@ test-matrix: $(MATRIX:%=test-wheel-%)
 
 # What a version can change: what touches Blender; with the oldest and the newest, which have NumPys of their own, the quick ones;
 # with the newest, which has a Python of its own, processes. Of the newest, tests/blender runs inside the real one, but for lights
-# (test-blender). Between the oldest and the newest, batches, lights and what is slow are left out of 4.5: 5.0 has them, and
-# test-light what Cycles shades.
+# and batches (test-blender). What is slow of lights the newest has alone, what is slow of batches the oldest. Between the two, 4.5
+# has what versions.py tells apart: scenes, pictures, animation; 5.0 has the rest, and test-light what Cycles shades. The faults
+# that are made on purpose, and the sample scenes, are the oldest's, whose files the latter are.
 TOUCHING_BLENDER = tests/blender tests/test_crashes.py \
 	$(shell grep -lE 'importorskip\("bpy"\)' tests/test_*.py tests/commands/test_*.py tests/comparison/test_*.py | grep -v test_project)
-tests-4.5 = $(TOUCHING_BLENDER) --ignore=tests/blender/jobs --ignore=tests/blender/light
+tests-4.5 = tests/blender $(foreach each,interface jobs light,--ignore=tests/blender/$(each))
 without-4.5 = $(empty) and not slow
 tests-5.0 = $(TOUCHING_BLENDER)
-tests-4.2 = $(TOUCHING_BLENDER) $(QUICK)
-tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender,$(TOUCHING_BLENDER)) $(QUICK) tests/jobs
+SLOW_LIGHT := $(shell grep -lE '^pytestmark = .*slow' tests/blender/light/*.py) tests/blender/test_light_by_light.py
+tests-4.2 = $(TOUCHING_BLENDER) $(QUICK) $(SLOW_LIGHT:%=--ignore=%)
+without-5.2 = $(empty) and (blender or not slow)
+tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender tests/test_leftovers.py tests/comparison/test_sabotage_on_cycles.py,$(TOUCHING_BLENDER)) $(QUICK) tests/jobs
 
 # Few examples of each property: make test has the many, and what a version changes, it changes for most of them. What is slow
 # begins first (tests/conftest.py), so that no process ends with it alone.
 test-wheel-%: .venvs/%/ready
-	$(call PARALLEL,.venvs/$*) --no-loadscope-reorder --hypothesis-profile=quick -m "not exhaustive and not light and not speed$(without-$*)" $(tests-$*)
+	$(call PARALLEL,.venvs/$*) --hypothesis-profile=quick -m "not exhaustive and not light and not speed$(without-$*)" $(tests-$*)
 
 test-light: $(MATRIX:%=test-light-%)
 
@@ -169,14 +173,17 @@ test-windows-smoke: .venv/zips
 # Windows' own; with the older one what touches Blender. The first is apart, since of libraries of one name a process has one on
 # Windows: OpenUSD's, which judges cameras, and Blender's are both called usd_ms.dll.
 WINDOWS_PYTEST = -m pytest -p no:cacheprovider --numprocesses=2 --dist=loadfile --hypothesis-profile=quick
+# Modules that are slow as a whole, and so left out, are not imported either: each takes seconds under wine.
+SLOW = $(shell grep -rlE --include='test_*.py' '^pytestmark.*mark\.(slow|exhaustive)' tests)
+WINDOWS_BLENDER = $(filter-out $(SLOW),$(shell find tests/blender -name 'test_*.py' | sort))
 WINDOWS_OWN = $(filter-out $(QUICK),$(wildcard tests/jobs/test_*.py tests/labels/test_*.py tests/commands/test_*.py) \
 	tests/tracer/test_c_interface.py tests/test_files.py tests/test_child_process.py tests/test_terminal.py tests/test_cli.py \
 	tests/test_crashes.py)
 test-windows-suite: .venv/zips
 	status=0; \
-	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_PYTEST) $(QUICK) || status=1; \
-	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_PYTEST) tests/blender $(WINDOWS_OWN) || status=1; \
-	.venv/bin/python .ci/emulated.py windows-4.2 $(WINDOWS_PYTEST) tests/blender || status=1; \
+	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_PYTEST) $(filter-out $(SLOW),$(QUICK)) || status=1; \
+	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_PYTEST) $(WINDOWS_BLENDER) $(filter-out $(SLOW),$(WINDOWS_OWN)) || status=1; \
+	.venv/bin/python .ci/emulated.py windows-4.2 $(WINDOWS_PYTEST) $(WINDOWS_BLENDER) || status=1; \
 	exit $$status
 
 test-arm64: .venv/zips

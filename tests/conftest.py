@@ -20,15 +20,24 @@ import pytest
 collect_ignore = [] if os.environ.get("BLENDER") else ["real_blender"]
 
 # The same examples in every run, so that a failure in CI is the same failure here; `pytest --hypothesis-profile=explore` looks
-# for new ones, `quick` has few. No deadlines: Blender's first call is slow.
-hypothesis.settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
-hypothesis.settings.register_profile("explore", deadline=None)
-hypothesis.settings.register_profile("quick", derandomize=True, database=None, deadline=None, max_examples=20)
+# for new ones, `quick` has few. No clocks: Blender's first call is slow, and so is a machine with other work.
+NO_CLOCK = {"deadline": None, "suppress_health_check": [hypothesis.HealthCheck.too_slow]}
+REPEATABLE = {**NO_CLOCK, "derandomize": True, "database": None}
+hypothesis.settings.register_profile("repeatable", **REPEATABLE)
+hypothesis.settings.register_profile("explore", **NO_CLOCK)
+hypothesis.settings.register_profile("quick", **REPEATABLE, max_examples=20)
 hypothesis.settings.load_profile("repeatable")
 
 
 _LONG = 4 * 3600  # seconds
 """The time limit of what takes minutes by its nature."""
+
+
+def pytest_ignore_collect(collection_path, config):
+    """All of tests/benchmarks is marked: where it is not asked for, the libraries of charts need not be imported."""
+    if collection_path.name == "benchmarks" and {"not exhaustive", "not speed"} <= set(config.option.markexpr.split(" and ")):
+        return True
+    return None
 
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks

@@ -1,10 +1,7 @@
-import dataclasses
 import json
 import math
-import re
 import xml.etree.ElementTree as ElementTree
 
-import matplotlib
 import numpy as np
 import pytest
 
@@ -54,16 +51,6 @@ def test_what_is_above_a_limit_is_told_with_both_figures_and_what_is_below_it_is
     assert chart_of(limit, Curve("memory", X, (9.0, 9.0, 9.0), league="other")).behind() == []
 
 
-def test_a_limit_is_no_rival():
-    limit, ours = Curve("what is allowed", X, (1e-9,) * 3, limit=True), Curve("ours", X, (1e-10,) * 3, ours=True)
-    assert chart_of(limit, ours, Curve("other", X, (2e-10,) * 3)).behind() == []
-
-
-def test_a_curve_of_unequal_lengths_is_refused():
-    with pytest.raises(ValueError, match="3 x and 2 y"):
-        Curve("ours", X, (1, 1))
-
-
 def test_a_chart_is_drawn_with_its_caption_the_machine_and_the_command(tmp_path):
     ours, other = Curve("ours", X, (0.0, 1e-16, 2e-16), ours=True), Curve("no answer", X, (1e-3, math.nan, math.inf))
     charts.draw(chart_of(ours, other), tmp_path / "chart.svg", "python -m benchmarks something")
@@ -71,25 +58,6 @@ def test_a_chart_is_drawn_with_its_caption_the_machine_and_the_command(tmp_path)
     assert ElementTree.fromstring(text).tag.endswith("svg")
     for record in ("A title", "Read this.", "ours", "no answer", "python -m benchmarks something", f"numpy {np.__version__}"):
         assert record in text, f"{record!r} is not in the chart"
-
-
-def test_the_same_measurement_draws_the_same_file(tmp_path):
-    for name in ("one", "two"):
-        charts.draw(chart_of(Curve("ours", X, X, ours=True)), tmp_path / f"{name}.svg", "python -m benchmarks something")
-    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
-
-
-def test_a_chart_in_a_place_that_is_none_is_an_error_in_one_sentence(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="can't be written"):
-        charts.draw(chart_of(Curve("ours", X, X, ours=True)), tmp_path / "file" / "chart.svg", "python -m benchmarks something")
-
-
-def test_figures_are_plain_numbers_and_null_and_what_is_not_left_at_its_default():
-    figures = chart_of(Curve("ours", np.array(X), (1.0, math.nan, math.inf), ours=True)).figures()
-    assert figures.pop("curves") == [{"name": "ours", "x": [1.0, 0.1, 0.01], "y": [1.0, None, None], "ours": True}]
-    words = {"name": "name", "title": "A title", "x_label": "x", "y_label": "y", "reading": "Read this."}
-    assert figures == {**words, "tie": 1e-16, "reverse": True}
 
 
 SPREAD = tuple((0.9 * x, 1.2 * x) for x in X)
@@ -127,58 +95,6 @@ def test_a_file_without_figures_of_charts_is_an_error_in_one_sentence(text, tmp_
     (tmp_path / "figures.json").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"has no figures of charts: give what"):
         charts.read(tmp_path / "figures.json")
-
-
-def test_a_chart_brings_its_paper_along_and_turns_dark_where_the_reader_prefers_that(tmp_path):
-    charts.draw(
-        chart_of(Curve("ours", X, X, ours=True), levels=(0.05,)), tmp_path / "chart.svg", "python -m benchmarks something"
-    )
-    text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
-    dark = text.partition("prefers-color-scheme: dark")[2].partition("</style>")[0]
-    drawn = text.partition("</style>")[0].partition("<style")[0] + text.partition("</style>")[2]
-    for color in charts._IN_THE_DARK:
-        assert f'[style*="fill: {color}"]' in dark and f'[style*="stroke: {color}"]' in dark
-    for color in (charts._INK, charts._BACKGROUND, charts._FAINT, charts._GRID, charts._OURS):
-        assert f"fill: {color}" in drawn or f"stroke: {color}" in drawn, f"nothing is {color}: the rule for it does nothing"
-
-
-def test_every_color_of_a_chart_can_be_read_on_a_light_and_on_a_dark_page():
-    """3 to 1, which WCAG 2.1 asks of what graphics are made of; of the grid nobody asks it."""
-
-    def luminance(color):
-        shares = np.array(matplotlib.colors.to_rgb(color))
-        return np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4) @ (0.2126, 0.7152, 0.0722)
-
-    def contrast(*colors):
-        dark, light = sorted(map(luminance, colors))
-        return (light + 0.05) / (dark + 0.05)
-
-    for color in (charts._INK, charts._FAINT, charts._OURS, *charts._COLORS):
-        at_night = contrast(charts._IN_THE_DARK[color], charts._IN_THE_DARK[charts._BACKGROUND])
-        assert contrast(color, charts._BACKGROUND) >= 3 <= at_night, f"{color} can't be read"
-
-
-def test_how_far_measurements_spread_is_drawn(tmp_path):
-    spread = [(0.9, 1.2), (0.09, 0.12), (0.009, 0.012)]
-    for name, curve in (("with", Curve("ours", X, X, ours=True, spread=spread)), ("without", Curve("ours", X, X, ours=True))):
-        charts.draw(chart_of(curve), tmp_path / f"{name}.svg", "python -m benchmarks something")
-    sizes = [(tmp_path / f"{name}.svg").read_text(encoding="utf-8").count("<path") for name in ("with", "without")]
-    assert sizes[0] >= sizes[1] + len(spread)
-
-
-def test_methods_of_a_point_or_two_stand_in_rows_the_best_on_top_with_their_error_written_beside(tmp_path):
-    methods = (
-        Curve("lost", (0.1,), (math.nan,)),
-        Curve("theirs", (0.1, 1.0), (2e-7, 2e-7)),
-        Curve("ours", (0.2,), (1e-16,), ours=True, spread=((0.1, 0.3),)),
-    )
-    chart = dataclasses.replace(chart_of(*methods), rows=("at once", "one by one"))
-    charts.draw(chart, tmp_path / "chart.svg", "python -m benchmarks something")
-    text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
-    for record in ("theirs", "ours", "1e-16", "2e-07", "no answer", "● at once", "○ one by one", "A title"):
-        assert record in text, f"{record!r} is not in the chart"
-    places = {name: float(re.search(rf'y="([-0-9.]+)"[^>]*>{name}<', text)[1]) for name in ("lost", "theirs", "ours")}
-    assert places["ours"] < places["theirs"] < places["lost"]
 
 
 def test_what_is_in_the_background_is_drawn_thin_and_without_its_spread(tmp_path):

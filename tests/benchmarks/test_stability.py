@@ -1,6 +1,8 @@
+import importlib
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("bpy")
@@ -14,6 +16,18 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 def test_every_sweep_is_a_module_and_every_module_a_sweep():
     modules = {path.stem for path in (ROOT / "benchmarks" / "stability").glob("*.py")} - {"__init__", "stage", "oracle"}
     assert modules == set(stability.SWEEPS)
+
+
+@pytest.mark.parametrize("name", stability.SWEEPS)
+def test_what_is_in_use_is_the_best_or_tied_all_along_each_sweep_at_whose_end_another_fails(name):
+    charts = importlib.import_module(f"benchmarks.stability.{name}").charts(quick=True)
+    assert [sentence for chart in charts for sentence in chart.behind()] == []
+    assert any(_worst(chart, False) > 10 * _worst(chart, True) for chart in charts), "no chart reaches a failure"
+
+
+def _worst(chart, ours):
+    """The largest error of the methods in use, or of all others."""
+    return max(np.nan_to_num(curve.y, nan=np.inf).max() for curve in chart.curves if curve.ours == ours)
 
 
 def test_an_unknown_sweep_is_refused_with_those_that_there_are(tmp_path, capsys):

@@ -4,6 +4,7 @@ Its pictures are what a perfect renderer would write; `rendered` moves each ray 
 law, which is what a float32 renderer does.
 """
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -78,6 +79,9 @@ class PaperScene:
 
     def picture(self, px=0.5, py=0.5) -> Image:
         """The exact picture, seen through the given sample point of every pixel."""
+        return _copy_of(_centered(self)) if np.isscalar(px) and px == py == 0.5 else self._seen_through(px, py)
+
+    def _seen_through(self, px, py) -> Image:
         rows, columns = np.mgrid[: self.pinhole.height, : self.pinhole.width]
         size = columns.shape
         px, py = (np.broadcast_to(p, size).ravel() for p in (px, py))
@@ -86,7 +90,10 @@ class PaperScene:
 
     def rendered(self, roundings: float = ROUNDINGS_OF_A_RENDERER, seed: int = 0) -> Image:
         """The picture of a float32 renderer: every ray is off by so many roundings. Without the tracer's own passes."""
-        exact = self.picture()
+        return _copy_of(_rendered(self, roundings, seed))
+
+    def _rendered(self, roundings: float, seed: int) -> Image:
+        exact = _centered(self)
         shift = tolerances.ray_shift(self.pinhole, exact.passes)
         missed = exact["Object Index"][..., 0] == 0
         shift[missed] = np.median(shift[~missed])
@@ -98,6 +105,21 @@ class PaperScene:
 
     def seen_by(self, pinhole: Pinhole) -> "PaperScene":
         return replace(self, pinhole=pinhole)
+
+
+@functools.lru_cache(8)
+def _centered(scene: PaperScene) -> Image:
+    return scene._seen_through(0.5, 0.5)
+
+
+@functools.lru_cache(8)
+def _rendered(scene: PaperScene, roundings: float, seed: int) -> Image:
+    return scene._rendered(roundings, seed)
+
+
+def _copy_of(image: Image) -> Image:
+    """A picture that a test may change."""
+    return replace(image, passes={name: values.copy() for name, values in image.passes.items()})
 
 
 def _pinhole(offset=(0.0, 0.0, 0.0), width=320, height=200, distance=300.0) -> Pinhole:

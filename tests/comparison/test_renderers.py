@@ -66,19 +66,8 @@ def test_nothing_is_nothing_however_a_renderer_writes_it(nothing, paper_scene):
     assert (actual["Depth"] == reference["Depth"]).all() and (actual["Position"][missed[..., 0]] == 0).all()
 
 
-@pytest.mark.parametrize("nothing", [0.0, np.inf, 1e10, 3e38])
-@pytest.mark.parametrize(
-    "names",
-    [
-        ("Depth",),
-        ("Distance",),
-        ("Position",),
-        ("Depth", "Position"),
-        ("Distance", "Position"),
-        ("Depth", "Distance"),
-        ("Depth", "Distance", "Position", "Normal"),
-    ],
-)
+@pytest.mark.parametrize("nothing", [0.0, np.inf, 1e10])
+@pytest.mark.parametrize("names", [("Depth",), ("Distance",), ("Position",), ("Depth", "Distance", "Position", "Normal")])
 def test_pictures_are_the_same_whatever_their_passes_hold_where_nothing_is(names, nothing, paper_scene):
     """Depth and Position together were taken as they are, and a distance of 1e10 for a surface at that depth."""
     picture = only(paper_scene.rendered(), *names)

@@ -110,12 +110,12 @@ def packed(**members: np.ndarray) -> bytes:
     return file.getvalue()
 
 
-class Said(Exception):
+class Failure(Exception):
     """A mutant was answered otherwise than it should."""
 
 
 def viewcam(*words: object) -> None:
-    """Run a command in this process, and raise Said unless all is well or told in a sentence."""
+    """Run a command in this process, and raise Failure unless all is well or told in a sentence."""
     from viewcam_addon import cli
 
     message = io.StringIO()
@@ -124,10 +124,10 @@ def viewcam(*words: object) -> None:
         status = _with_events(cli, [str(word) for word in words], message)
     sentence = message.getvalue().strip()
     if status not in (0, 1, 2, 3) or (status > 1) != bool(sentence):
-        raise Said(f"status {status}: {sentence!r}")
+        raise Failure(f"status {status}: {sentence!r}")
     judge(sentence)
     if warned:
-        raise Said(f"warned: {warned[0].message} at {warned[0].filename}:{warned[0].lineno}")
+        raise Failure(f"warned: {warned[0].message} at {warned[0].filename}:{warned[0].lineno}")
 
 
 def _with_events(cli: object, words: list[str], output: io.StringIO) -> int:
@@ -143,9 +143,9 @@ def _with_events(cli: object, words: list[str], output: io.StringIO) -> int:
 
 
 def judge(sentence: str) -> None:
-    """Raise Said if a sentence is none."""
+    """Raise Failure if a sentence is none."""
     if "bug" in sentence or "Traceback" in sentence or len(sentence) > LONGEST or "\n" in sentence:
-        raise Said(sentence[:LONGEST])
+        raise Failure(sentence[:LONGEST])
 
 
 Feed = Callable[[random.Random, Path], None]
@@ -176,7 +176,7 @@ def scene() -> Feed:
             passes.pop("Variance", None)  # infinite where one sample does not tell it
             for name, values in passes.items():
                 if not np.isfinite(values).all():
-                    raise Said(f"{name} holds what is no finite number at level {level}")
+                    raise Failure(f"{name} holds what is no finite number at level {level}")
 
     return feed
 
@@ -371,7 +371,7 @@ def labels() -> Feed:
 
 
 def _is_no_json(kind: str, constant: str) -> None:
-    raise Said(f"{kind} holds {constant}, which is no JSON")
+    raise Failure(f"{kind} holds {constant}, which is no JSON")
 
 
 def cameras_of(name: str) -> Feed:
@@ -411,7 +411,7 @@ def cameras_of(name: str) -> Feed:
         for camera in cameras_read:
             for line in (camera.name, *camera.notes):
                 if len(line) > LONGEST or not all(map(str.isprintable, line.split(" "))):
-                    raise Said(f"a name or note is no line of a few characters that show: {line[:200]!r}")
+                    raise Failure(f"a name or note is no line of a few characters that show: {line[:200]!r}")
             if camera.lens is not None:
                 camera.lens.folds(camera.lens.undistort(CORNERS))
         try:
@@ -447,11 +447,11 @@ def _mutant(data: bytes, other: bytes, chance: random.Random) -> bytes:
 
 
 def _judge_caused(error: Exception) -> None:
-    """Raise Said if a sentence is none, or stands for what no reader thought of."""
+    """Raise Failure if a sentence is none, or stands for what no reader thought of."""
     judge(str(error))
     if error.__cause__ is not None:
         place = traceback.extract_tb(error.__cause__.__traceback__)[-1]
-        raise Said(f"{type(error.__cause__).__name__} at {Path(place.filename).name}:{place.lineno}: {error.__cause__}")
+        raise Failure(f"{type(error.__cause__).__name__} at {Path(place.filename).name}:{place.lineno}: {error.__cause__}")
 
 
 def broken(kind: str) -> Feed:
@@ -461,7 +461,7 @@ def broken(kind: str) -> Feed:
         if not folder.name.endswith("-2"):
             return
         if kind == "bug":
-            raise Said("a bug")
+            raise Failure("a bug")
         if kind == "crash":
             os.kill(os.getpid(), signal.SIGSEGV)
         if kind == "hang":
@@ -503,13 +503,13 @@ COMMANDS = (
 
 
 def command(folder: Path) -> None:
-    """Give a mutant to every command as a user does, and raise Said unless all is well or told in a sentence."""
+    """Give a mutant to every command as a user does, and raise Failure unless all is well or told in a sentence."""
     how = {"cwd": folder, "env": os.environ | {"PYTHONPATH": str(TESTS.parent)}, "timeout": 120}
     for words in COMMANDS:
         program = [sys.executable, "-m", "viewcam_addon", *words]
         ran = subprocess.run(program, capture_output=True, text=True, errors="replace", check=False, **how)
         if ran.returncode < 0 or (ran.returncode > 1) != bool(ran.stderr.strip()) or "Traceback" in ran.stdout:
-            raise Said(f"viewcam {words[0]} ended with status {ran.returncode}: {ran.stderr[-LONGEST:]!r}")
+            raise Failure(f"viewcam {words[0]} ended with status {ran.returncode}: {ran.stderr[-LONGEST:]!r}")
         judge(ran.stderr.strip())
 
 
@@ -559,8 +559,8 @@ def main(kind: str, first: str, count: str, place: str) -> None:
         try:
             feed(random.Random(f"{kind} {number}"), work)
             if is_small and _spent() - spent > SMALL_SECONDS:
-                raise Said(f"took {_spent() - spent:.1f} s")
-        except Said as error:
+                raise Failure(f"took {_spent() - spent:.1f} s")
+        except Failure as error:
             tell(descriptor, number, str(error))
         except Exception as error:
             place = traceback.extract_tb(error.__traceback__)[-1]

@@ -51,7 +51,7 @@ def as_a_user_sees(mutant: Path) -> list[str]:
     """The faults of the command line's answer to a .blend that crashes Blender: a sentence and a status are right."""
     try:
         targets.command(mutant)
-    except targets.Said as error:
+    except targets.Failure as error:
         return [f"{mutant.name}: {error}"]
     return []
 

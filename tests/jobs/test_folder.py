@@ -234,8 +234,8 @@ class Other:
         return self.process.stdout.readline().strip()
 
     def kill(self):
-        self.process.kill()
-        self.process.communicate()
+        with self.process:
+            self.process.kill()
 
 
 @pytest.fixture
@@ -299,14 +299,15 @@ def test_only_the_first_of_several_batches_is_alone(path, another):
 
 
 @posix
-def test_no_batch_begins_while_another_is_told_that_it_is_alone(path):
+def test_no_batch_begins_while_another_is_told_that_it_is_alone(path, another):
     with Claims(path) as claims, claims.alone() as is_alone:
         assert is_alone
-        command = [sys.executable, "-c", HOLDER, str(path)]
-        beginner = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+        beginner = another()
+        assert not beginner.alone
+        beginner.process.stdin.close()  # nothing is left for it to do but to begin
         with pytest.raises(subprocess.TimeoutExpired):
-            beginner.wait(2)
-    assert beginner.communicate("")[0].strip() == "False", "it was not alone when it asked"
+            beginner.process.wait(2)
+    assert beginner.process.wait() == 0
 
 
 @posix

@@ -1,4 +1,4 @@
-"""Runs inside a real Blender with a window: enables and disables the extension ten times, and lets it draw in between.
+"""Runs inside a real Blender with a window: enables and disables the extension four times, and lets it draw in between.
 
 blender --enable-event-simulate -p 0 0 1000 700 --addons … --python leftovers_in_a_window.py
 
@@ -16,7 +16,7 @@ import leftovers
 from hands_in_a_window import camera, move, region, start, window
 
 EXTENSION = leftovers.EXTENSION
-ROUNDS = 10
+ROUNDS = 4
 
 
 def enable(is_wanted):

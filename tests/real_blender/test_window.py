@@ -85,7 +85,7 @@ def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_
     assert "Traceback" not in output, output
 
 
-def test_ten_rounds_of_enabling_and_disabling_leave_nothing_behind_in_a_window(real_blender):
+def test_rounds_of_enabling_and_disabling_leave_nothing_behind_in_a_window(real_blender):
     outcome = run_in_a_window(real_blender, ROOT / "tests" / "real_blender" / "leftovers_in_a_window.py", size=("1000", "700"))
     output = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0 and "done: leave_nothing_behind" in output, output

@@ -564,7 +564,7 @@ def needles(sheet, add, mesh_from):
 
 
 def facets(sheet, add, mesh_from):
-    return mesh_from("ico_sphere", subdivisions=4, radius=0.05)
+    return mesh_from("ico_sphere", subdivisions=3, radius=0.05)
 
 
 # How far UV may not be off: of needles thinner than a pixel it changes by a whole map with each pixel, of which a ray's
