@@ -1,10 +1,10 @@
 // A hierarchy of boxes, eight to a node, over anything that has a box: built by the surface area heuristic, the same for any
 // number of threads.
 //
-// Boxes are float32 in units of the hierarchy's own size, about its own centre, rounded outward: neither a scene's scale nor its
+// Boxes are float32 in units of the hierarchy's own size, about its own center, rounded outward: neither a scene's scale nor its
 // place costs a digit. What a ray does not hit is left out without a doubt, since box_ray.h rounds to the other side as well.
 //
-// Rejected: quantised boxes (half the memory of the nodes, which are a quarter of all, for a tenth of the speed), spatial splits
+// Rejected: quantized boxes (half the memory of the nodes, which are a quarter of all, for a tenth of the speed), spatial splits
 // (a third faster on long thin triangles, twice the memory), and a refit where things move (nothing moves here but the camera).
 #pragma once
 #include <cmath>
@@ -48,8 +48,8 @@ struct Bvh {
     uint32_t root = NOTHING;
     uint32_t leaf_size = 1;
     Array<uint32_t> leaves;  // leaf_size primitives each, NOTHING where there are fewer
-    // Boxes hold (p − centre) · scale, scale a power of two, within ±half, which is below 1.
-    Vec3 centre, half;
+    // Boxes hold (p − center) · scale, scale a power of two, within ±half, which is below 1.
+    Vec3 center, half;
     double scale = 1;
 
     size_t leaf_count() const { return leaves.size() / leaf_size; }
@@ -125,15 +125,15 @@ class Builder {
                 }
         }
     };
-    struct Extent {  // of boxes, and of their doubled centres
-        float4 low = EMPTY_LOW, high = EMPTY_HIGH, centre_low = EMPTY_LOW, centre_high = EMPTY_HIGH;
+    struct Extent {  // of boxes, and of their doubled centers
+        float4 low = EMPTY_LOW, high = EMPTY_HIGH, center_low = EMPTY_LOW, center_high = EMPTY_HIGH;
     };
     struct Place {
         int axis = -1, bin = 0;
     };
 
-    static int bin_of(float doubled_centre, float low, float factor) {
-        int bin = int((doubled_centre - low) * factor);
+    static int bin_of(float doubled_center, float low, float factor) {
+        int bin = int((doubled_center - low) * factor);
         return bin < 0 ? 0 : bin >= BINS ? BINS - 1 : bin;
     }
 
@@ -147,11 +147,11 @@ class Builder {
         parallel_for(parts, size_t(parts), [&](size_t i) {
             Extent e;
             for (size_t k = part(int(i)); k < part(int(i) + 1); k++) {
-                float4 low = references[k].low, high = references[k].high, centre = low + high;
+                float4 low = references[k].low, high = references[k].high, center = low + high;
                 e.low = min(e.low, low);
                 e.high = max(e.high, high);
-                e.centre_low = min(e.centre_low, centre);
-                e.centre_high = max(e.centre_high, centre);
+                e.center_low = min(e.center_low, center);
+                e.center_high = max(e.center_high, center);
             }
             extents[i] = e;
         });
@@ -159,8 +159,8 @@ class Builder {
         for (int i = 1; i < parts; i++) {
             all.low = min(all.low, extents[i].low);
             all.high = max(all.high, extents[i].high);
-            all.centre_low = min(all.centre_low, extents[i].centre_low);
-            all.centre_high = max(all.centre_high, extents[i].centre_high);
+            all.center_low = min(all.center_low, extents[i].center_low);
+            all.center_high = max(all.center_high, extents[i].center_high);
         }
         node.low = all.low;
         node.high = all.high;
@@ -172,7 +172,7 @@ class Builder {
         }
 
         size_t middle = begin + count / 2;
-        float4 size = all.centre_high - all.centre_low, factor{};
+        float4 size = all.center_high - all.center_low, factor{};
         for (int axis = 0; axis < 3; axis++) {
             float f = float(BINS) * (1 - 1e-6f) / size[axis];
             factor[axis] = size[axis] > 0 && f < FAR ? f : 0;
@@ -185,9 +185,9 @@ class Builder {
                 Bins& mine = bins[i];
                 mine.clear();
                 for (size_t k = part(int(i)); k < part(int(i) + 1); k++) {
-                    float4 low = references[k].low, high = references[k].high, centre = low + high;
+                    float4 low = references[k].low, high = references[k].high, center = low + high;
                     for (int axis = 0; axis < 3; axis++) {
-                        int bin = bin_of(centre[axis], all.centre_low[axis], factor[axis]);
+                        int bin = bin_of(center[axis], all.center_low[axis], factor[axis]);
                         mine.low[axis][bin] = min(mine.low[axis][bin], low);
                         mine.high[axis][bin] = max(mine.high[axis][bin], high);
                         mine.count[axis][bin]++;
@@ -197,7 +197,7 @@ class Builder {
             for (int i = 1; i < parts; i++) bins[0].add(bins[i]);
             Place best = cheapest(bins[0], factor);
             if (best.axis >= 0) {
-                float low = all.centre_low[best.axis], f = factor[best.axis];
+                float low = all.center_low[best.axis], f = factor[best.axis];
                 auto is_left = [&](const Reference& r) { return bin_of(r.low[best.axis] + r.high[best.axis], low, f) < best.bin; };
                 middle = size_t(std::partition(&references[begin], &references[begin] + count, is_left) - references.begin());
                 if (middle == begin || middle == end) middle = begin + count / 2;
@@ -351,8 +351,8 @@ template <class BoxOf> Bvh build_bvh(size_t count, const BoxOf& box_of, uint32_t
     }
     if (!solid) return bvh;
 
-    bvh.centre = extent.low * 0.5 + extent.high * 0.5;
-    Vec3 up = extent.high - bvh.centre, down = bvh.centre - extent.low;
+    bvh.center = extent.low * 0.5 + extent.high * 0.5;
+    Vec3 up = extent.high - bvh.center, down = bvh.center - extent.low;
     bvh.half = {max(up.x, down.x), max(up.y, down.y), max(up.z, down.z)};
     double largest = max_component(bvh.half);
     if (largest > 0) bvh.scale = std::ldexp(1.0, -std::max(std::ilogb(largest), -1000) - 2);
@@ -367,8 +367,8 @@ template <class BoxOf> Bvh build_bvh(size_t count, const BoxOf& box_of, uint32_t
             build::Reference& reference = builder.references[to++];
             for (int axis = 0; axis < 3; axis++) {
                 // One float beyond the rounded value covers the rounding of the difference as well as that to float.
-                float low = float((box.low[axis] - bvh.centre[axis]) * bvh.scale);
-                float high = float((box.high[axis] - bvh.centre[axis]) * bvh.scale);
+                float low = float((box.low[axis] - bvh.center[axis]) * bvh.scale);
+                float high = float((box.high[axis] - bvh.center[axis]) * bvh.scale);
                 reference.low[axis] = std::nextafterf(low, -build::FAR);
                 reference.high[axis] = std::nextafterf(high, build::FAR);
             }
