@@ -502,14 +502,15 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     tried.append(_of_focal_factor(views, evidence))
     if not of_depth and np.abs(views.center - views.size / 2).max() <= 0.5:
         tried += _left_out(views, evidence)
-    if isinstance(evidence, Tracks):
-        tried += _lens_of_evidence(views, evidence)
     errors = [evidence.errors(mistake.undone(views)) for mistake in tried]
     known = (as_is, *(each for each, mistake in zip(errors, tried, strict=True) if not mistake.is_fitted))
-    if isinstance(evidence, Depths) and min(_usual(each, evidence) for each in known) > _EXPLAINED:
-        lenses = _lenses_of_depths(views, evidence)
-        tried += lenses
-        errors += [evidence.errors(mistake.undone(views)) for mistake in lenses]
+    if isinstance(evidence, Depths):
+        lenses = _lenses_of_depths(views, evidence) if min(_usual(each, evidence) for each in known) > _EXPLAINED else []
+    else:  # what a lens moves aside is seen in the largest errors but for outliers
+        nearest = min(float(np.sort(each)[int(0.95 * (len(each) - 1))]) for each in known)
+        lenses = _lens_of_tracks(views, evidence) if nearest > _LEFT_OUT / 2 else []
+    tried += lenses
+    errors += [evidence.errors(mistake.undone(views)) for mistake in lenses]
     # The usual error is that of the best explanation, so that it does not hide in the worse ones.
     usual = max(evidence.floor, min(_usual(each, evidence) for each in (as_is, *errors)))
     costs = np.array([_cost(each, usual) for each in (as_is, *errors)])
@@ -638,7 +639,7 @@ def _cost(errors: Array, usual: float) -> float:
     return float(np.log1p(bounded * bounded).mean()) * min(len(errors), _COUNTED)
 
 
-def _lens_of_evidence(views: Views, evidence: Tracks) -> list[Mistake]:
+def _lens_of_tracks(views: Views, evidence: Tracks) -> list[Mistake]:
     """The mistake of cameras whose lens was left out or is another one: that which the evidence asks for, if it explains it."""
     straight = replace(views, lenses=())
     places, depth = straight.project(evidence.which, evidence.points)

@@ -89,6 +89,7 @@ class Search:
     find : the bias, a share of the light. least : that which would be found in 99 of 100 cases so far, if it is everywhere;
     least_in_blocks : if it is in a typical block of 32 × 32 pixels alone; both 0 without noise.
     samples : so far, of each side. rounds : so far. is_decided : whether that was the last. expected : samples that it takes.
+    following : samples after the next round, if there is to be one; None after all.
     """
 
     find: float
@@ -98,6 +99,7 @@ class Search:
     rounds: int
     is_decided: bool
     expected: float
+    following: int | None
 
     @property
     def reached(self) -> bool:
