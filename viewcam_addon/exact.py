@@ -90,10 +90,22 @@ def cross(a: Vector, b_high: Vector, b_low: Vector) -> tuple[Vector, Vector, boo
 
     The third value says where all three sums have settled. Non-zero components must not be smaller than `SMALLEST_FACTOR`.
     """
+    zeros = [not x if isinstance(x, float) else not x.any() for x in a]
+    if zeros.count(True) == 2:
+        i = zeros.index(False)
+        if np.all(np.abs(a[i]) == 0.5):  # as of an up that is an axis: no product rounds
+            return _along_axis(i, a[i], b_high), _along_axis(i, a[i], b_low), True
     high, low, settled = zip(
         *(sum_terms(_cross_terms(a, b_high, b_low, j, k)) for j, k in ((1, 2), (2, 0), (0, 1))), strict=True
     )
     return high, low, settled[0] & settled[1] & settled[2]
+
+
+def _along_axis(i: int, size: Number, b: Vector) -> Vector:
+    """a × b for an a of that size along axis i, without −0."""
+    j, k, zero = (i + 1) % 3, (i + 2) % 3, size - size
+    components = {i: zero + 0.0 * b[i], j: zero - size * b[k], k: zero + size * b[j]}
+    return components[0], components[1], components[2]
 
 
 def _cross_terms(a: Vector, b_high: Vector, b_low: Vector, j: int, k: int) -> list[Number]:

@@ -25,31 +25,36 @@ IDENTITY = np.eye(4)
 _FREE = 2.0**-26
 
 
-def euler(rotation: Array, order: str) -> tuple[float, float, float]:
-    """The angles about x, y and z in radians, applied in `order` ("XYZ": about x first), of a rotation matrix.
+def euler(rotation: Array, order: str) -> Array:
+    """(..., 3): the angles about x, y and z in radians, applied in `order` ("XYZ": about x first), of rotation matrices.
 
     Of the two triples of angles that give the same rotation, the one of the smaller sum, which float32 also stores better.
     """
-    return min(_triples(rotation, order), key=lambda triple: sum(map(abs, triple)))
+    triple, other = _triples(rotation, order)
+    sums = np.abs(triple).sum(-1, keepdims=True), np.abs(other).sum(-1, keepdims=True)
+    return np.where(sums[0] <= sums[1], triple, other)
 
 
-def _triples(m: Array, order: str, before: Sequence[float] | None = None) -> list[tuple[float, float, float]]:
-    """Both triples of angles in [−π, π] that give a rotation; in gimbal lock those that begin with the angle of `before`."""
+def _triples(m: Array, order: str, before: Sequence[float] | None = None) -> tuple[Array, Array]:
+    """Both triples of angles in [−π, π] that give rotations, (..., 3) each.
+
+    before : of a single matrix, in gimbal lock those that begin with its angle.
+    """
     i, j, k, sign = _axes(order)
-    from_lock = math.hypot(m[i, i], m[j, i])
+    from_lock = np.hypot(m[..., i, i], m[..., j, i])
     is_locked = before is not None and from_lock <= _FREE
-    first = sign * before[i] if is_locked else math.atan2(m[k, j], m[k, k])
-    second = math.atan2(-m[k, i], from_lock)
-    sine, cosine = math.sin(first), math.cos(first)
-    third = math.atan2(sine * m[i, k] - cosine * m[i, j], cosine * m[j, j] - sine * m[j, k])
-    angles, other = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-    angles[i], angles[j], angles[k] = sign * first, sign * second, sign * third
-    other[i], other[j], other[k] = (sign * angle for angle in (_opposite(first), _opposite(-second), _opposite(third)))
-    return [tuple(angles), tuple(other)]
+    first = np.float64(sign * before[i]) if is_locked else np.arctan2(m[..., k, j], m[..., k, k])
+    second = np.arctan2(-m[..., k, i], from_lock)
+    sine, cosine = np.sin(first), np.cos(first)
+    third = np.arctan2(sine * m[..., i, k] - cosine * m[..., i, j], cosine * m[..., j, j] - sine * m[..., j, k])
+    angles, other = np.empty((2, *np.shape(first), 3))
+    angles[..., i], angles[..., j], angles[..., k] = sign * first, sign * second, sign * third
+    other[..., i], other[..., j], other[..., k] = (sign * _opposite(angle) for angle in (first, -second, third))
+    return angles, other
 
 
-def _opposite(angle: float) -> float:
-    return angle - math.copysign(math.pi, angle)
+def _opposite(angle: Array) -> Array:
+    return angle - np.copysign(math.pi, angle)
 
 
 def from_euler(angles: Sequence[float], order: str) -> Array:
@@ -70,20 +75,20 @@ def _axes(order: str) -> tuple[int, int, int, int]:
     return i, j, k, 1 if (j - i) % 3 == 1 else -1
 
 
-def quaternion(rotation: Array) -> tuple[float, float, float, float]:
-    """(w, x, y, z), w ≥ 0, of a rotation matrix: from its largest component, so that nothing cancels (Shepperd 1978)."""
-    trace = np.trace(rotation)
-    squares = np.array([trace, *np.diag(rotation)]) * [1.0, 2.0, 2.0, 2.0] + np.array([1.0, *[1.0 - trace] * 3])
-    largest = int(np.argmax(squares))
-    skew = [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
-    if largest == 0:
-        numbers = np.array([squares[0], *skew])
-    else:
-        i = largest - 1
-        numbers = np.array([skew[i], *(rotation[i] + rotation[:, i])])
-        numbers[largest] = squares[largest]
-    numbers /= math.copysign(np.linalg.norm(numbers), numbers[0])
-    return tuple(numbers.tolist())
+def quaternion(rotation: Array) -> Array:
+    """(..., 4): w, x, y, z with w ≥ 0 from the largest component, so that nothing cancels (Shepperd 1978)."""
+    m = rotation
+    trace = m[..., 0, 0] + m[..., 1, 1] + m[..., 2, 2]
+    products = np.empty((*np.shape(trace), 4, 4))  # 4 q qᵀ
+    products[..., 0, 0] = 1 + trace
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1)), 1):
+        products[..., 0, i] = products[..., i, 0] = m[..., k, j] - m[..., j, k]
+        products[..., i, i] = 1 - trace + 2 * m[..., i - 1, i - 1]
+        products[..., j + 1, k + 1] = products[..., k + 1, j + 1] = m[..., j, k] + m[..., k, j]
+    largest = np.diagonal(products, axis1=-2, axis2=-1).argmax(-1)
+    numbers = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
+    length = np.sqrt((numbers * numbers).sum(-1, keepdims=True))
+    return numbers / np.copysign(length, numbers[..., :1])
 
 
 def from_quaternion(numbers: Sequence[float]) -> Array:
@@ -101,31 +106,32 @@ def from_quaternion(numbers: Sequence[float]) -> Array:
     )
 
 
-def axis_angle(rotation: Array) -> tuple[float, float, float, float]:
-    """(angle, x, y, z): radians in [0, π] about a unit axis, Blender's (0, 1, 0) where the angle is 0."""
-    w, *axis = quaternion(rotation)
-    sine = math.hypot(*axis)
-    if sine == 0:
-        return 0.0, 0.0, 1.0, 0.0
-    return 2 * math.atan2(sine, w), *(component / sine for component in axis)
+def axis_angle(rotation: Array) -> Array:
+    """(..., 4): radians in [0, π] and the unit axis, Blender's (0, 1, 0) where the angle is 0, of rotation matrices."""
+    numbers = quaternion(rotation)
+    sine = np.sqrt((numbers[..., 1:] * numbers[..., 1:]).sum(-1, keepdims=True))
+    is_turned = sine > 0
+    axis = np.where(is_turned, numbers[..., 1:] / np.where(is_turned, sine, 1.0), (0.0, 1.0, 0.0))
+    return np.concatenate([2 * np.arctan2(sine, numbers[..., :1]), axis], axis=-1)
 
 
-def numbers(rotation: Array, mode: str, before: Sequence[float] | None = None) -> tuple[float, ...]:
-    """The numbers of a rotation in one of Blender's modes: an order of Euler angles, "QUATERNION" or "AXIS_ANGLE".
+def numbers(rotation: Array, mode: str, before: Sequence[float] | None = None) -> Array:
+    """(..., n): the numbers of rotations in one of Blender's modes, an order of Euler angles, "QUATERNION" or "AXIS_ANGLE".
 
-    before : the numbers of another rotation. Those nearest to them are given then, so that what is interpolated between the two
-        neither flips nor takes the long way round: the other triple of Euler angles, the quaternion of the other sign, the
-        opposite axis, and whole turns more or less.
+    before : of a single matrix, the numbers of another rotation. Those nearest to them are given then, so that what is
+        interpolated between the two neither flips nor takes the long way round: the other triple of Euler angles, the
+        quaternion of the other sign, the opposite axis, and whole turns more or less.
     """
     if mode == "QUATERNION":
-        quaternion_ = quaternion(rotation)
-        return quaternion_ if before is None or np.dot(quaternion_, before) >= 0 else tuple(-number for number in quaternion_)
+        turn = quaternion(rotation)
+        return turn if before is None or np.dot(turn, before) >= 0 else -turn
     if mode == "AXIS_ANGLE":
-        return axis_angle(rotation) if before is None else _continued_axis_angle(*axis_angle(rotation), before=before)
+        turn = axis_angle(rotation)
+        return turn if before is None else np.array(_continued_axis_angle(*turn.tolist(), before=before))
     if before is None:
         return euler(rotation, mode)
-    triples = [map(_wound, triple, before) for triple in _triples(rotation, mode, before)]
-    return min(map(tuple, triples), key=lambda triple: math.dist(triple, before))
+    triples = [[*map(_wound, triple.tolist(), before)] for triple in _triples(rotation, mode, before)]
+    return np.array(min(triples, key=lambda triple: math.dist(triple, before)))
 
 
 def _continued_axis_angle(angle: float, *axis: float, before: Sequence[float]) -> tuple[float, ...]:
@@ -141,12 +147,10 @@ def _wound(angle: float, near: float) -> float:
     return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))
 
 
-def neighbors(numbers: Sequence[float]) -> Iterator[tuple[float, ...]]:
-    """The n numbers rounded to float32, then all 3ⁿ − 1 that differ from these by a step of float32 in some of them."""
-    rounded = np.array(numbers, dtype=np.float32)
-    yield tuple(rounded.tolist())
+def neighbors(rounded: NDArray[np.float32]) -> Iterator[tuple[float, ...]]:
+    """The 3ⁿ − 1 tuples that differ from n numbers of float32 by one of its steps in some of them."""
     choices = np.column_stack([rounded, *(np.nextafter(rounded, np.float32(limit)) for limit in (-np.inf, np.inf))])
-    yield from itertools.islice(itertools.product(*choices.tolist()), 1, None)
+    return itertools.islice(itertools.product(*choices.tolist()), 1, None)
 
 
 def nearest(matrix: Array) -> Array:

@@ -59,7 +59,7 @@ def flight_of(crowd, scene):
 
 def test_cameras_that_are_carried_together_stand_to_the_bit_where_each_by_itself_would(crowd, scene, monkeypatch):
     together = flight_of(crowd, scene)
-    monkeypatch.setattr(CameraSync, "carry", lambda blocks, _scene, _depsgraph: blocks)
+    monkeypatch.setattr(CameraSync, "carry", lambda cameras, _scene, _depsgraph: [sync for sync, _ in cameras])
     alone = flight_of(crowd, scene)
     for frame, *flight in zip(FRAMES, together, alone, strict=True):
         for each, state, expected in zip(crowd, *flight, strict=True):
@@ -70,8 +70,9 @@ def test_most_of_them_are_carried_together(crowd, scene, monkeypatch):
     left, carry = [], CameraSync.carry
 
     def counting(*arguments):
-        left.append([each.name for each in carry(*arguments)])
-        return [bpy.data.objects[name] for name in left[-1]]
+        syncs = carry(*arguments)
+        left.append([sync.camera_object.name for sync in syncs])
+        return syncs
 
     scene.frame_set(2)
     monkeypatch.setattr(CameraSync, "carry", counting)

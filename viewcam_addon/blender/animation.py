@@ -22,13 +22,16 @@ from . import camera as cameras
 from . import datablocks, resolution, storage, targets
 from .camera import CameraSync
 
+_Object = bpy.types.Object  # to look it up takes as long as to ask a camera for its name
+
 
 @persistent
 def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
     targets.forget_shapes(depsgraph)
-    for block in CameraSync.carry(_evaluated_cameras(depsgraph), scene, depsgraph):
-        _at_frame(block, scene, depsgraph)
+    for sync in CameraSync.carry(_evaluated_cameras(depsgraph), scene, depsgraph):
+        with _errors_told(sync.camera_object, scene):
+            sync.at_frame(scene, depsgraph)
     resolution.on_frame_change(scene, depsgraph)
 
 
@@ -38,12 +41,12 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     targets.forget_shapes(depsgraph)
     if depsgraph.id_type_updated("SCENE"):
         resolution.follow(scene)
-    for block in _evaluated_cameras(depsgraph):
-        if not resolution.is_paused:
-            with _errors_told(block, scene):
-                CameraSync.of(block).updated(scene, depsgraph)
-        elif datablocks.has_driven_values(block):
-            _at_frame(block, scene, depsgraph)
+    for sync, _ in _evaluated_cameras(depsgraph):
+        with _errors_told(sync.camera_object, scene):
+            if not resolution.is_paused:
+                sync.updated(scene, depsgraph)
+            elif datablocks.has_driven_values(sync.camera_object):
+                sync.at_frame(scene, depsgraph)
 
 
 @persistent
@@ -56,7 +59,8 @@ def on_load(_path: str, _more: object = None) -> None:
     for camera_object in watching:
         targets.connect(camera_object)
     for camera_object in watching:
-        _at_frame(camera_object, scene, bpy.context.evaluated_depsgraph_get())
+        with _errors_told(camera_object, scene):
+            CameraSync.of(camera_object).at_frame(scene, bpy.context.evaluated_depsgraph_get())
 
 
 @persistent
@@ -70,18 +74,15 @@ def on_undo(_scene: bpy.types.Scene, _more: object = None) -> None:
 
 
 def _is_camera(block: bpy.types.ID) -> bool:
-    return isinstance(block, bpy.types.Object) and block.type == "CAMERA" and storage.is_enabled(block)
+    return type(block) is _Object and block.type == "CAMERA" and storage.is_enabled(block)
 
 
-def _evaluated_cameras(depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
-    """The enabled cameras, originals, that Blender has just evaluated and that nobody is about to set."""
-    blocks = [update.id.original for update in depsgraph.updates]
-    return [block for block in blocks if _is_camera(block) and not CameraSync.of(block).is_being_set]
-
-
-def _at_frame(camera_object: bpy.types.Object, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    with _errors_told(camera_object, scene):
-        CameraSync.of(camera_object).at_frame(scene, depsgraph)
+def _evaluated_cameras(depsgraph: bpy.types.Depsgraph) -> list[tuple[CameraSync, bpy.types.Object]]:
+    """The enabled cameras that Blender has just evaluated and that nobody is about to set, each with its evaluated object."""
+    blocks = [block for block in [update.id for update in depsgraph.updates] if type(block) is _Object]
+    cameras = [(block.original, block) for block in blocks if block.type == "CAMERA"]
+    known = [(CameraSync.of(original), block) for original, block in cameras if storage.is_enabled(original)]
+    return [each for each in known if not each[0].is_being_set]
 
 
 @contextlib.contextmanager

@@ -86,6 +86,8 @@ class CameraSync:
         # The camera's state and its stored values as they were last seen to agree; None where nobody has looked.
         self._state: tuple | None = None
         self._values: CameraValues | None = None
+        # The picture in which they decide all of the camera, each by itself, so that `carry` may bring it; None in no picture.
+        self._carried_in: intrinsics.Frame | None = None
         # Both as they were before each of the last moves since the values were edited: a move that is canceled gives the
         # values back to the bit.
         self._rests: tuple[tuple[tuple, CameraValues], ...] = ()
@@ -240,76 +242,82 @@ class CameraSync:
 
     @classmethod
     def carry(
-        cls, cameras: list[bpy.types.Object], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
-    ) -> list[bpy.types.Object]:
+        cls,
+        cameras: list[tuple["CameraSync", bpy.types.Object]],
+        scene: bpy.types.Scene,
+        depsgraph: bpy.types.Depsgraph,
+    ) -> list["CameraSync"]:
         """Bring those cameras, in one pass, of which a frame has changed the values and nothing else.
 
-        cameras : enabled ones, originals, that Blender has evaluated. Returns those that are left to `at_frame`.
+        cameras : enabled ones, with their objects as Blender has evaluated them. Returns those that are left to `at_frame`.
         """
         if depsgraph.mode == "RENDER" or len(cameras) < _MANY:
-            return cameras
+            return [sync for sync, _ in cameras]
         left, moved = [], []
         try:
             picture = without_border(datablocks.frame_of(scene))
         except InputError:  # no picture at all
-            return cameras
-        for camera_object in cameras:
-            sync = cls.of(camera_object)
-            values = sync._animated(picture, depsgraph)
+            return [sync for sync, _ in cameras]
+        for sync, evaluated in cameras:
+            values = sync._animated(evaluated, picture)
             if values is None:
-                left.append(camera_object)
+                left.append(sync)
             elif values is not sync._values:
                 moved.append((sync, values))
-        poses = np.array([[each.eye, each.look_at, each.up] for _, each in moved]).reshape(-1, 3, 3)
+        poses = np.array([(*each.eye, *each.look_at, *each.up) for _, each in moved]).reshape(-1, 3, 3)
         valid = make_views(*poses.swapaxes(0, 1))
-        left += [sync.camera_object for (sync, _), is_valid in zip(moved, valid, strict=True) if not is_valid]
-        moved = [each for each, is_valid in zip(moved, valid, strict=True) if is_valid]
+        if not valid.all():
+            left += [sync for (sync, _), is_valid in zip(moved, valid, strict=True) if not is_valid]
+            moved, poses = [each for each, is_valid in zip(moved, valid, strict=True) if is_valid], poses[valid]
         if moved:
-            left += cls._bring(moved, np.stack(basis(*poses[valid].swapaxes(0, 1)), axis=-1), scene)
+            axes = np.stack(basis(*poses.swapaxes(0, 1)), axis=-1)
+            locations = poses[:, 0].astype(np.float32)
+            modes = np.array([sync._state[0].mode for sync, _ in moved])
+            for mode in set(modes.tolist()):
+                of_mode = np.flatnonzero(modes == mode)
+                left += cls._bring([moved[i] for i in of_mode], mode, locations[of_mode], axes[of_mode], scene)
         return left
 
     @classmethod
     def _bring(
-        cls, moved: list[tuple["CameraSync", CameraValues]], axes: Array, scene: bpy.types.Scene
-    ) -> list[bpy.types.Object]:
-        """Place cameras that nothing carries by their new values. axes : (n, 3, 3), u, v and w as columns.
+        cls,
+        moved: list[tuple["CameraSync", CameraValues]],
+        mode: str,
+        locations: NDArray[np.float32],
+        axes: Array,
+        scene: bpy.types.Scene,
+    ) -> list["CameraSync"]:
+        """Place n cameras that nothing carries by their new values.
 
-        Returns those that have no such lens.
+        mode : of their rotations. locations : (n, 3). axes : (n, 3, 3), u, v and w as columns. Returns those that have no such
+        lens.
         """
         left, cameras = [], [sync.camera_object for sync, _ in moved]
-        modes = [sync._state[0].mode for sync, _ in moved]
-        turns = pose.set_rotations(cameras, modes, list(map(rotation.numbers, axes, modes)), axes)
-        locations = np.array([values.eye for _, values in moved]).astype(np.float32).tolist()
-        for (sync, values), location, turn in zip(moved, locations, turns, strict=True):
-            camera_object, before = sync.camera_object, sync._values
-            camera_object.location = location
+        turns = pose.set_rotations(cameras, mode, rotation.numbers(axes, mode), axes)
+        for (sync, values), location, turn in zip(moved, map(tuple, locations.tolist()), turns.tolist(), strict=True):
+            camera_object, (channels, *lens), before = sync.camera_object, sync._state, sync._values
+            if location != channels.location:
+                camera_object.location = location
             if storage.is_focused_on_look_at(camera_object):
                 conversion.store(camera_object.data.dof, focus_distance=math.dist(values.eye, values.look_at))
-            channels = sync._state[0]._replace(location=tuple(location), rotation=turn)
-            sync._state, sync._values = (channels, *sync._state[1:]), values
-            sync._rests, sync._is_moving, sync._placed = (), False, ()
+            sync._state = (rotation.Channels(mode, location, tuple(turn), *channels[3:]), *lens)
+            sync._values, sync._rests, sync._is_moving, sync._placed = values, (), False, ()
             if (values.distance, values.zoom) != (before.distance, before.zoom):
                 try:
                     sync.resized(scene)
                     sync._agree()
                 except InputError:
-                    left.append(camera_object)
+                    left.append(sync)
         return left
 
-    def _animated(self, picture: intrinsics.Frame, depsgraph: bpy.types.Depsgraph) -> CameraValues | None:
+    def _animated(self, evaluated: bpy.types.Object, picture: intrinsics.Frame) -> CameraValues | None:
         """The values at a frame that can have changed nothing else of the camera, and which no curve asks for in another way.
 
         Nothing carries the camera, and it stands where its values were last seen to agree with it. None of any other.
         """
-        camera_object, before = self.camera_object, self._values
-        if before is None or before.pole == HOLD or before.follows or not before.set_for == before.counted_in == picture:
+        if (self._carried_in is not picture and self._carried_in != picture) or not self.is_untouched(by_values=True):
             return None
-        if not self.is_untouched(by_values=True) or not self._state[0].is_plain or storage.asked_of(camera_object):
-            return None
-        evaluated = camera_object.evaluated_get(depsgraph)
-        if not evaluated.is_evaluated or camera_object.data.type != "PERSP":
-            return None
-        return storage.animated(evaluated, before)
+        return storage.animated(evaluated, self._values)
 
     def at_frame(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         """Blender has evaluated an enabled camera at another frame: what the values decide there places it, the rest follows.
@@ -496,8 +504,11 @@ class CameraSync:
 
     def _agree(self, rests: tuple[tuple[tuple, CameraValues], ...] = (), is_moving: bool = False) -> None:
         """Take note that the camera is where its values say."""
-        self._state, self._values = conversion.state_of(self.camera_object), storage.load(self.camera_object)
+        self._state = channels, kind, *_ = conversion.state_of(self.camera_object)
+        self._values = values = storage.load(self.camera_object)
         self._rests, self._is_moving = rests, is_moving
+        is_simple = values.pole != HOLD and not values.follows and values.set_for == values.counted_in
+        self._carried_in = values.set_for if is_simple and channels.is_plain and kind == "PERSP" else None
 
 
 def forget_all() -> None:

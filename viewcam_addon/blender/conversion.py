@@ -113,8 +113,8 @@ def store(block: bpy.types.bpy_struct, **properties: float | tuple[float, ...]) 
 def state_of(camera_object: bpy.types.Object) -> tuple:
     """All of the camera that `place` reads or sets, what carries it aside."""
     camera = camera_object.data
-    lens = (camera.lens, camera.shift_x, camera.shift_y, camera.sensor_width, camera.sensor_height, camera.sensor_fit)
-    return pose.channels_of(camera_object), lens, tuple(camera.virtual_pinhole_sensor)
+    sensor = (camera.sensor_width, camera.sensor_height, camera.sensor_fit, camera.virtual_pinhole_sensor[:])
+    return pose.channels_of(camera_object), camera.type, camera.lens, camera.shift_x, camera.shift_y, *sensor
 
 
 def evaluated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object:

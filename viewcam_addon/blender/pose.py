@@ -47,12 +47,12 @@ def channels_of(block: bpy.types.Object) -> Channels:
     delta = _DELTA_ROTATIONS.get(mode, "delta_rotation_euler")
     return Channels(
         mode,
-        tuple(block.location),
-        tuple(getattr(block, _ROTATIONS.get(mode, "rotation_euler"))),
-        tuple(block.scale),
-        tuple(block.delta_location),
-        tuple(getattr(block, delta)) if delta else (),
-        tuple(block.delta_scale),
+        block.location[:],
+        getattr(block, _ROTATIONS.get(mode, "rotation_euler"))[:],
+        block.scale[:],
+        block.delta_location[:],
+        getattr(block, delta)[:] if delta else (),
+        block.delta_scale[:],
     )
 
 
@@ -63,35 +63,38 @@ def set_rotation(camera_object: bpy.types.Object, turn: Array, before: Sequence[
     """
     channels = channels_of(camera_object)
     numbers = rotation.numbers(turn, channels.mode, before)
-    set_rotations([camera_object], [channels.mode], [numbers], (channels.delta @ turn * channels.signs)[None])
+    set_rotations([camera_object], channels.mode, numbers[None], (channels.delta @ turn * channels.signs)[None])
 
 
-def set_rotations(
-    cameras: Sequence[bpy.types.Object], modes: Sequence[str], numbers: Sequence[tuple[float, ...]], axes: Array
-) -> list[tuple[float, ...]]:
-    """Rotate n cameras, each by its numbers in its mode or those beside them that float32 makes the better matrix of.
+def set_rotations(cameras: Sequence[bpy.types.Object], mode: str, numbers: Array, axes: Array) -> NDArray[np.float32]:
+    """Rotate n cameras of one mode, each by its numbers or those beside them that float32 makes the better matrix of.
 
-    axes : (n, 3, 3), the axes wanted, as columns. Returns the numbers that were set.
+    numbers : (n, k), of the mode. axes : (n, 3, 3), those wanted, as columns. Returns the numbers that were set.
     """
-    names = [_ROTATIONS.get(mode, "rotation_euler") for mode in modes]
-    waiting = list(map(rotation.neighbors, numbers))
-    best, least = list(numbers), [np.inf] * len(cameras)
-    left, at_once = list(range(len(cameras))), 1
-    while left:
-        tried = [(i, candidate) for i in left for candidate in itertools.islice(waiting[i], at_once)]
+    name, best = _ROTATIONS.get(mode, "rotation_euler"), numbers.astype(np.float32)
+    for camera_object, turn in zip(cameras, best.tolist(), strict=True):
+        setattr(camera_object, name, turn)
+    errors = rotation.largest_error(float64([camera_object.matrix_basis for camera_object in cameras]), axes)
+    for i in np.flatnonzero(errors > _ROUNDING):
+        best[i] = _set_better(cameras[i], name, best[i], axes[i], errors[i])
+    return best
+
+
+def _set_better(
+    camera_object: bpy.types.Object, name: str, rounded: NDArray[np.float32], axes: Array, least: float
+) -> Sequence[float]:
+    """Rotate a camera by the first numbers beside the rounded ones that are right, or the best of all; these numbers."""
+    best, waiting, at_once = tuple(rounded.tolist()), rotation.neighbors(rounded), 2
+    while least > _ROUNDING and (tried := list(itertools.islice(waiting, at_once))):
         matrices = []
-        for i, candidate in tried:
-            setattr(cameras[i], names[i], candidate)
-            matrices.append(cameras[i].matrix_basis.copy())
-        errors = rotation.largest_error(float64(matrices), axes[[i for i, _ in tried]]) if tried else ()
-        for (i, candidate), error in zip(tried, errors, strict=True):
-            if error < least[i]:
-                best[i], least[i] = candidate, error
-        at_once, last = 2 * at_once, dict(tried)
-        for i in left:
-            if last.get(i) != best[i]:
-                setattr(cameras[i], names[i], best[i])
-        left = [i for i in left if least[i] > _ROUNDING and i in last]
+        for turn in tried:
+            setattr(camera_object, name, turn)
+            matrices.append(camera_object.matrix_basis.copy())
+        errors = rotation.largest_error(float64(matrices), axes)
+        if errors.min() < least:
+            best, least = tried[errors.argmin()], errors.min()
+        at_once *= 2
+    setattr(camera_object, name, best)
     return best
 
 
