@@ -1265,7 +1265,7 @@ def test_a_scan_of_3rscan_has_its_intrinsics_and_size_in_its_info(tmp_path):
     (tmp_path / "frame-000000.pose.txt").write_text(pose_text(known))
     assert the_same(cameras.read(tmp_path), known).size_stated
     (tmp_path / "_info.txt").write_text("m_colorWidth = 640\n")
-    with pytest.raises(InputError, match="K in .*_info.txt is .*give a number"):
+    with pytest.raises(InputError, match=r"K in .*_info\.txt is .*give a number"):
         cameras.read(tmp_path)
 
 
