@@ -107,7 +107,8 @@ class Tracing(child_process.ServerOnDemand):
         of geometry `pixels` compared, `position` in pixels, `share_of_tolerance` of each pass where it is largest,
         `mismatches`, and `conversion`, the stated camera against this one; of light its `samples` and `quantities`. None is
         what was not compared. Of a job that finds a bias there are `undecided` and `seconds` alone until the last round, where
-        `undecided` has `expected` and `least` of light_verdict.Search; then a report's folder gets the pictures of all rounds.
+        `undecided` has `expected` and `following` of light_verdict.Search; then a report's folder gets the pictures of all
+        rounds.
 
         Raises
         ------
@@ -296,7 +297,7 @@ class _Server:
         if wanted.bias and isinstance(comparison, RadianceComparison):
             search = sequential.search(comparison, wanted.bias, rounds)
             if not search.is_decided:
-                return {"undecided": {"expected": search.expected, "least": search.least}, "seconds": seconds}
+                return {"undecided": {"expected": search.expected, "following": search.following}, "seconds": seconds}
             comparison, self._rounds = dataclasses.replace(comparison, search=search), None
             if files.report:
                 for path, picture in zip(tests, pictures, strict=True):
