@@ -25,7 +25,7 @@ NO_CLOCK = {"deadline": None, "suppress_health_check": [hypothesis.HealthCheck.t
 REPEATABLE = {**NO_CLOCK, "derandomize": True, "database": None}
 hypothesis.settings.register_profile("repeatable", **REPEATABLE)
 hypothesis.settings.register_profile("explore", **NO_CLOCK)
-hypothesis.settings.register_profile("quick", **REPEATABLE, max_examples=20)
+hypothesis.settings.register_profile("quick", **REPEATABLE, max_examples=10)
 hypothesis.settings.load_profile("repeatable")
 
 

@@ -342,7 +342,7 @@ BRITISH += "|initialis|normalis|optimis|organis|quantis|rasteris|recognis|regula
 
 
 def is_british(text: str) -> bool:
-    text = text.replace("CANCELLED", "").lower()  # Blender's own word
+    text = text.replace("CANCELLED", "").lower().replace("cancellation", "")  # both are American
     return any(stem in text for stem in BRITISH.split("|"))
 
 
@@ -376,6 +376,8 @@ def test_docstrings_begin_with_what_a_thing_is_or_does():
 def test_names_say_what_a_value_is_and_are_spelled_as_blender_spells():
     assert guilty(poor_names) == {}
     assert not [name for name in tracked_files() if is_british(name)]
+    core = [path for path in PACKAGE.rglob("*") if path.suffix in (".h", ".cpp")]
+    assert core and not [path for path in core if is_british(path.read_text(encoding="utf-8"))]
 
 
 def test_a_docstring_that_begins_without_its_subject_is_seen():

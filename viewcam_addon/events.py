@@ -4,9 +4,9 @@ An event is a name and fields. Of every command are told `started` (command, wor
 printed), `error` (command, text, and `problems` where there are several), `note` (command, text: how something was taken, or
 what to know) and `finished` (command, exit_status, seconds); a picture that is traced tells `progress` (share), as do labels
 that become a scene of BOP's (work: written), a check each `step` (name: rendering, with number and of, tracing, comparing)
-and, where it searches for a bias, `forecast` (samples: of a pixel in the end, taken: so far, seconds: left), and a batch tells
-of its shots (docs/batch.md). All of it goes to copies of standard output and standard error, so it is heard while libraries are
-silent.
+and, where it searches for a bias, `forecast` (samples: of a pixel in the end, taken: so far, following: after the next round,
+seconds: left), and a batch tells of its shots (docs/batch.md). All of it goes to copies of standard output and standard error,
+so it is heard while libraries are silent.
 
 Rejected: Python's logging, whose levels, loggers and handlers are more than a line of JSON needs, and to which the libraries in
 this process write as well.

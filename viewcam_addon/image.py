@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from . import machine
 from .errors import InputError
 from .files import written_whole
-from .pinhole import Pinhole
+from .pinhole import Pinhole, ViewPlane
 from .terminal import silent_libraries
 
 
@@ -311,8 +311,11 @@ def _frame(headers: Sequence[dict[str, Any]], path: Path) -> FrameSize:
     return frames.pop()
 
 
-def write(path: str | os.PathLike[str], image: Image) -> None:
+def write(path: str | os.PathLike[str], image: Image, is_bent: bool = False) -> None:
     """Write a 32-bit multilayer EXR, whole or not at all.
+
+    is_bent : whether a lens bends the picture: then it has no worldToNDC and no camera of its own, which would be the
+    pinhole's, but worldToCamera alone.
 
     Raises
     ------
@@ -324,7 +327,12 @@ def write(path: str | os.PathLike[str], image: Image) -> None:
         for name, array in image.passes.items()
         for i, letter in enumerate(CHANNELS[name])
     }
-    _save(path, {**image.attributes, **(_camera_attributes(image.camera) if image.camera is not None else {})}, channels)
+    attributes: dict[str, Any] = dict(image.attributes)
+    if image.camera is not None:
+        attributes |= _camera_attributes(image.camera)
+    if is_bent:
+        attributes = {name: value for name, value in attributes.items() if name not in ("worldToNDC", _CAMERA_ATTRIBUTE)}
+    _save(path, attributes, channels)
 
 
 def write_rgba(path: str | os.PathLike[str], pixels: NDArray[np.float32]) -> None:
@@ -336,11 +344,11 @@ _DATA = ("Vector", "Denoising Depth", "Denoising Normal", "Crypto")
 """The beginnings of names of Blender's further passes that are no colors."""
 
 
-def rewrite(path: str | os.PathLike[str], change: Callable[[NDArray[Any], bool], NDArray[Any]]) -> None:
-    """Write an EXR anew, with other pixels in the same channels; its texts stay.
+def rewrite(path: str | os.PathLike[str], change: Callable[[NDArray[Any], bool], NDArray[Any]], plane: ViewPlane) -> None:
+    """Write an EXR anew, with other pixels in the same channels; its texts stay, and what it says of its camera does not.
 
     change : (height, width, channels), rows from the **top**, and whether these are data, of which nothing may be between →
-    the new ones. Raises InputError as `read` and `write` do.
+    the new ones. plane : of these, whose pixel aspect the file says. Raises InputError as `read` and `write` do.
     """
     channels, _, attributes = _pixels(Path(path))
     result: dict[str, NDArray[Any]] = {}
@@ -349,7 +357,8 @@ def rewrite(path: str | os.PathLike[str], change: Callable[[NDArray[Any], bool],
         if names:
             pixels = change(np.stack([channels[name] for name in names], axis=-1), is_data)
             result |= {name: np.ascontiguousarray(pixels[..., i]) for i, name in enumerate(names)}
-    _save(path, attributes, {name: result[name] for name in channels})
+    aspect = {"pixelAspectRatio": plane.distance[1] / plane.distance[0]}
+    _save(path, attributes | aspect, {name: result[name] for name in channels})
 
 
 def _is_data(channel: str) -> bool:

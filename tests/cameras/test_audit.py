@@ -184,12 +184,14 @@ def test_noise_and_unknown_mistakes_are_given_no_name():
 # ---- depth maps of a sphere on a floor
 
 
-def depth_map(views, number):
+def depth_map(views, number, lens=None):
     """(height, width) depth along the view, rows from the top; nan where nothing is."""
     width, height = views.size[number].astype(int)
     columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     x = (columns - views.center[number, 0]) / views.focal[number, 0]
     y = -(rows - views.center[number, 1]) / views.focal[number, 1]
+    if lens is not None:
+        x, y = np.moveaxis(lens.undistort(np.stack([x, -y], axis=-1)) * [1, -1], -1, 0)
     rays = np.stack([x, y, -np.ones_like(x)], axis=-1) @ views.axes[number].T
     eye = views.eye[number]
     with np.errstate(all="ignore"):
@@ -238,6 +240,14 @@ def filmed():
 def test_depth_maps_say_that_right_cameras_are_right(filmed):
     views, maps = filmed
     assert _audited(views, Depths(maps)).kind == "none"
+
+
+def test_depth_maps_that_a_lens_has_bent_tell_the_lens_and_no_focal_length():
+    """A batch with --distort makes such; taken for a pinhole's they fitted best with a focal length 1.02 times too long."""
+    views = views_of(a_filmed_scene(count=3))
+    verdict = _audited(views, Depths([depth_map(views, i, distortion.opencv({"k1": -0.2})) for i in range(3)]))
+    assert verdict.kind == "lens_left_out", verdict
+    assert abs(float(verdict.sentence.split("k1 = ")[1].split()[0]) + 0.2) < 2e-3, verdict
 
 
 @pytest.mark.parametrize("kind", ["y_up", "y_down"])
@@ -455,6 +465,9 @@ BENT = {
     "lens_twice": (lambda lens: None, "lens_twice"),
     "tangential_swapped": (lambda lens: replace(lens, tangential=lens.tangential[::-1]), "tangential_swapped"),
     "a fisheye": (lambda lens: replace(lens, projection="equidistant"), "lens_model"),
+    "the other sign": (lambda lens: replace(lens, radial=tuple(-k for k in lens.radial)), "lens_model"),
+    "y up in p1": (lambda lens: replace(lens, tangential=(-lens.tangential[0], lens.tangential[1])), "lens_model"),
+    "another model": (lambda lens: distortion.Lens((), "fov", (0.9,)), "lens_model"),
 }
 
 
@@ -463,7 +476,7 @@ def test_what_is_wrong_with_a_lens_is_named_and_nothing_where_it_is_right(true):
     """The pictures were taken through one lens, and the cameras say another."""
     change, kind = BENT[true]
     values = distortion.opencv({"k1": -0.2, "k2": 0.05, "p1": 0.004, "p2": -0.003})
-    for seed in range(20):
+    for seed in range(10):
         random = np.random.default_rng(seed)
         views, middle = a_right_dataset(random)
         lens = change(values)
@@ -477,18 +490,28 @@ def test_what_is_wrong_with_a_lens_is_named_and_nothing_where_it_is_right(true):
         off = np.median(
             np.hypot(*(taken - (values.distort(in_plane) * views.focal[straight.which] + views.center[straight.which])).T)
         )
-        if not true or off > 1:  # a telephoto shows too little of a lens to tell
+        if not true or off > 1.5:  # a telephoto shows too little of a lens to tell
             assert verdict.kind == kind, (seed, off, verdict)
 
 
-@pytest.mark.parametrize("k1", [-0.25, -0.05, 0.15])
-def test_a_lens_that_was_left_out_is_named_with_its_coefficient(k1):
-    """A positive one says that pictures were undistorted twice, or have a pincushion's lens."""
+LEFT_OUT = {
+    "k1": distortion.opencv({"k1": -0.25}),
+    "little": distortion.opencv({"k1": -0.05}),
+    "undistorted twice": distortion.opencv({"k1": 0.15}),
+    "tangential": distortion.opencv({"k1": -0.25, "k2": 0.08, "p1": 0.006, "p2": -0.004}),
+    "a fisheye": distortion.fisheye({"k1": 0.03, "k2": -0.01}),
+    "fov": distortion.Lens((), "fov", (0.9,)),
+}
+
+
+@pytest.mark.parametrize("name", LEFT_OUT)
+def test_a_lens_that_was_left_out_is_named_with_its_coefficient(name):
+    """A positive k1 says that pictures were undistorted twice, or have a pincushion's lens."""
     named = 0
-    for seed in range(20):
+    for seed in range(10):
         random = np.random.default_rng(seed)
         views, middle = a_right_dataset(random)
-        lens = distortion.opencv({"k1": k1})
+        lens = LEFT_OUT[name]
         straight = points_in_pictures(random, views, middle, 0.0)
         in_plane = (straight.places - views.center[straight.which]) / views.focal[straight.which]
         bent = (lens.distort(in_plane) - in_plane) * views.focal[straight.which]
@@ -497,8 +520,10 @@ def test_a_lens_that_was_left_out_is_named_with_its_coefficient(k1):
         if np.percentile(np.hypot(*bent.T), 95) > 4:
             named += 1
             assert verdict.kind == "lens_left_out", (seed, verdict)
-            assert abs(float(verdict.sentence.split("k1 = ")[1].split(",")[0]) - k1) < 0.2 * abs(k1) + 0.02, verdict
-    assert named >= 5
+            k1 = float(verdict.sentence.split("k1 = ")[1].split(",")[0])
+            if lens.projection == "pinhole" and not any(lens.tangential):  # the terms of others do each other's work
+                assert abs(k1 - lens.radial[0]) < 0.2 * abs(lens.radial[0]) + 0.02, verdict
+    assert named >= 3
 
 
 def test_a_data_set_of_colmap_with_a_lens_is_right(tmp_path, capsys):

@@ -149,7 +149,11 @@ WIDE = axes.view_plane(50, 50, 83, 44, (160, 90))
     [
         ([camera("a", None)], None, "no camera of FILE has a lens that distorts"),
         ([camera("a", None)], "a", "the camera a of FILE has no lens"),
-        ([camera("a", LENSES["OPENCV"][0]), camera("b", BEHIND)], None, "have 2 lenses or sizes: name one, as in a or b"),
+        (
+            [camera("a", LENSES["OPENCV"][0]), camera("b", BEHIND)],
+            None,
+            "have 2 lenses or sizes, and none is called .* name one, as in a or b",
+        ),
         ([camera("a", LENSES["OPENCV"][0])], "c", "there is no camera 'c'"),
         ([camera("a", FOLDED)], None, "a of FILE can't be rendered: from (.*) the model folds there"),
         ([camera("a", BEHIND, WIDE)], None, "or looks 90° and more aside"),
@@ -162,9 +166,14 @@ WIDE = axes.view_plane(50, 50, 83, 44, (160, 90))
 )
 def test_what_no_pinhole_covers_is_a_sentence(read, name, sentence):
     with pytest.raises(InputError, match=sentence.replace("(.*)", ".*")):
-        of_cameras(read, "FILE", name)
+        of_cameras(read, "FILE", name).of("x")
 
 
-def test_cameras_of_one_lens_need_no_name():
-    bent = camera("a", LENSES["OPENCV"][0])
-    assert of_cameras([bent, replace(bent, name="b"), camera("c", None)], "FILE") == Calibration(PLANE, bent.lens)
+def test_cameras_of_one_lens_need_no_name_and_those_of_several_are_told_by_theirs():
+    bent, other = camera("a", LENSES["OPENCV"][0]), camera("d", LENSES["OPENCV_FISHEYE"][0])
+    alike = [bent, replace(bent, name="b"), camera("c", None)]
+    assert of_cameras(alike, "FILE").of("x", None) == Calibration(PLANE, bent.lens)
+    rig = of_cameras([*alike, other], "FILE")
+    assert [rig.of(None, name).lens for name in ("d", "b")] == [other.lens, bent.lens]
+    with pytest.raises(InputError, match="2 lenses or sizes, and none is called 'c' or 'frame_1': name one, as in a or d"):
+        rig.of("c", "frame_1")

@@ -190,6 +190,23 @@ def test_a_lens_that_is_written_for_nerfstudio_comes_back(tmp_path, model):
     assert json.loads(text)["camera_model"] == ("OPENCV_FISHEYE" if "FISHEYE" in model else "OPENCV")
 
 
+def test_a_rigs_camera_model_is_where_nerfstudio_and_instant_ngp_look_for_it(tmp_path):
+    """nerfstudio's is at the top, and a fisheye without is_fisheye is to instant-ngp a lens whose p1 is k3."""
+    fisheye, *_ = of_colmap("OPENCV_FISHEYE", tmp_path)
+    brown, *_ = of_colmap("OPENCV", tmp_path)
+    shorter = dataclasses.replace(fisheye.pinhole, distance=500.0)
+    rig = [fisheye, dataclasses.replace(fisheye, name="b", image="b.png", pinhole=shorter)]
+    text = cameras.write(rig, "transforms")
+    document = json.loads(text)
+    assert document["camera_model"] == "OPENCV_FISHEYE" and all(frame["is_fisheye"] for frame in document["frames"])
+    assert [(each.lens, each.pinhole) for each in cameras.read(text)] == [(each.lens, each.pinhole) for each in rig]
+    other = dataclasses.replace(brown, name="c", image="c.png")
+    with pytest.raises(InputError, match="one camera_model for all pictures, and 'b' has a fisheye's where 'c' has none"):
+        cameras.write([*rig, other], "transforms")
+    straight = dataclasses.replace(other, name="d", image="d.png", lens=None)
+    assert json.loads(cameras.write([other, straight], "transforms"))["camera_model"] == "OPENCV"
+
+
 @pytest.mark.parametrize("form", ["transforms", "colmap"])
 def test_a_lens_that_a_format_has_no_model_of_is_refused(tmp_path, form):
     camera, *_ = of_colmap("EUCM", tmp_path)

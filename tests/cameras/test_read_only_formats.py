@@ -1257,6 +1257,18 @@ def test_scannets_folder_has_its_intrinsics_and_pictures(tmp_path):
     the_same(cameras.read(tmp_path / "pose" / "2.txt", options=Options(size=(known.width, known.height))), known)
 
 
+def test_a_scan_of_3rscan_has_its_intrinsics_and_size_in_its_info(tmp_path):
+    known = Known("shifted")
+    k = f"{known.f_x!r} 0 {known.c_x - 0.5!r} 0 0 {known.f_y!r} {known.c_y - 0.5!r} 0 0 0 1 0 0 0 0 1"
+    info = f"m_colorWidth = {known.width}\nm_colorHeight = {known.height}\nm_calibrationColorIntrinsic = {k} \n"
+    (tmp_path / "_info.txt").write_text(f"m_versionNumber = 4\nm_sensorName = a phone\n{info}m_frames.size = 1\n")
+    (tmp_path / "frame-000000.pose.txt").write_text(pose_text(known))
+    assert the_same(cameras.read(tmp_path), known).size_stated
+    (tmp_path / "_info.txt").write_text("m_colorWidth = 640\n")
+    with pytest.raises(InputError, match=r"K in .*_info\.txt is .*give a number"):
+        cameras.read(tmp_path)
+
+
 def test_seven_scenes_frames_go_to_the_world_and_a_pose_of_nobody_knows_is_asked_for(tmp_path):
     known = Known("plain")
     (tmp_path / "frame-000001.pose.txt").write_text(pose_text(known))

@@ -116,7 +116,7 @@ def test_each_wrong_word_is_one_sentence_and_nothing_is_written(tmp_path, capfd,
     ("words", "sentence"),
     [
         (["--distort", "shots.csv"], "shots.csv"),
-        (["--distort", "lens", "a", "b"], "a b are more: name one"),
+        (["--distort", "lens", "a", "b"], "a b are more: name one or none"),
         (["--distort", "lens", "b"], "there is no camera 'b'"),
         (["--distort", "lens", "--size", "64x36"], "--size is 64 × 36 and the camera of --distort has 320 × 180 pixels"),
         (["--distort", "folded"], "the model folds there"),

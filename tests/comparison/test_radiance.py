@@ -110,13 +110,30 @@ def test_the_mean_is_told_in_as_many_digits_as_its_error_has():
     def sentence(difference, error):
         return light_verdict._mean_text(light_verdict.LightRow("Combined", 1.0, 1.0 + difference, error, 2 * error, 0))
 
-    assert sentence(-2.5e-7, 4.4e-7).startswith("the mean differs by −0.000025 %, with an error of ± 0.000044 %, and ")
-    assert sentence(-2.5e-9, 4.4e-7).startswith(
-        "the mean is the same within ± 0.000044 %, and a difference of 0.000088 % would"
+    assert sentence(-2.5e-7, 4.4e-7).startswith("the mean differs by −0.000025 %, with a standard error of 0.000044 %; ")
+    assert sentence(-2.5e-9, 4.4e-7) == (
+        "the mean is the same within a standard error of 0.000044 %; a picture 0.000088 % brighter or darker throughout would "
+        "have been found in 99 of 100 cases"
     )
-    assert sentence(0.25, 0.3).startswith("the mean differs by +25 %, with an error of ± 30 %")
-    assert sentence(0.0, 0.0).startswith("the mean is the same within ± 0 %")
+    assert sentence(0.25, 0.3).startswith("the mean differs by +25 %, with a standard error of 30 %")
+    assert sentence(0.0, 0.0).startswith("the mean is the same within a standard error of 0 %")
     assert "−0.000 %" not in sentence(-1e-9, math.inf)
+
+
+def test_a_bias_below_the_error_of_the_mean_is_said_to_be_found_by_the_channel_that_tells_it():
+    """Blue has a hundredth of red's noise: where the mean of all is known to 0.4 %, blue is to 0.01 %."""
+    rng, noise = np.random.default_rng(8), np.array([0.5, 0.05, 0.005])
+
+    def side(factor=1.0):
+        colors = TRUTH * (1.0 + rng.normal(size=(HEIGHT, WIDTH, 3)) * noise)
+        combined = np.dstack([factor * colors, np.ones((HEIGHT, WIDTH))])
+        return picture(rng, SAMPLES, Combined=combined, Variance=(TRUTH * noise) ** 2)
+
+    comparison = radiance.compare(side(), [side() for _ in range(SEEDS)], PINHOLE)
+    visible = comparison.rows[0].visible
+    assert comparison.passed and visible < comparison.rows[0].ratio_error, "else there is nothing to explain"
+    assert "would have been found in 99 of 100 cases by its blue channel, which has the least noise" in comparison.sentence
+    assert not radiance.compare(side(), [side(1.0 + visible) for _ in range(SEEDS)], PINHOLE).passed
 
 
 def test_noise_explains_the_relative_error_of_the_right_picture(same):

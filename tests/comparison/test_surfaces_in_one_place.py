@@ -9,7 +9,7 @@ from viewcam_addon.comparison import tolerances
 from viewcam_addon.comparison.geometry import compare
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.render import Tracer
+from viewcam_addon.tracer.render import ENLARGEMENT, SLOPES, Tracer
 from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
 
 # What moves each ray of the renderer on paper, in roundings: as in conftest.py.
@@ -88,7 +88,7 @@ def rendered(tracer, seed=0, off=0.0, within=1e-12):
     first, counts = np.unique(rays, return_index=True, return_counts=True)[1:]
     chosen = first + random.integers(0, counts)
     size = (CAMERA.height, CAMERA.width, -1)
-    names = [name for name in passes if name not in ("Magnitude", "Facing", "UV Slope", "Normal Slope")]
+    names = [name for name in passes if name not in ("Magnitude", "Facing", *SLOPES, ENLARGEMENT)]
     return Image({name: passes[name][chosen].reshape(size) for name in names})
 
 
@@ -243,3 +243,22 @@ def test_a_hair_is_beyond_tolerance_and_a_hundredth_of_it_within(tracer, referen
     seen = {name: values[hit] for name, values in reference.passes.items()}
     allowed = tolerances.ROUNDINGS[-1] * tolerances.depth_error(CAMERA, seen) * seen["Depth"][:, 0]
     assert HAIR / 100 < np.median(allowed) < HAIR / 2
+
+
+@pytest.mark.parametrize(("turned", "passes"), [(0.95, True), (2.0, False)])
+def test_stored_normals_are_off_by_more_between_corners_that_diverge(turned, passes):
+    """Corners lean outwards by 75°: amid them their sum is cos 75° = 0.26 long, and what each is off is divided by it."""
+
+    def of_a_square(off):
+        mesh = square(2.0)
+        out = np.sign(mesh.vertices[mesh.triangles][..., :2]) * np.sin(np.radians(75.0)) / np.sqrt(2.0)
+        normals = np.concatenate([out, np.full((2, 3, 1), np.cos(np.radians(75.0)))], axis=-1)
+        across = np.array([1.0, -1.0, 0.0]) - normals * (normals[..., :1] - normals[..., 1:2])
+        normals += off * across / np.linalg.norm(across, axis=-1, keepdims=True)
+        mesh = replace(mesh, corner_normals=normals.astype(np.float32))
+        return Tracer(Scene(CAMERA, {"square": mesh}, (Object("Square", "square", tilted(np.eye(4)), 1),)), 1)
+
+    tracer, test = of_a_square(0.0), Image(of_a_square(turned * tolerances.NORMAL_STORAGE).render())
+    comparison = compared(Image(tracer.render()), test, tracer)
+    assert comparison.passed == passes, "\n".join(comparison.lines())
+    assert comparison.passed or "Normal is" in comparison.sentence

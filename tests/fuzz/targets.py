@@ -340,7 +340,16 @@ def labels() -> Feed:
         whole = {path.name: path.read_bytes() for path in scratch.iterdir() if path.name.startswith(("a.", "b."))}
     whole["b.png"] = whole["b.instances.png"]  # a picture that stands beside its labels
     documents = [json.loads(whole[f"{name}.labels.json"]) for name in ("a", "b")]
-    ways = (("coco",), ("coco", "--amodal"), ("panoptic",), ("bop",), ("colmap",), ("colmap", "--points", 5), ("kitti",))
+    ways = (
+        ("coco",),
+        ("coco", "--amodal"),
+        ("panoptic",),
+        ("bop",),
+        ("colmap",),
+        ("colmap", "--points", 5),
+        ("kitti",),
+        ("yolo",),
+    )
 
     def feed(chance: random.Random, folder: Path) -> None:
         shots = folder / "shots"

@@ -60,14 +60,14 @@ def test_a_picture_of_which_not_all_is_modeled_makes_the_page_amber(tmp_path):
     counts = {"shots": 2, "done": 2, "failed": 0, "left": 0, "checked": 2, "checks_failed": 0, "not_all_modeled": 1}
     sheet.write(tmp_path / "sheet.html", [], counts)
     text = (tmp_path / "sheet.html").read_text()
-    assert 'class="same_but"' in text and "1 the same but for objects that are not modeled" in text
+    assert 'class="same_but"' in text and "1 with objects that are not modeled" in text
 
 
 def test_what_went_wrong_is_told_by_name(tmp_path, painting):
     broken = {"shot_001": InputError("the lamp <Key & Fill> is broken: mend it")}
     painting.paint(tmp_path, 4, painter=painting.Painter(broken=broken, unlike=["shot_002"]), check=True)
     actual = page(tmp_path)
-    assert "3 are there, 1 failed, 1 not what the reference tracer sees." in actual.text
+    assert "3 are there, 1 failed, 1 failed the check." in actual.text
     assert "the lamp <Key & Fill> is broken: mend it" in actual.text and "the left half is < the right half" in actual.text
     assert "Only what went wrong" in actual.text and 'class="different"' in (tmp_path / "contact-sheet.html").read_text()
 
@@ -141,6 +141,8 @@ def test_each_picture_has_its_verdict_or_says_that_it_was_not_checked():
     assert "identical to 0.0003 px" in text_of(passed) and "not checked" not in text_of(passed)
     assert "identical" in text_of({**passed, "figures": {"position": {}}})
     assert "differs Another picture." in text_of({"passed": False, "verdict": "Another picture."})
+    nothing = "Nothing to compare: no pixel of either picture shows an object."
+    assert f"nothing to compare {nothing}" in text_of({"passed": False, "verdict": nothing})
     but = {**passed, "answer": "same_but", "not_modeled": {"count": 2, "names": ["Hair", "Fog"], "share": 0.25}}
     assert "identical to 0.0003 px, but for 2 objects that are not modeled" in text_of(but)
     assert "class=but" in sheet.picture(Result("a", {**record, "check": but}))

@@ -13,6 +13,7 @@ from viewcam_addon import image
 from viewcam_addon.cli import main
 from viewcam_addon.errors import InputError
 from viewcam_addon.labels import KINDS, PASSES, coco, files, masks
+from viewcam_addon.labels.scene_labels import label
 from viewcam_addon.png import encoded
 from viewcam_addon.tracer.scene import scene_file
 
@@ -189,7 +190,7 @@ def test_pycocotools_loads_it_and_finds_every_mask(pictures, tmp_path, kind):
         for each in annotations:
             mask, expected = dataset.annToMask(each), encoded[each["instance_id"]]
             assert mask.sum() == each["area"] == expected[kind]["area"] and each["bbox"] == expected[kind]["bbox"]
-            assert dataset.loadCats(each["category_id"])[0]["name"] == coco.category(expected["name"])
+            assert dataset.loadCats(each["category_id"])[0]["name"] == coco.category(expected)
             if kind == "visible":
                 np.testing.assert_array_equal(mask, labels.image["Instance"][::-1, :, 0] == each["instance_id"])
     coco_masks = pytest.importorskip("pycocotools.mask")
@@ -204,6 +205,38 @@ def test_pycocotools_loads_it_and_finds_every_mask(pictures, tmp_path, kind):
     assert [each["visible"] for each in hidden] == [None], "the test wants an object that is hidden as a whole"
     ids = dataset.getAnnIds()
     assert sorted(ids) == list(range(1, len(ids) + 1))
+
+
+def test_categories_and_keypoints_are_those_of_pycocotools_and_yolo(tmp_path):
+    """A ball's center is in the ball, its far side is as well, and what is behind it is hidden."""
+    joints = {"middle": [0.0, 0, 0], "behind": [0.0, 4, 0], "aside": [0.0, -60, 9]}
+    annotations = {"Ball": {"category": "person", "keypoints": joints}, "Cube": {"category": "person"}}
+    labels = label(room(), ("masks",), annotations=annotations)
+    path = tmp_path / "shots" / "a.exr"
+    path.parent.mkdir()
+    files.write(path, labels)
+    path.with_suffix(".png").write_bytes(encoded(np.zeros((48, 64, 3), np.uint8)))
+    column, row, _ = CAMERA.project(np.array([[0.0, 0, 0.7], [0, 4, 0.7]]))  # the ball's matrix lifts it by 0.7
+    loader = pytest.importorskip("pycocotools.coco").COCO
+    assert run(path.parent, tmp_path / "all.json") == 0
+    dataset = loader(tmp_path / "all.json")
+    categories = {each["name"]: each for each in dataset.loadCats(dataset.getCatIds())}
+    assert [*categories] == ["Floor", "person"] and categories["person"]["keypoints"] == [*joints]
+    people = dataset.loadAnns(dataset.getAnnIds(catIds=[categories["person"]["id"]]))
+    (ball,) = (each for each in people if each["num_keypoints"])
+    expected = [column[0] - 0.5, 48 - row[0] - 0.5, 2, column[1] - 0.5, 48 - row[1] - 0.5, 1, 0, 0, 0]
+    np.testing.assert_allclose(ball["keypoints"], expected, atol=1e-9)
+    assert len(people) == 3 and "keypoints" not in dataset.loadAnns(dataset.getAnnIds(catIds=[1]))[0]
+    assert run(path.parent, tmp_path / "yolo", "--to", "yolo") == 0
+    lines = (tmp_path / "yolo" / "labels" / "a.txt").read_text().splitlines()
+    assert (tmp_path / "yolo" / "images" / "a.png").read_bytes() == path.with_suffix(".png").read_bytes()
+    numbers = np.array([[*map(float, line.split())] for line in lines])
+    assert sorted(numbers[:, 0]) == [0, 1, 1, 1] and numbers.shape[1] == 5 + 3 * 3
+    of_ball = numbers[[line[7] == 2 for line in numbers]][0]
+    x, y, width, height = ball["bbox"]
+    np.testing.assert_allclose(of_ball[1:5] * [64, 48, 64, 48], [x + width / 2, y + height / 2, width, height], rtol=1e-8)
+    np.testing.assert_allclose(of_ball[5:11:3] * 64, column, rtol=1e-8)
+    assert "kpt_shape: [3, 3]" in (tmp_path / "yolo" / "data.yaml").read_text()
 
 
 @given(st.lists(st.integers(1, 70_000), min_size=1, max_size=12), st.booleans())

@@ -17,6 +17,7 @@ from viewcam_addon.tracer.scene import Mesh, Object, Scene
 
 from .conftest import CAMERA, room
 
+OpenEXR = pytest.importorskip("OpenEXR")
 cv2 = pytest.importorskip("cv2")
 
 WIDTH, HEIGHT = 64, 48
@@ -137,7 +138,9 @@ def test_label_files_say_the_lens_and_bop_which_has_none_refuses_it(tmp_path):
     files.write(tmp_path / "shot.exr", labels)
     document = files.read(tmp_path / "shot.labels.json")
     assert files.lens(document) == BROWN and Pinhole(**document["camera"]) == CAMERA
+    header = OpenEXR.File(str(tmp_path / "shot.labels.exr"), header_only=True).parts[0].header
     assert image.read(tmp_path / "shot.labels.exr").size == (WIDTH, HEIGHT)
+    assert "worldToCamera" in header and not {"worldToNDC", "virtualPinhole"} & {*header}, "it is no pinhole's picture"
     with pytest.raises(InputError, match="lens distortion"):
         bop.write(tmp_path, tmp_path / "bop")
 

@@ -173,4 +173,4 @@ def steps():
         print(f"done: {part.__name__}", flush=True)
 
 
-start(steps)
+start(steps, interval=0.02)

@@ -256,4 +256,4 @@ def steps():
     yield from {"render": render, "cancel": cancel, "view": view, "swipe": swipe}[PART]()
 
 
-start(steps)
+start(steps, interval=0.05)

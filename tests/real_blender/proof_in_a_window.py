@@ -296,4 +296,4 @@ def steps():
         yield
 
 
-start(steps)
+start(steps, interval=0.05)

@@ -128,8 +128,8 @@ def test_frames_of_a_batch_are_those_of_f(real_blender, tmp_path, engine):
     check(real_blender.run("-b", blend, "-o", tmp_path / "f_###", "-f", "{},{}".format(*frames)))
     shots = tmp_path / "shots.csv"
     # Backwards and once more: what is kept from one frame is in the way of another, if it is.
-    rows = [f"{place}_{frame:03},{frame}" for place, frame in enumerate((*frames, frames[0]))]
-    shots.write_text("\n".join(["name,frame", *rows]))
+    rows = [f"{place}_{frame:03},Virtual Pinhole,{frame}" for place, frame in enumerate((*frames, frames[0]))]
+    shots.write_text("\n".join(["name,camera,frame", *rows]))
     check(real_blender.run("-b", blend, "--command", "viewcam", "batch", shots, "--out", tmp_path / "batch"))
     for place, frame in enumerate((*frames, frames[0])):
         by_f, other = channels(tmp_path / f"f_{frame:03}.exr"), channels(tmp_path / "batch" / f"{place}_{frame:03}.exr")

@@ -122,23 +122,38 @@ LIT_BY = {
 }
 
 
+RED, BLUE = Color((0.8, 0.1, 0.1)), Color((0.1, 0.3, 0.9))
+OUTWARDS = node("geometry", output="normal")  # as a number below 0 on one side, which makes mirrors of facets
+WIDE = {
+    "matte": node("diffuse", color=RED),
+    "rough": node("diffuse", color=BLUE, roughness=0.7),
+    "plastic": node("principled", base_color=RED, normal=node("bump", height=node("noise"), distance=0.1)),
+    "painted": node(
+        "principled", base_color=OUTWARDS, metallic=0.4, roughness=OUTWARDS, specular_ior_level=0.8, diffuse_roughness=0.3
+    ),
+    "brushed": node(
+        "mix",
+        factor=0.3,
+        first=node("metallic", roughness=0.3),
+        second=node("glossy", color=BLUE, distribution="multiscatter_ggx"),
+    ),
+}
+
+
 @pytest.mark.parametrize("sky", [0.0, 0.3])
 @pytest.mark.parametrize("lamps", LIT_BY.values(), ids=LIT_BY)
 def test_what_goes_in_vectors_has_the_bits_of_what_goes_path_by_path(random_scene, lamps, sky):
-    """A second closure that is black adds nothing, but with it a surface is no longer taken for a matte one."""
-    scene = random_scene(SEED, 40, 33)
-    red, blue = Color((0.8, 0.1, 0.1)), Color((0.1, 0.3, 0.9))
-    matte = {"red": sum_of(diffuse=red), "blue": sum_of(diffuse=blue)}
-    objects = tuple(replace(placed, materials=("red", "blue")[i % 2 :][:1]) for i, placed in enumerate(scene.objects))
-    scene = replace(scene, objects=objects, materials=matte, lamps=tuple(lamps), world=World((sky,) * 3), bounces=Bounces(6, 5))
-    black = node("diffuse", color=Color((0.0, 0.0, 0.0)))
-    one_by_one = {
-        name: Material(surface=node("add", first=node("diffuse", color=color), second=black))
-        for name, color in (("red", red), ("blue", blue))
-    }
+    """A second closure that is black and transparent adds nothing, but with it no paths at a surface go together."""
+    scene = random_scene(SEED, 24, 20)
+    objects = tuple(replace(placed, materials=(name,)) for placed, name in zip(scene.objects, WIDE, strict=True))
+    lit = {"lamps": tuple(lamps), "world": World((sky,) * 3), "bounces": Bounces(6, 5, 4)}
+    black = node("transparent", color=Color((0.0, 0.0, 0.0)))
+    wide = {name: Material(surface=shader) for name, shader in WIDE.items()}
+    one_by_one = {name: Material(surface=node("add", first=shader, second=black)) for name, shader in WIDE.items()}
     for level, samples, error in (("direct", 3, None), ("path", 8, None), ("path", 32, 0.05)):
         in_vectors, in_turn = (
-            render(replace(scene, materials=materials), level, samples, error=error) for materials in (matte, one_by_one)
+            render(replace(scene, objects=objects, materials=materials, **lit), level, samples, error=error)
+            for materials in (wide, one_by_one)
         )
         assert in_vectors["Combined"][..., :3].any() or not (lamps or sky)
         for name, values in in_vectors.items():

@@ -15,6 +15,7 @@ and one factor of all focal lengths), and judging poses by their looks (do camer
 most and a false alarm for the rest.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -33,8 +34,18 @@ _FEWEST = 40  # observations
 _LEFT_OUT = 2.0  # pixels: less may be anything's
 _ROUNDS = 10  # of weighing outliers
 _LENS_FITS = 1.0  # pixels: a lens that was left out explains the evidence to this, or is none
-_FITTED = "focal_factor"
+_FITTED_LENSES = (  # projection, terms and whether the focal length is fitted, too: the simpler ones first
+    ("pinhole", 2, False),
+    ("pinhole", 5, False),
+    ("equidistant", 5, False),
+    ("pinhole", 5, True),
+    ("equidistant", 5, True),
+)
+_BETTER = 0.95  # of a simpler lens's error: what a further term has to bring
+_FITTED_TO = 20_000  # observations, about: more tell no more of a few numbers
 _FACTORS, _STEPS, _FINEST = (1 / 8, 8.0), 25, 1e-5  # of depth maps: what is tried first, and how fine it is told
+_K1 = (-0.4, 0.4, 21, 1e-3)  # of depth maps: from where to where, how many are tried first, and how finely it is told
+_EXPLAINED = 1e-4  # of the depth: steps of millimeters at ten meters; what fits so needs no lens
 _COUNTED = 2000  # at most: a systematic error repeats in each, so more of them add no certainty
 _FARTHEST = 1e6  # times the usual error: what is behind the camera counts as that
 _Y_TO_Z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -269,13 +280,15 @@ _UNITS |= {"0.3048 (feet)": 0.3048, "0.0254 (inches)": 0.0254, "1/0.3048 (feet)"
 @dataclass(frozen=True)
 class Mistake:
     """kind : a name for programs. sentence : what was done. undone : the cameras without it. of_depth : whether only depth maps
-    can show it. of_world : whether all cameras are turned together, which depth maps can't show: each sees what it saw."""
+    can show it. of_world : whether all cameras are turned together, which depth maps can't show: each sees what it saw.
+    is_fitted : whether it has numbers that are fitted to the evidence: it explains whatever a known one does, too."""
 
     kind: str
     sentence: str
     undone: Callable[[Views], Views]
     of_depth: bool = False
     of_world: bool = False
+    is_fitted: bool = False
 
 
 def _mistakes() -> list[Mistake]:
@@ -489,9 +502,15 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     tried.append(_of_focal_factor(views, evidence))
     if not of_depth and np.abs(views.center - views.size / 2).max() <= 0.5:
         tried += _left_out(views, evidence)
-    if isinstance(evidence, Tracks) and not any(views.lenses):
-        tried += _lens_left_out(views, evidence)
     errors = [evidence.errors(mistake.undone(views)) for mistake in tried]
+    known = (as_is, *(each for each, mistake in zip(errors, tried, strict=True) if not mistake.is_fitted))
+    if isinstance(evidence, Depths):
+        lenses = _lenses_of_depths(views, evidence) if min(_usual(each, evidence) for each in known) > _EXPLAINED else []
+    else:  # what a lens moves aside is seen in the largest errors but for outliers
+        nearest = min(float(np.sort(each)[int(0.95 * (len(each) - 1))]) for each in known)
+        lenses = _lens_of_tracks(views, evidence) if nearest > _LEFT_OUT / 2 else []
+    tried += lenses
+    errors += [evidence.errors(mistake.undone(views)) for mistake in lenses]
     # The usual error is that of the best explanation, so that it does not hide in the worse ones.
     usual = max(evidence.floor, min(_usual(each, evidence) for each in (as_is, *errors)))
     costs = np.array([_cost(each, usual) for each in (as_is, *errors)])
@@ -508,7 +527,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
             over = [
                 (max(float(cost - costs[0]), 0.0), mistake.kind)
                 for mistake, cost, each in zip(tried, costs[1:], errors, strict=True)
-                if _differ(each, as_is, evidence) and mistake.kind != _FITTED
+                if _differ(each, as_is, evidence) and not mistake.is_fitted
             ]
             possible = tuple(dict.fromkeys(kind for sure, kind in over if sure < _SURE))
             if possible:
@@ -524,8 +543,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     mistake = tried[best - 1]
     tied = [tried[i - 1] for i in np.flatnonzero(costs - costs[best] < _TIED) if i and tried[i - 1] is not mistake]
     first = min([mistake, *tied], key=tried.index)
-    # A fitted factor explains whatever a known one does, and tells nothing beside it.
-    others = tuple(dict.fromkeys(each.kind for each in (mistake, *tied) if each.kind not in (first.kind, _FITTED)))
+    others = tuple(dict.fromkeys(each.kind for each in (mistake, *tied) if each.kind != first.kind and not each.is_fitted))
     sentence = f"{first.sentence} (undone, the evidence fits to {error:.2g} {evidence.unit} in place of {error_as_is:.3g})"
     if others:
         sentence += f"; the evidence can't tell it from: {', '.join(others)}"
@@ -547,7 +565,7 @@ def _of_focal_factor(views: Views, evidence: "Tracks | Depths") -> Mistake:
     """The mistake of a focal length that is wrong by the factor that the evidence asks for."""
     factor = _factor_of_tracks(views, evidence) if isinstance(evidence, Tracks) else _factor_of_depths(views, evidence)
     off = f"{factor:.4g} times too short" if factor > 1 else f"{1 / factor:.4g} times too long"
-    return Mistake(_FITTED, f"the focal length is {off}", lambda v: _scaled(v, factor))
+    return Mistake("focal_factor", f"the focal length is {off}", lambda v: _scaled(v, factor), is_fitted=True)
 
 
 def _factor_of_tracks(views: Views, evidence: Tracks) -> float:
@@ -563,12 +581,41 @@ def _factor_of_tracks(views: Views, evidence: Tracks) -> float:
 
 def _factor_of_depths(views: Views, evidence: Depths) -> float:
     """The factor with the least usual error: of some, then of those around the best, until it is told finely enough."""
-    logs = np.linspace(*np.log(_FACTORS), _STEPS)
-    while (step := logs[1] - logs[0]) > _FINEST:
-        usual = [_usual(evidence.errors(_scaled(views, factor)), evidence) for factor in np.exp(logs)]
-        best = logs[int(np.argmin(usual))]
-        logs = np.linspace(best - step, best + step, _STEPS // 3)
-    return float(np.exp(best))
+
+    def usual(log: float) -> float:
+        return _usual(evidence.errors(_scaled(views, math.exp(log))), evidence)
+
+    return math.exp(_least(usual, *np.log(_FACTORS), _STEPS, _FINEST))
+
+
+def _least(cost: Callable[[float], float], first: float, last: float, steps: int, finest: float) -> float:
+    """The value with the least cost: of some, then of those around the best, until it is told finely enough."""
+    values = np.linspace(first, last, steps)
+    while (step := values[1] - values[0]) > finest:
+        best = values[int(np.argmin([cost(value) for value in values.tolist()]))]
+        values = np.linspace(best - step, best + step, steps // 3)
+    return float(best)
+
+
+def _lenses_of_depths(views: Views, evidence: Depths) -> list[Mistake]:
+    """The mistakes of cameras whose lens was left out or is another one: of straight lines with the k1 that depth maps ask for,
+    or a fisheye; those that move the pictures."""
+
+    def of_lens(k1: float, projection: str = "pinhole") -> Lens:
+        return replace(opencv({"k1": k1}), projection=projection)
+
+    def usual(k1: float) -> float:
+        return _usual(evidence.errors(_with_lens_of(of_lens(k1), 1.0)(views)), evidence)
+
+    as_is = [lens or Lens(()) for lens in views.lenses or (None,)]
+    places = np.concatenate([np.stack([columns, rows], axis=-1) for columns, rows, _ in evidence.samples])
+    points = (places - views.center[0]) / views.focal[0]
+    result = []
+    for lens in (of_lens(_least(usual, *_K1)), of_lens(0.0, "equidistant")):
+        moved = np.hypot(*((lens.distort(points) - as_is[0].distort(points)) * views.focal[0]).T)
+        if np.nanpercentile(moved, 95) > _LEFT_OUT:
+            result.append(_of_lens(views, lens, 1.0))
+    return result
 
 
 def _left_out(views: Views, evidence: Tracks) -> list[Mistake]:
@@ -592,31 +639,79 @@ def _cost(errors: Array, usual: float) -> float:
     return float(np.log1p(bounded * bounded).mean()) * min(len(errors), _COUNTED)
 
 
-def _lens_left_out(views: Views, evidence: Tracks) -> list[Mistake]:
-    """The mistake of cameras without a lens: the radial one that the evidence asks for, if it explains all of it.
-
-    k1 and k2 by least squares, each observation weighted by Cauchy's cost, so that outliers count little.
-    """
-    places, depth = views.project(evidence.which, evidence.points)
-    center, focal = (each[(evidence.which + views.shifted) % len(views.eye)] for each in (views.center, views.focal))
+def _lens_of_tracks(views: Views, evidence: Tracks) -> list[Mistake]:
+    """The mistake of cameras whose lens was left out or is another one: that which the evidence asks for, if it explains it."""
+    straight = replace(views, lenses=())
+    places, depth = straight.project(evidence.which, evidence.points)
+    there = np.flatnonzero((depth > 0) & np.isfinite(places).all(axis=-1))
+    there = there[:: max(1, len(there) // _FITTED_TO)]
+    which = evidence.which[there]
+    center, focal = (each[(which + views.shifted) % len(views.eye)] for each in (views.center, views.focal))
+    points, taken = (places[there] - center) / focal, (evidence.places[there] - center) / focal
+    best: tuple[Lens, float, float] | None = None
+    for projection, terms, of_focal in _FITTED_LENSES:
+        fit = _fitted(points, taken, focal, projection, terms, of_focal, evidence.floor)
+        if fit is not None and (best is None or fit[2] < _BETTER * best[2]):
+            best = fit
+    if best is None:
+        return []
+    lens, factor, _ = best
     with np.errstate(all="ignore"):
-        usable = (depth > 0) & (np.hypot(*(places - evidence.places).T) < views.size.max() / 4)
-    expected = ((places - center) / focal)[usable]
-    if len(expected) < _FEWEST:
+        as_is = points * factor
+        if any(views.lenses):
+            as_is = (views.project(evidence.which[there], evidence.points[there])[0] - center) / focal
+        moved = np.hypot(*((lens.distort(points) * factor - as_is) * focal).T)
+    moved = moved[np.isfinite(moved)]
+    if not len(moved) or np.percentile(moved, 95) < _LEFT_OUT:
         return []
-    off = (evidence.places - places)[usable]
-    r = (expected * expected).sum(axis=-1)
-    slopes = np.stack([(r**power)[:, None] * expected * focal[usable] for power in (1, 2)], axis=-1)
-    k = np.zeros(2)
+    return [_of_lens(views, lens, factor)]
+
+
+def _of_lens(views: Views, lens: Lens, factor: float) -> Mistake:
+    """The mistake of cameras that should have a lens, and focal lengths so many times as long."""
+    right = ", ".join(f"{name} = {value:.4g}" for name, value in lens.terms) + " is right"
+    right = f"a fisheye with {right}" if lens.projection != "pinhole" else right
+    right += f", with focal lengths {factor:.4g} times as long" if factor != 1 else ""
+    if any(views.lenses):
+        kind, sentence = "lens_model", f"the lens is of another model or another camera: {right}"
+    else:
+        kind, sentence = "lens_left_out", f"lens distortion was left out: {right}, or the pictures were undistorted twice"
+    return Mistake(kind, sentence, _with_lens_of(lens, factor), is_fitted=True)
+
+
+def _with_lens_of(lens: Lens, factor: float) -> Callable[[Views], Views]:
+    return lambda views: replace(_scaled(views, factor), lenses=(lens,) * len(views.eye))
+
+
+def _fitted(
+    points: Array, taken: Array, focal: Array, projection: str, count: int, of_focal: bool, floor: float
+) -> tuple[Lens, float, float] | None:
+    """The lens that takes a pinhole's points to places in pictures, the factor of the focal length and the usual error in
+    pixels; None where there is none that does.
+
+    points, taken : (m, 2), in the view plane at distance 1. count : of its terms k1, k2, k3, p1, p2. By least squares, each
+    observation weighted by Cauchy's cost, so that outliers count little.
+    """
+    base = Lens((), projection).distort(points)
+    off = taken - base
+    # What is farther from where the projection alone shows it than lenses bend is an outlier, or beyond the picture.
+    usable = np.hypot(*off.T) < np.maximum(0.5 * np.hypot(*base.T), 0.1)
+    if usable.sum() < _FEWEST:
+        return None
+    base, off, focal = base[usable], off[usable], focal[usable]
+    x, y = base.T
+    r = x * x + y * y
+    columns = [(r**power)[:, None] * base for power in (1, 2, 3)]
+    columns += [np.stack([2 * x * y, r + 2 * y * y], axis=-1), np.stack([r + 2 * x * x, 2 * x * y], axis=-1)]
+    slopes = np.stack(columns[:count] + [base] * of_focal, axis=-1)
+    terms = np.zeros(slopes.shape[-1])
     for _ in range(_ROUNDS):
-        errors = np.hypot(*(off - slopes @ k).T)
-        weight = 1 / np.hypot(1, errors / max(float(np.median(errors)), evidence.floor))
-        k = np.linalg.lstsq((weight[:, None, None] * slopes).reshape(-1, 2), (weight[:, None] * off).ravel(), rcond=None)[0]
-    moved = np.hypot(*(slopes @ k).T)
-    if np.percentile(moved, 95) < _LEFT_OUT or np.median(np.hypot(*(off - slopes @ k).T)) > _LENS_FITS:
-        return []
-    lens = opencv(dict(zip(("k1", "k2"), k.tolist(), strict=True)))
-    sentence = (
-        f"lens distortion was left out: k1 = {k[0]:.4g}, k2 = {k[1]:.4g} is right, or the pictures were undistorted twice"
-    )
-    return [Mistake("lens_left_out", sentence, lambda v: replace(v, lenses=(lens,) * len(v.eye)))]
+        errors = np.hypot(*((off - slopes @ terms) * focal).T)
+        weight = focal / np.hypot(1, errors / max(float(np.median(errors)), floor))[:, None]
+        terms = np.linalg.lstsq((weight[..., None] * slopes).reshape(-1, len(terms)), (weight * off).ravel(), rcond=None)[0]
+    error = float(np.median(np.hypot(*((off - slopes @ terms) * focal).T)))
+    if error > _LENS_FITS:
+        return None
+    factor = 1 + float(terms[-1]) * of_focal
+    values = zip(("k1", "k2", "k3", "p1", "p2"), (terms[:count] / factor).tolist(), strict=False)
+    return replace(opencv(dict(values)), projection=projection), factor, max(error, floor)

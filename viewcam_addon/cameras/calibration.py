@@ -17,6 +17,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from .. import checks
 from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
 from .camera import Camera, choose
@@ -115,35 +116,57 @@ class Calibration:
         return result
 
 
-def of_cameras(read: Sequence[Camera], source: str, name: str | None = None) -> Calibration:
-    """The calibration that cameras of one file share. source : the file, as a sentence names it. name : of one of them.
+@dataclass(frozen=True)
+class Rig:
+    """The calibrated cameras of a file. source : the file, as a sentence names it. by_name : those that have a lens."""
+
+    source: str
+    by_name: Mapping[str, Calibration]
+
+    @cached_property
+    def _firsts(self) -> dict[Calibration, str]:
+        """The first camera of each calibration."""
+        return {calibration: name for name, calibration in [*self.by_name.items()][::-1]}
+
+    def of(self, *names: str | None) -> Calibration:
+        """The calibration of the camera that has the first of the names that one has, or else that all cameras share.
+
+        Raises
+        ------
+        InputError
+            if no camera is called so and they share none, or if no pinhole's picture covers it.
+        """
+        called = next((name for name in names if name in self.by_name), None)
+        if called is None and len(self._firsts) > 1:
+            *_, second, first = self._firsts.values()
+            raise InputError(
+                f"the cameras of {self.source} have {len(self._firsts)} lenses or sizes, and none is called "
+                f"{' or '.join(checks.quoted(name) for name in names if name) or 'as this one'}: name one, as in {first} or "
+                f"{second}, or call cameras as theirs"
+            )
+        called = called or next(iter(self.by_name))
+        try:
+            _ = self.by_name[called].cover  # refuses here, before anything is rendered
+        except InputError as error:
+            raise InputError(f"the camera {called} of {self.source} can't be rendered: {error}") from None
+        return self.by_name[called]
+
+
+def of_cameras(read: Sequence[Camera], source: str, name: str | None = None) -> Rig:
+    """The calibrations of one file's cameras. source : the file, as a sentence names it. name : of the only one wanted.
 
     Raises
     ------
     InputError
-        if there is none, or several and no name, or one that no pinhole's picture covers.
+        if no camera has a lens, or the named one has none.
     """
-    bent = {camera.name: Calibration(camera.pinhole.plane, camera.lens) for camera in read if camera.lens is not None}
-    if name is not None:
-        camera = choose([*read], name)
-        if camera.lens is None:
-            raise InputError(f"the camera {name} of {source} has no lens that distorts: name another")
-        result = Calibration(camera.pinhole.plane, camera.lens)
-    elif not bent:
+    chosen = [*read] if name is None else [choose([*read], name)]
+    bent = {camera.name: Calibration(camera.pinhole.plane, camera.lens) for camera in chosen if camera.lens is not None}
+    if not bent and name is not None:
+        raise InputError(f"the camera {name} of {source} has no lens that distorts: name another")
+    if not bent:
         raise InputError(f"no camera of {source} has a lens that distorts: give a file whose cameras have")
-    else:
-        result, *others = dict.fromkeys(bent.values())
-        if others:
-            firsts = {each: name for name, each in reversed(bent.items())}
-            raise InputError(
-                f"the cameras of {source} have {len(others) + 1} lenses or sizes: name one, as in {next(iter(bent))}"
-                f" or {firsts[others[0]]}"
-            )
-    try:
-        _ = result.cover  # refuses here, before anything is rendered
-    except InputError as error:
-        raise InputError(f"the camera {name or next(iter(bent))} of {source} can't be rendered: {error}") from None
-    return result
+    return Rig(source, bent)
 
 
 def _with_plane(pinhole: Pinhole, plane: ViewPlane) -> Pinhole:

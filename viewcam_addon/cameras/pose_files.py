@@ -1,6 +1,7 @@
 """Poses, 4 × 4 or 3 × 4 in a text file for each picture: 7-Scenes, 3DMatch, ScanNet, and whatever folder is alike.
 
     frame-000000.pose.txt            7-Scenes, 3DMatch, tsdf-fusion: with camera-intrinsics.txt in this folder or the one above
+    frame-000000.pose.txt            3RScan: with _info.txt in this folder
     pose/0.txt, color/0.jpg          ScanNet: with intrinsic/intrinsic_color.txt, or intrinsics_color.txt, in the one above
 
 These are from the camera, x right, y down, z into the view, to the world. Other files do not say which way they go, and ask for
@@ -27,7 +28,8 @@ TITLE = "pose files (ScanNet, 7-Scenes)"
 
 _FOLDERS = ("", "pose/", "poses/")
 _OF_FRAME = re.compile(r"frame-\d+\.pose")
-_INTRINSICS = ("intrinsic/intrinsic_color.txt", "intrinsics_color.txt", "camera-intrinsics.txt")
+_INTRINSICS = ("intrinsic/intrinsic_color.txt", "intrinsics_color.txt", "camera-intrinsics.txt", "_info.txt")
+_INFO = re.compile(r"^(m_\w+) = (.*)$", re.MULTILINE)
 _PICTURES = ("{}.color.jpg", "{}.color.png", "color/{}.jpg", "{}.jpg", "{}.png", "rgb/{}.png", "images/{}.jpg")
 _FARTHEST = 1e-2
 
@@ -100,11 +102,17 @@ def _intrinsics(file: Source) -> Mapping[str, Any]:
     for up in ((), ("..",)):
         for name in _INTRINSICS:
             if k_file := file.file(*up, *name.split("/")):
-                numbers = flat(f"K in {k_file.name}", k_file.text)
+                text, size = k_file.text, {}
+                if name == "_info.txt":
+                    info = dict(_INFO.findall(text))
+                    text = info.get("m_calibrationColorIntrinsic", "")
+                    stated = {key.lower(): info.get(f"m_color{key}", "").strip() for key in ("Width", "Height")}
+                    size = {key: int(value) for key, value in stated.items() if value.isdecimal() and len(value) < 10}
+                numbers = flat(f"K in {k_file.name}", text)
                 side = {9: 3, 16: 4}.get(len(numbers))
                 if side is None:
                     raise InputError(f"{k_file.name} has {len(numbers)} numbers: K has 3 × 3, or 4 × 4")
-                return {"k": np.array(numbers).reshape(side, side)[:3, :3].ravel().tolist()}
+                return {**size, "k": np.array(numbers).reshape(side, side)[:3, :3].ravel().tolist()}
     return {}
 
 

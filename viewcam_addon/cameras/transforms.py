@@ -93,14 +93,25 @@ def document(
     Raises
     ------
     InputError
-        if there is no camera, two have one picture or one is mirrored, or if the scale is not one that instant-ngp takes.
+        if there is no camera, two have one picture, one is mirrored or some but not all have a fisheye, or if the scale is not
+        one that instant-ngp takes.
     """
     cameras = naming.checked(cameras, FILE)
     if aabb_scale is not None and checks.whole("aabb_scale", aabb_scale) not in AABB_SCALES:
         raise InputError(f"aabb_scale is {aabb_scale}: give a power of two from 1 to {AABB_SCALES[-1]}")
     pictures = [_picture(camera.pinhole) | _said_of(camera) for camera in cameras]
+    models = {str(picture.get("camera_model")): camera.name for picture, camera in zip(pictures, cameras, strict=True)}
+    fisheye = models.pop(_FISHEYES[0], None)
+    if fisheye is not None and models:
+        raise InputError(
+            f"{FILE} has one camera_model for all pictures, and {checks.quoted(fisheye)} has a fisheye's where "
+            f"{checks.quoted(next(iter(models.values())))} has none: write each kind into a file of its own"
+        )
     shared = all(picture == pictures[0] for picture in pictures)
+    # At the top in any case: nerfstudio looks for it there alone.
+    model = next((picture["camera_model"] for picture in pictures if "camera_model" in picture), None)
     return {
+        **({} if model is None else {"camera_model": model}),
         **(pictures[0] if shared else {}),
         **({} if aabb_scale is None else {"aabb_scale": int(aabb_scale)}),
         **(more or {}),
@@ -129,14 +140,14 @@ def _said_of_world(cameras: Sequence[Camera]) -> dict[str, Any]:
 
 
 def _said_of(camera: Camera) -> dict[str, Any]:
-    """The camera's lens, as nerfstudio has it."""
+    """The camera's lens, as nerfstudio has it, and by which key instant-ngp knows a fisheye, whose k3 is else taken for p1."""
     lens = camera.lens
     if lens is None:
         return {}
     numbers = dict(zip(("k1", "k2", "k3", "k4"), (*lens.radial, *[0.0] * 4), strict=False))
     tangential = dict(zip(("p1", "p2"), lens.tangential, strict=True))
     if lens == distortion.fisheye(numbers):
-        return {"camera_model": "OPENCV_FISHEYE", **numbers}
+        return {"camera_model": _FISHEYES[0], "is_fisheye": True, **numbers}
     if lens == distortion.opencv(numbers | tangential | {"r8": numbers["k4"], "k4": 0.0}):
         return {"camera_model": "OPENCV", **numbers, **tangential}
     raise InputError(

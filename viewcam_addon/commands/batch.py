@@ -14,9 +14,10 @@ from .. import argument_types as types
 from .. import cameras
 from ..cameras import calibration as calibrations
 from ..cameras import distortion
-from ..cameras.calibration import Calibration
+from ..cameras.calibration import Rig
 from ..errors import InputError
 from ..jobs import lists, makers
+from ..jobs import names as shot_names
 from ..jobs.folder import Outputs
 from ..jobs.job import ENGINES, LEVELS, Job
 from ..jobs.plan import Plan
@@ -85,8 +86,9 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     group.add_argument("--seed", type=types.seed, metavar="N", help="another noise for another number (default: the scene's)")
 
     words = (
-        "a calibrated camera, by any file that viewcam camera reads, and of several its name: pictures and labels are as it "
-        "takes them, by its lens, focal length and size; a shot says where from"
+        "a calibrated camera, by any file that viewcam camera reads: pictures and labels are as it takes them, by its lens, "
+        "focal length and size; a shot says where from. Of several it is the one so named, or that of the shot's own name or "
+        "its camera's"
     )
     group.add_argument("--distort", nargs="+", metavar=("FILE", "NAME"), help=words)
 
@@ -129,9 +131,9 @@ def run(options: argparse.Namespace) -> Result:
         workers=options.workers,
         scheduler=options.scheduler,
     )
-    calibration = _calibration(options) if options.distort else None
-    complete = functools.partial(_completed, options=options, calibration=calibration)
-    shots_of = functools.partial(_shots, options, calibration)
+    rig = _rig(options) if options.distort else None
+    complete = functools.partial(_completed, options=options, rig=rig)
+    shots_of = functools.partial(_shots, options, rig)
     summary = carry_out(plan, shots_of, options.events, complete, str(options.shots or ""))
     return summary.exit_status, summary.to_json()
 
@@ -165,34 +167,38 @@ def _outputs(options: argparse.Namespace) -> Outputs:
     return Outputs(not options.labels_only, options.check, kinds, options.depth_steps)
 
 
-def _calibration(options: argparse.Namespace) -> Calibration:
-    """The calibrated camera of --distort."""
+def _rig(options: argparse.Namespace) -> Rig:
+    """The calibrated cameras of --distort, by their names and those that shots of them have."""
     file, *names = options.distort
     if len(names) > 1:
-        raise InputError(f"--distort is of one camera, a file and its name, and {' '.join(names)} are more: name one")
+        raise InputError(f"--distort is of a file and one camera's name, and {' '.join(names)} are more: name one or none")
     how = dataclasses.replace(options_of(options), without_distortion=False)
     result = calibrations.of_cameras(cameras.read(Path(file), options=how), file, *names)
-    size = result.plane.width, result.plane.height
-    if options.size not in (None, size):
-        sizes = "--size is {} × {} and the camera of --distort has {} × {} pixels".format(*options.size, *size)
-        raise InputError(f"{sizes}: leave --size out, or give the camera of such pictures")
-    return result
+    for plane in {calibration.plane for calibration in result.by_name.values()} if options.size else ():
+        if options.size != (plane.width, plane.height):
+            sizes = (
+                f"{options.size[0]} × {options.size[1]} and the camera of --distort has {plane.width} × {plane.height} pixels"
+            )
+            raise InputError(f"--size is {sizes}: leave --size out, or give the camera of such pictures")
+    fit = {shot_names.made_fit(name): calibration for name, calibration in result.by_name.items()}
+    return dataclasses.replace(result, by_name=fit | dict(result.by_name))
 
 
-def _shots(options: argparse.Namespace, calibration: Calibration | None, renderer: Any) -> Sequence[Job]:
+def _shots(options: argparse.Namespace, rig: Rig | None, renderer: Any) -> Sequence[Job]:
     if options.shots is not None:
         if lists.is_list(options.shots):
             return lists.read(options.shots, renderer.cameras)
         read = cameras.read(options.shots, options=options_of(options))
         for note in dict.fromkeys(note for camera in read for note in camera.notes):
             options.events.tell("note", command=options.command, text=note)
-        for camera in () if calibration else read:
+        for camera in () if rig else read:
             distortion.refuse(camera.lens, camera.pinhole.plane, camera.name, "a render")
         return makers.from_pinholes((camera.name, camera.pinhole) for camera in read)
     if options.cameras is not None:
         return makers.from_cameras(options.cameras, renderer.cameras, spaces=not options.transforms)
     if options.orbit is not None:
-        size = (calibration.plane.width, calibration.plane.height) if calibration else options.size
+        plane = rig and rig.of(options.camera).plane
+        size = (plane.width, plane.height) if plane else options.size
         return makers.orbit(renderer.pinhole(options.camera, size, options.frame), options.orbit)
     camera = renderer.scene_camera if options.camera is None else options.camera
     if camera not in renderer.cameras:
@@ -201,15 +207,16 @@ def _shots(options: argparse.Namespace, calibration: Calibration | None, rendere
     return makers.frames(options.frames, options.camera)
 
 
-def _completed(job: Job, options: argparse.Namespace, calibration: Calibration | None) -> Job:
-    """The job, with what the command line says where it says nothing itself. calibration : of --distort."""
+def _completed(job: Job, options: argparse.Namespace, rig: Rig | None) -> Job:
+    """The job, with what the command line says where it says nothing itself. rig : of --distort."""
     width, height = options.size or (None, None)
     stated = {field: getattr(options, field) for field in ("frame", "engine", "samples", "level", "seed", "threads")}
     stated |= {"width": width, "height": height}
     missing = {field: value for field, value in stated.items() if getattr(job, field) is None}
     job = dataclasses.replace(job, trust=options.trust, **missing)
-    if calibration is None:
+    if rig is None:
         return job
+    calibration = rig.of(job.camera, job.name)
     size = calibration.plane.width, calibration.plane.height
     if job.size not in (None, size):
         sizes = "{} × {} pixels and the camera of --distort {} × {}".format(*job.size, *size)

@@ -7,7 +7,7 @@ import json
 from .. import argument_types as types
 from ..errors import InputError
 from ..files import written_whole
-from ..labels import bop, coco, colmap, kitti
+from ..labels import bop, coco, colmap, kitti, yolo
 from ..terminal import say
 from . import Result
 
@@ -16,8 +16,10 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     added.set_defaults(writes=("output",))
     added.add_argument("folder", metavar="FOLDER", type=types.path, help="where viewcam render --labels has written")
     added.add_argument("output", metavar="OUT", type=types.path, help="a file of COCO's; of another format a new folder")
-    words = "COCO's instances (default) or panoptic format; BOP's scene; COLMAP's points and tracks; KITTI's depth and flow"
-    added.add_argument("--to", choices=["coco", "panoptic", "colmap", "bop", "kitti"], default="coco", help=words)
+    words = (
+        "COCO's instances (default) or panoptic; YOLO's boxes; BOP's scene; COLMAP's points and tracks; KITTI's depth and flow"
+    )
+    added.add_argument("--to", choices=["coco", "panoptic", "yolo", "colmap", "bop", "kitti"], default="coco", help=words)
     added.add_argument("--amodal", action="store_true", help="whole objects, in place of what is visible of them")
     words = "for COLMAP: points that are sampled in each picture (default: 1000)"
     added.add_argument("--overwrite", action="store_true", help="replace a folder of the same format, and nothing else")
@@ -34,8 +36,8 @@ def run(options: argparse.Namespace) -> Result:
     elif options.to == "bop":
         progress = functools.partial(options.events.tell, "progress", work="written")
         counts = bop.write(options.folder, options.output, lambda share: progress(share=share), options.overwrite)
-    elif options.to == "kitti":
-        counts = kitti.write(options.folder, options.output, options.overwrite)
+    elif options.to in ("kitti", "yolo"):
+        counts = (kitti if options.to == "kitti" else yolo).write(options.folder, options.output, options.overwrite)
     else:
         document = coco.panoptic(options.folder) if options.to == "panoptic" else coco.instances(options.folder, options.amodal)
         with written_whole(options.output) as temporary:

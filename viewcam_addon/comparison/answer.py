@@ -18,6 +18,9 @@ from ..errors import several
 SAME, SAME_BUT, DIFFERENT = "same", "same_but", "different"
 ANSWERS = (SAME, SAME_BUT, DIFFERENT)
 
+NOTHING = "Nothing to compare"
+"""The headline where there is no answer: the two are DIFFERENT then, as far as whoever asked whether they are the same goes."""
+
 COLORS = {SAME: "green", SAME_BUT: "amber", DIFFERENT: "red"}
 
 

@@ -139,6 +139,15 @@ def run(sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: float
     return tuple(_hypothesis_test(sides, *answer) for answer in _statistics(sides, allowed, freedom, share))
 
 
+def least_findable(tests: Sequence[HypothesisTest]) -> float:
+    """The least share that all light may be off and be found with the probability POWER; inf where nothing would be.
+
+    The whole picture tells it, or where its light is that of too few pixels for their squares to tell, the one that tells most.
+    """
+    whole = tests[SIZES.index(WHOLE)].typical_findable
+    return whole if math.isfinite(whole) else min(float(test.findable.min()) for test in tests)
+
+
 def worst_channel(errors: Array) -> Array:
     """(rows, columns): of each tile's channels the one that differs most, with its sign."""
     return np.take_along_axis(errors, np.abs(errors).argmax(axis=-1)[..., None], axis=-1)[..., 0]

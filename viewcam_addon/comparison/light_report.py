@@ -13,6 +13,7 @@ from . import charts, difference, page, pictures
 from .hypothesis_tests import CONTOURS, WHOLE, HypothesisTest
 from .light_verdict import change_text, edge_text, place_text, samples_text
 from .radiance import LightRow, RadianceComparison
+from .statistics import plain
 from .tolerances import ROUNDINGS
 
 # Under the loupe: one place for each test that failed, the first of them.
@@ -54,6 +55,7 @@ def write_report(
         "makers": (_maker(reference), _maker(tests[0])),
         "edge_text": edge_text,
         "place_text": place_text,
+        "plain": plain,
         "samples_text": samples_text,
         "chart": chart,
         "crops": _crops(comparison, on_screen),

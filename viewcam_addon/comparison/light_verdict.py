@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from ..errors import listed
 from ..pinhole import Pinhole
-from .answer import Answer, NotModeled, answered, percent_of
+from .answer import NOTHING, Answer, NotModeled, answered, percent_of
 from .coincident import TakenOut
 from .hypothesis_tests import CONTOURS, PIXELS, WHOLE, HypothesisTest, Place
 from .noise_free import Edges
 from .perception import Appearance
+from .sides import CHANNEL_NAMES
 from .statistics import PassErrors, percentile_name, plain
 from .tolerances import PERCENTILES, Array
 from .verdict import mark, pairs_text, percent
@@ -45,7 +46,8 @@ class LightRow:
     """The result for one quantity.
 
     reference, test : means over the picture and its channels. ratio : test over reference, nan where that is 0.
-    ratio_error : its standard error. visible : the relative bias of all that is compared that is found half of the time.
+    ratio_error : its standard error. visible : the least relative bias of all that is compared that is found in 99 of
+    100 cases; inf where none is.
     hypothesis_tests : none where there is no noise. noise_free, edges : the exact comparison, None where there is noise.
     broken : pixels that are no numbers on one side or both. factor : the one that explains all of the difference, or None.
     """
@@ -87,6 +89,7 @@ class Search:
     find : the bias, a share of the light. least : that which would be found in 99 of 100 cases so far, if it is everywhere;
     least_in_blocks : if it is in a typical block of 32 × 32 pixels alone; both 0 without noise.
     samples : so far, of each side. rounds : so far. is_decided : whether that was the last. expected : samples that it takes.
+    following : samples after the next round, if there is to be one; None after all.
     """
 
     find: float
@@ -96,6 +99,7 @@ class Search:
     rounds: int
     is_decided: bool
     expected: float
+    following: int | None
 
     @property
     def reached(self) -> bool:
@@ -156,7 +160,7 @@ class RadianceComparison:
                 False, "Different here", f"{_difference(worst[0])}{_hint(worst[0])}{others}{_without(self)}.", self.not_modeled
             )
         if self.is_empty:
-            return answered(False, "Nothing to compare", _nothing_left(self.taken_out), self.not_modeled)
+            return answered(False, NOTHING, _nothing_left(self.taken_out), self.not_modeled)
         if not self.is_noisy:
             row = combined.noise_free
             text = (
@@ -352,23 +356,30 @@ def _mean_text(row: LightRow, search: Search | None = None) -> str:
     digits = 1 - math.floor(math.log10(error)) if 0.0 < error < math.inf else _MOST_DIGITS  # two of the error
     difference = round(100.0 * (row.ratio - 1.0), min(digits, _MOST_DIGITS))
     differs = (
-        f"differs by {difference:+.{max(digits, 0)}f} %, with an error of".replace("-", "−")
+        f"differs by {difference:+.{max(digits, 0)}f} %, with a standard error of".replace("-", "−")
         if difference
-        else "is the same within"
+        else "is the same within a standard error of"
     )
-    would = f"and a difference of {plain(100.0 * row.visible)} % would have been found"
-    if search:
-        everywhere, in_blocks = (plain(100.0 * least) for least in (search.least, search.least_in_blocks))
-        alone = (
-            f", in a typical block of 32 × 32 pixels alone one of {in_blocks} %"
-            if math.isfinite(search.least_in_blocks)
-            else ""
-        )
-        would = f"and a difference of {everywhere} % would have been found in 99 of 100 cases{alone}"
-        if not search.reached:
-            would += f"; to find the {plain(100.0 * search.find)} % asked for takes too many samples"
-            would += f", some {_rounded(search.expected):,} a pixel" if math.isfinite(search.expected) else ""
-    return f"the mean {differs} ± {plain(error)} %, {would}"
+    text = f"the mean {differs} {plain(error)} %"
+    visible = search.least if search else row.visible
+    if not math.isfinite(visible):
+        return text
+    text += f"; a picture {plain(100.0 * visible)} % brighter or darker throughout would have been found in 99 of 100 cases"
+    text += _quietest_channel(row)
+    if search and math.isfinite(search.least_in_blocks):
+        text += f", and a typical block of 32 × 32 pixels alone that is {plain(100.0 * search.least_in_blocks)} % off"
+    if search and not search.reached:
+        text += f"; to find the {plain(100.0 * search.find)} % asked for takes too many samples"
+        text += f", some {_rounded(search.expected):,} a pixel" if math.isfinite(search.expected) else ""
+    return text
+
+
+def _quietest_channel(row: LightRow) -> str:
+    """, by its blue channel, which has the least noise: where another is so much noisier that the mean tells half as much."""
+    by_channel = row.hypothesis_tests[-1].findable[0, 0] if row.hypothesis_tests else np.zeros(0)
+    if len(by_channel) != len(CHANNEL_NAMES) or not by_channel.max() > 2.0 * by_channel.min():
+        return ""
+    return f" by its {CHANNEL_NAMES[int(by_channel.argmin())]} channel, which has the least noise"
 
 
 def _rounded(number: float) -> int:

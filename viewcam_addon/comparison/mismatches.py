@@ -29,7 +29,7 @@ from .tolerances import Array, Seen
 
 # surfaces_at(columns, rows, px, py) -> what rays through n sub-pixel positions may see: (m,) which of them each surface is of,
 # ascending, its nearest surface first; (m,) the objects' names; and dict of pass name to (m, channels) float32, perhaps with
-# "UV Slope" and "Normal Slope". A ray that meets nothing has one entry, too. As Tracer.surfaces_at.
+# "UV Slope", "Normal Slope" and "Normal Enlargement". A ray that meets nothing has one entry, too. As Tracer.surfaces_at.
 SurfacesAt = Callable[[NDArray, NDArray, Array, Array], tuple[NDArray, NDArray, Seen]]
 
 # Of n pixels: the error, what one rounding causes, and what storage and the filter's bias cause, which may be one number.
@@ -106,17 +106,20 @@ class SurfaceAgreement:
 
     across : (n,) pixels, how far each of the test's positions, projected, lies from the center of its pixel.
     slopes : pass name to (n,), how much Normal and UV change per pixel there (tolerances.slopes). renderer : the test's.
+    enlargement : (n,) or a number, times the error of stored corner normals, that of the normal between them.
     """
 
     pinhole: Pinhole
     across: Array
     slopes: dict[str, Array]
     renderer: Renderer = CYCLES
+    enlargement: Array | float = 1.0
 
     def at(self, chosen: NDArray) -> "SurfaceAgreement":
         """The agreement at some of the pixels, by their indices."""
         slopes = {name: slope[chosen] for name, slope in self.slopes.items()}
-        return replace(self, across=self.across[chosen], slopes=slopes)
+        enlargement = np.broadcast_to(self.enlargement, self.across.shape)[chosen]
+        return replace(self, across=self.across[chosen], slopes=slopes, enlargement=enlargement)
 
     def slope(self, expected: Seen, name: str) -> Array:
         """The slope of a pass: the surface's own, where it is known."""
@@ -172,7 +175,9 @@ def _depth_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Er
 def _normal_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Errors:
     slope, renderer = agreement.slope(expected, "Normal"), agreement.renderer
     one_rounding = tolerances.normal_error(agreement.pinhole, expected, slope)
-    return tolerances.angle_between(expected["Normal"], seen["Normal"]), one_rounding, renderer.normal + renderer.center * slope
+    enlargement = expected["Normal Enlargement"][..., 0] if "Normal Enlargement" in expected else agreement.enlargement
+    floor = renderer.normal * enlargement + renderer.center * slope
+    return tolerances.angle_between(expected["Normal"], seen["Normal"]), one_rounding, floor
 
 
 def _uv_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Errors:
@@ -281,7 +286,8 @@ def settle(
     doubtful = agreement.roundings(expected, seen) > tolerances.ROUNDINGS[0]
     asked = np.flatnonzero((borders | differs | doubtful) & tolerances.is_hit(expected))
     kinds, expected = kinds.copy(), {name: values.copy() for name, values in expected.items()}
-    agreement = replace(agreement, slopes={name: slope.copy() for name, slope in agreement.slopes.items()})
+    slopes, enlargement = {name: slope.copy() for name, slope in agreement.slopes.items()}, np.ones(len(kinds))
+    agreement = replace(agreement, slopes=slopes, enlargement=enlargement)
     pixels, objects = [NOWHERE.columns], [NOWHERE.objects]
     for start in range(0, len(asked), _CENTERS):
         batch = asked[start : start + _CENTERS]
@@ -298,7 +304,9 @@ def settle(
         other = right[right != nearest[rays[right]]]
         for name, values in expected.items():
             values[pixel[other]] = traced[name][other, : values.shape[1]]
-        for name, slope in agreement.slopes.items():
+        if "Normal Enlargement" in traced:
+            enlargement[batch] = traced["Normal Enlargement"][nearest, 0]
+        for name, slope in slopes.items():
             own = here.slope(traced, name)
             slope[batch] = np.maximum(slope[batch], own[nearest])
             slope[pixel[other]] = own[other]

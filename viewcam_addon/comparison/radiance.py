@@ -183,8 +183,7 @@ def _noisy(
     errors = sides.difference - sides.difference.mean(axis=(0, 1))
     # Channels share their samples, so that each pixel's sum over them is one error; but each channel is asked by itself.
     ratio_error = _relative(np.sqrt((errors.sum(axis=-1) ** 2).sum()), sides.reference.sum())
-    by_channel = map(_relative, np.sqrt((errors**2).sum(axis=(0, 1))), sides.reference.sum(axis=(0, 1)))
-    visible = tests[-1].limit * min(by_channel)
+    visible = hypothesis_tests.least_findable(tests)
     row = LightRow(*_means(sides), ratio_error, visible, int(sides.broken.sum()), tests)
     if not row.ok:
         scaled_passes = _factor(sides, lambda scaled: all(q.ok for q in hypothesis_tests.run(scaled, *settings)))

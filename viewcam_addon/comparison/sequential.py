@@ -1,16 +1,17 @@
 """A group sequential test: light compared in rounds of samples, until a bias of a wanted size would have been found.
 
-Each round adds samples on both sides, with seeds of its own, to those of the rounds before, so that nothing is thrown away: 16,
-64 and 256 a pixel after the first three, where a round costs more than its samples, and then twice as many after each, up to
-65,536. All hypothesis tests are made after each. Pictures that differ end it. The others are the same as soon as the test of
-all of Combined would have found a picture that is off by the wanted share everywhere, with the probability
-hypothesis_tests.POWER. In the whole most noise cancels; so there are some samples at least, for what is wrong in a few pixels
-alone. Where so few pixels have light that their sum tells nothing, the tile or pixel that tells most decides.
+Each round adds samples on both sides, with seeds of its own, to those of the rounds before, so that nothing is thrown away: 16
+a pixel after the first, which tells what is wrong by much; then as many as could decide at all, 256 for a bias of 0.5 %, since
+a round costs more than such few samples; and then twice as many after each, up to 65,536. All hypothesis tests are made after
+each. Pictures that differ end it. The others are the same as soon as the test of all of Combined would have found a picture
+that is off by the wanted share everywhere, with the probability hypothesis_tests.POWER. In the whole most noise cancels; so
+there are some samples at least, for what is wrong in a few pixels alone. Where so few pixels have light that their sum tells
+nothing, the tile or pixel that tells most decides.
 
-Who looks eleven times has eleven chances of a false alarm. The false alarms that are promised are spent over the looks
-(Lan and DeMets, Discrete sequential boundaries for clinical trials, Biometrika 70, 1983), an eleventh on each. That their sum
-is an upper bound is Boole's inequality, which holds however the looks depend on one another, whatever the noise is, and
-whichever of them is the last; to stop with *the same* can raise no alarm.
+Who looks eleven times, as often as there are totals, has eleven chances of a false alarm. The false alarms that are promised
+are spent over the looks (Lan and DeMets, Discrete sequential boundaries for clinical trials, Biometrika 70, 1983), an eleventh
+on each. That their sum is an upper bound is Boole's inequality, which holds however the looks depend on one another, whatever
+the noise is, and whichever of them is the last; to stop with *the same* can raise no alarm.
 
 Rejected: the boundaries of Pocock (1977) and of O'Brien and Fleming (1979), a little lower because they take the rounds' sums
 to be normal, which the noise of light is not at a level of 10⁻⁹; confidence sequences (Howard, Ramdas, McAuliffe and Sekhon,
@@ -18,7 +19,6 @@ Time-uniform, nonparametric, nonasymptotic confidence sequences, Annals of Stati
 sample, and are wider for looks that nobody makes; rounds of one size, of which there would be a thousand.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -26,11 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..image import Image
-from .hypothesis_tests import BLOCKS, WHOLE
+from .hypothesis_tests import BLOCKS, SIZES, least_findable
 from .light_verdict import FALSE_ALARMS, RadianceComparison, Search
 
 TOTALS = (16, 64, *(256 * 2**doubled for doubled in range(9)))
-"""Samples of a pixel after each round, of each side."""
+"""Samples of a pixel, of each side, that there may be after a round."""
 
 FALSE_ALARMS_OF_EACH = FALSE_ALARMS / len(TOTALS)
 """The probability of a false alarm that each look may spend."""
@@ -80,18 +80,19 @@ def search(comparison: RadianceComparison, find: float, rounds: Rounds) -> Searc
     after = next((total for total in TOTALS if total >= expected), None)
     is_decided = rounds.samples >= _FEWEST_OF_ALL and (after is None or after <= rounds.samples)
     is_last = is_decided or not comparison.passed or rounds.samples == TOTALS[-1]
-    return Search(find, least, in_blocks, rounds.samples, rounds.count, is_last, expected if after is None else after)
+    more = [total for total in TOTALS if total > rounds.samples]
+    enough = [total for total in more if after is not None and total >= fewest]
+    following = next(iter(enough or more), None)
+    expected = expected if after is None else after
+    return Search(find, least, in_blocks, rounds.samples, rounds.count, is_last, expected, following)
 
 
 def _least(comparison: RadianceComparison) -> tuple[float, float]:
     """The least bias that would be found if it is everywhere, and in a typical block alone; 0 without noise."""
     if not comparison.is_noisy:
         return 0.0, 0.0
-    tests = {test.size: test for test in comparison.rows[0].hypothesis_tests}
-    everywhere = tests[WHOLE].typical_findable
-    if not math.isfinite(everywhere):
-        everywhere = min(float(test.findable.min()) for test in tests.values())
-    return everywhere, tests[BLOCKS].typical_findable
+    tests = comparison.rows[0].hypothesis_tests
+    return least_findable(tests), tests[SIZES.index(BLOCKS)].typical_findable
 
 
 def _pooled(before: Image, now: Image, share: float) -> Image:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pinhole import Pinhole
-from .answer import Answer, NotModeled, answered
+from .answer import NOTHING, Answer, NotModeled, answered
 from .cameras import ConversionError, Systematic
 from .far_from_origin import FarFromOrigin
 from .mismatches import KINDS, NOWHERE, PIXELS_PER_UNEXPLAINED, InOnePlace, Mismatches
@@ -88,7 +88,7 @@ class GeometryComparison:
     def answer(self) -> Answer:
         """True if the two are the same picture, in one sentence, which names the gravest fault where there is one."""
         if self.is_empty:
-            return answered(False, "Nothing to compare", NOTHING_TO_COMPARE, self.not_modeled)
+            return answered(False, NOTHING, NOTHING_TO_COMPARE, self.not_modeled)
         systematic_ok = self.systematic is None or self.systematic.ok  # where nothing is compared no row is
         conversion_ok = self.conversion is None or self.conversion.ok
         same = systematic_ok and conversion_ok and self.mismatches_ok and all(row.ok for row in self.rows)

@@ -45,11 +45,13 @@ _NGP_SCALE = 0.33
 def refuse(shots: Sequence[Job], suffix: str, test: str | None = None) -> None:
     """Raise InputError for what no dataset could say, before any shot is rendered. suffix, test : as of `write`."""
     colmap.check_names([f"{shot.name}.{suffix}" for shot in shots])
-    for calibration in {shot.calibration for shot in shots if shot.calibration is not None}:
-        place = calibration.at(Pinhole((0, 0, 1), (0, 0, 0), (0, 1, 0), 1, 1, 1))
-        camera = Camera("--distort", place, image="picture", lens=calibration.lens)
-        transforms.document([camera])
-        colmap.texts([camera])
+    place = Pinhole((0, 0, 1), (0, 0, 0), (0, 1, 0), 1, 1, 1)
+    firsts = {shot.calibration: str(shot.name) for shot in reversed(shots)}
+    cameras = [
+        Camera(name, each.at(place) if each else place, image=name, lens=each and each.lens) for each, name in firsts.items()
+    ]
+    transforms.document(cameras)
+    colmap.texts(cameras)
     if test is not None:
         if suffix != "png":
             raise InputError("--test writes the original NeRF's files, whose pictures are PNGs: give --transforms png")

@@ -15,7 +15,7 @@ from typing import Any
 from urllib.parse import quote
 
 from .. import html_page
-from ..comparison.answer import DIFFERENT, SAME, SAME_BUT, but_for
+from ..comparison.answer import DIFFERENT, NOTHING, SAME, SAME_BUT, but_for
 from ..comparison.statistics import plain
 from ..files import written_whole
 from .summary import Result
@@ -23,8 +23,8 @@ from .summary import Result
 _WORDS = {
     "failed": "failed",
     "left": "left to render",
-    "checks_failed": "not what the reference tracer sees",
-    "not_all_modeled": "the same but for objects that are not modeled",
+    "checks_failed": "failed the check",
+    "not_all_modeled": "with objects that are not modeled",
 }
 
 
@@ -67,7 +67,7 @@ def verdict(result: Result) -> str:
     if not check:
         return "not checked"
     if result.answer == DIFFERENT:
-        return "differs"
+        return NOTHING.lower() if str(check.get("verdict")).startswith(NOTHING) else "differs"
     figures = _part(check, "figures")
     largest = _part(figures, "position").get("max")
     words = f"identical to {plain(largest)} px" if isinstance(largest, float) else "identical"

@@ -107,7 +107,8 @@ class Tracing(child_process.ServerOnDemand):
         of geometry `pixels` compared, `position` in pixels, `share_of_tolerance` of each pass where it is largest,
         `mismatches`, and `conversion`, the stated camera against this one; of light its `samples` and `quantities`. None is
         what was not compared. Of a job that finds a bias there are `undecided` and `seconds` alone until the last round, where
-        `undecided` has `expected` and `least` of light_verdict.Search; then a report's folder gets the pictures of all rounds.
+        `undecided` has `expected` and `following` of light_verdict.Search; then a report's folder gets the pictures of all
+        rounds.
 
         Raises
         ------
@@ -148,11 +149,12 @@ class Tracing(child_process.ServerOnDemand):
         depth_steps: float,
         threads: int | None = None,
         lens: Lens | None = None,
+        annotations: Mapping[str, Any] | None = None,
     ) -> list[str]:
         """Write the labels beside a picture (labels.files); the names of the files.
 
         frames : "here", and of flow "previous" and "next" as well. lens : what bends the picture, whose own plane all cameras
-        have.
+        have. annotations : as of `label` in labels/scene_labels.py.
 
         Raises
         ------
@@ -160,7 +162,8 @@ class Tracing(child_process.ServerOnDemand):
             if scenes can't be read or labels not be written, there is no OpenEXR, or the process ended first.
         """
         request = {"frames": dict(frames), "picture": str(picture), "kinds": list(kinds), "depth_steps": depth_steps}
-        return self.ask({"label": {**request, "threads": threads, "lens": lens and lens.to_json()}})
+        more = {"threads": threads, "lens": lens and lens.to_json(), "annotations": dict(annotations or {})}
+        return self.ask({"label": {**request, **more}})
 
     def distort(self, image: Path, preview: Path, calibration: Calibration, cut: ViewPlane) -> None:
         """Put a lens on a picture's two files, EXR and PNG. cut : the view plane of the pinhole that they show.
@@ -294,7 +297,7 @@ class _Server:
         if wanted.bias and isinstance(comparison, RadianceComparison):
             search = sequential.search(comparison, wanted.bias, rounds)
             if not search.is_decided:
-                return {"undecided": {"expected": search.expected, "least": search.least}, "seconds": seconds}
+                return {"undecided": {"expected": search.expected, "following": search.following}, "seconds": seconds}
             comparison, self._rounds = dataclasses.replace(comparison, search=search), None
             if files.report:
                 for path, picture in zip(tests, pictures, strict=True):
@@ -316,6 +319,7 @@ class _Server:
         depth_steps: float,
         threads: int | None,
         lens: dict[str, Any] | None,
+        annotations: dict[str, Any],
     ) -> list[str]:
         from ..labels import files
         from ..labels.scene_labels import label
@@ -325,7 +329,8 @@ class _Server:
             for name, frame in frames.items()
         }
         bent = Lens.from_json(lens) if lens else None
-        labels = label(scenes.pop("here"), kinds, **scenes, threads=threads, keepers=self._keepers, lens=bent)
+        here, how = scenes.pop("here"), (threads, self._keepers, bent, annotations)
+        labels = label(here, kinds, scenes.get("previous"), scenes.get("next"), *how)
         return [path.name for path in files.write(Path(picture), labels, depth_steps)]
 
     def _scene(self, path: str) -> "Scene":
@@ -344,7 +349,7 @@ def _distort(image: str, preview: str, calibration: dict[str, Any], cut: dict[st
     from .. import png
 
     of, plane = Calibration.from_json(calibration), ViewPlane(**cut)
-    images.rewrite(image, lambda pixels, is_data: of.distorted(pixels, plane, nearest=is_data))
+    images.rewrite(image, lambda pixels, is_data: of.distorted(pixels, plane, nearest=is_data), of.plane)
     pixels = of.distorted(png.decoded(Path(preview).read_bytes()), plane)
     with written_whole(preview) as temporary:
         temporary.write_bytes(png.encoded(pixels if pixels.shape[2] > 2 else pixels[..., 0]))

@@ -134,7 +134,7 @@ class _Objects:
             with files.understood(path):
                 for each in document["instances"]:
                     if (key := self._key(each)) not in self._object_of:
-                        self._object_of[key] = _object_of(each, alike.setdefault(category(each["name"]), []))
+                        self._object_of[key] = _object_of(each, alike.setdefault(category(each), []))
         self._every = [(name, each) for name in sorted(alike) for each in alike[name]]
         self._numbers = {id(each): number for number, (_, each) in enumerate(self._every, start=1)}
 
@@ -151,7 +151,7 @@ class _Objects:
     def _key(instance: Document) -> tuple[Any, ...]:
         """All that decides which object an instance is; what stands still has one in all pictures."""
         box, rows = instance["box"], instance["object_to_world"][:3]
-        return category(instance["name"]), *box["min"], *box["max"], *(number for row in rows for number in row[:3])
+        return category(instance), *box["min"], *box["max"], *(number for row in rows for number in row[:3])
 
 
 class _Object(NamedTuple):

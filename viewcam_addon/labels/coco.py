@@ -1,7 +1,8 @@
 """The labels of many pictures as one file of COCO's: instances (boxes and masks) or panoptic (segments of color pictures).
 
-Both are plain JSON of what `labels.json` files tell, so that nothing is traced again and a dataset may grow. A category is an
-object's name without Blender's number behind it (Chair of Chair.001).
+Both are plain JSON of what `labels.json` files tell, so that nothing is traced again and a dataset may grow. A category is what
+the object's custom property says, or else its name without Blender's number behind it (Chair of Chair.001). Keypoints count
+from the first pixel's center, as COCO's do, and boxes from the picture's edge.
 """
 
 import re
@@ -21,7 +22,7 @@ def instances(folder: Path, amodal: bool = False) -> Document:
     folder : of label files; `file_name` is the picture's that they belong to. Raises InputError as `read_pictures` does.
     """
     pictures, categories = read_pictures(folder)
-    kind = "amodal" if amodal else "visible"
+    kind, names = "amodal" if amodal else "visible", keypoint_names(pictures)
     annotations: list[Document] = []
     for number, (path, document) in enumerate(pictures, start=1):
         for each in with_mask(kind, path, document):
@@ -29,14 +30,19 @@ def instances(folder: Path, amodal: bool = False) -> Document:
                 {
                     "id": len(annotations) + 1,
                     "image_id": number,
-                    "category_id": categories[category(each["name"])],
+                    "category_id": categories[category(each)],
                     **each[kind],
                     "segmentation": masks.compressed(each[kind]["segmentation"]),
                     "iscrowd": 0,
                     "instance_id": each["id"],
+                    **_keypoints(each, names.get(category(each), [])),
                 }
             )
-    return {"images": _images(pictures), "annotations": annotations, "categories": _categories(categories)}
+    numbered = [
+        each | ({"keypoints": names[each["name"]], "skeleton": []} if each["name"] in names else {})
+        for each in _categories(categories)
+    ]
+    return {"images": _images(pictures), "annotations": annotations, "categories": numbered}
 
 
 def panoptic(folder: Path) -> Document:
@@ -47,7 +53,7 @@ def panoptic(folder: Path) -> Document:
         segments = [
             {
                 "id": each["id"],
-                "category_id": categories[category(each["name"])],
+                "category_id": categories[category(each)],
                 "area": each["visible"]["area"],
                 "bbox": each["visible"]["bbox"],
                 "iscrowd": 0,
@@ -60,9 +66,31 @@ def panoptic(folder: Path) -> Document:
     return {"images": _images(pictures), "annotations": annotations, "categories": things}
 
 
-def category(name: str) -> str:
-    """Chair of Chair.001: Blender's names of copies."""
-    return re.sub(r"\.\d{3,}$", "", name)
+def category(instance: Document) -> str:
+    """The category that an instance has, or Chair of Chair.001: Blender's names of copies."""
+    return str(instance.get("category") or re.sub(r"\.\d{3,}$", "", instance["name"]))
+
+
+def keypoint_names(pictures: Sequence[tuple[Path, Document]]) -> dict[str, list[str]]:
+    """The names of the keypoints of each category that has some, in the order in which they are first met."""
+    names: dict[str, dict[str, None]] = {}
+    for _, document in pictures:
+        for each in document["instances"]:
+            for point in each.get("keypoints", ()):
+                names.setdefault(category(each), {})[point["name"]] = None
+    return {name: [*points] for name, points in names.items()}
+
+
+def _keypoints(instance: Document, names: Sequence[str]) -> Document:
+    """The keys of an annotation for the keypoints of its category; none where that has none."""
+    if not names:
+        return {}
+    points = {point["name"]: point for point in instance.get("keypoints", ())}
+    numbers: list[float] = []
+    for name in names:
+        point = points.get(name)
+        numbers += [point["x"] - 0.5, point["y"] - 0.5, point["visible"]] if point and point["visible"] else [0, 0, 0]
+    return {"keypoints": numbers, "num_keypoints": sum(visible > 0 for visible in numbers[2::3])}
 
 
 def read_pictures(folder: Path) -> tuple[list[tuple[Path, Document]], dict[str, int]]:
@@ -77,7 +105,7 @@ def read_pictures(folder: Path) -> tuple[list[tuple[Path, Document]], dict[str, 
     if not paths:
         raise InputError(f"{folder} has no label files, *.labels.json: write some with viewcam render --labels masks")
     pictures = [(path, files.read(path)) for path in paths]
-    names = sorted({category(each["name"]) for _, document in pictures for each in document["instances"]})
+    names = sorted({category(each) for _, document in pictures for each in document["instances"]})
     return pictures, {name: number for number, name in enumerate(names, start=1)}
 
 

@@ -70,7 +70,7 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
         told_in.unlink(missing_ok=True)
     for each in others:
         if each.suffix == ".exr":
-            image.write(each, labels.image)
+            image.write(each, labels.image, is_bent=labels.lens is not None)
             continue
         ending = each.name.removeprefix(f"{path.stem}.")
         content = _content(ending, passes[FILES[ending]][::-1], depth_steps)
@@ -128,7 +128,11 @@ def _check(document: dict[str, Any]) -> None:
     if len({each["id"] for each in document["instances"]}) < len(document["instances"]):
         raise ValueError("two instances have one id")
     for each in document["instances"]:
-        texts.append(each["name"])
+        texts += [each["name"], each.get("category", ""), *(point["name"] for point in each.get("keypoints", ()))]
+        for point in each.get("keypoints", ()):
+            _check_numbers([point["x"], point["y"]], (2,))
+            if point["visible"] not in (0, 1, 2):
+                raise ValueError("a keypoint is seen, hidden or not there")
         if type(each["id"]) is not int or not 0 < each["id"] <= _LARGEST_ID:
             raise ValueError("an id is none")
         for name in ("object_to_world", "object_to_camera"):

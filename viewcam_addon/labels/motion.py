@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..tracer.render import barycentric
 from ..tracer.scene import Mesh, Spheres
 from .surfaces import Array, Instance, Surfaces
 
@@ -94,12 +95,6 @@ def _carried(here: Surfaces, there: Surfaces, instance: Instance, other: Instanc
         directions = (local - before.centers[primitive]) / before.radii[primitive, None]
         local = after.centers[primitive] + after.radii[primitive, None] * directions
     elif not is_rigid:
-        a, b, c = np.moveaxis(before.vertices[before.triangles[primitive]], 1, 0)
-        across, along, reach = b - a, c - a, local - a
-        normal = np.cross(across, along)
-        area = (normal * normal).sum(1)
-        second = (np.cross(reach, along) * normal).sum(1) / area
-        third = (np.cross(across, reach) * normal).sum(1) / area
-        a, b, c = np.moveaxis(after.vertices[after.triangles[primitive]], 1, 0)
-        local = a + second[:, None] * (b - a) + third[:, None] * (c - a)
+        weights = barycentric(local, before.vertices[before.triangles[primitive]])
+        local = (weights[..., None] * after.vertices[after.triangles[primitive]]).sum(axis=1)
     return local @ other.matrix[:3, :3].T + other.matrix[:3, 3]

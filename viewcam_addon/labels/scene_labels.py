@@ -1,6 +1,6 @@
 """All labels of one frame: passes of a picture, and what is told of each instance."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,10 +41,12 @@ def label(
     threads: int | None = None,
     keepers: Keepers | None = None,
     lens: Lens | None = None,
+    annotations: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Labels:
     """The labels of a scene's picture. keepers : of what other scenes share with it. The rest is as in api.label.
 
-    lens : what bends the picture of all frames, whose cameras have its own plane.
+    lens : what bends the picture of all frames, whose cameras have its own plane. annotations : by the names of objects their
+    `category` and `keypoints`, which are (x, y, z) in the object's coordinates by their names.
     """
     if unknown := [kind for kind in kinds if kind not in KINDS]:
         raise InputError(f"there is no label {unknown[0]!r}: give some of {', '.join(KINDS)}")
@@ -82,7 +84,7 @@ def label(
     if covered:
         passes |= covered.passes
     planes = {name: np.asarray(values, np.float32).reshape(*shape, -1) for name, values in passes.items()}
-    records = _instances(surfaces, covered, with_masks="masks" in kinds, with_amodal="amodal" in kinds)
+    records = _instances(surfaces, covered, annotations or {}, with_masks="masks" in kinds, with_amodal="amodal" in kinds)
     header = {"software": "Virtual Pinhole", **(covered.header if covered else {})}
     return Labels(Image(planes, scene.camera, header), records, lost, lens)
 
@@ -101,7 +103,11 @@ def _motions(name: str, motion: Motion) -> dict[str, NDArray[Any]]:
 
 
 def _instances(
-    surfaces: Surfaces, covered: coverage.Coverage | None, with_masks: bool, with_amodal: bool
+    surfaces: Surfaces,
+    covered: coverage.Coverage | None,
+    annotations: Mapping[str, Mapping[str, Any]],
+    with_masks: bool,
+    with_amodal: bool,
 ) -> list[dict[str, Any]]:
     camera, all_of_them = surfaces.camera, surfaces.instances
     if not all_of_them:
@@ -128,6 +134,11 @@ def _instances(
             "object_to_camera": in_camera[number],
             "box": {"min": least.tolist(), "max": greatest.tolist()},
         }
+        about = annotations.get(instance.key[0], {})
+        if "category" in about:
+            figures["category"] = about["category"]
+        if about.get("keypoints"):
+            figures["keypoints"] = _keypoints(surfaces, number, about["keypoints"])
         if with_masks:
             figures["visible"] = seen
         if with_amodal:
@@ -137,3 +148,21 @@ def _instances(
             figures["coverage"] = share
         result.append(figures)
     return result
+
+
+def _keypoints(surfaces: Surfaces, number: int, points: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The places of an instance's keypoints in the picture, from its upper left corner, and COCO's figure of what is seen.
+
+    It is 2 where the pixel shows the instance itself, which a joint is inside of, or nothing that is nearer than the point; 1
+    where something else hides it; and 0, with a place of 0, 0, where it is not in the picture.
+    """
+    camera, matrix = surfaces.camera, surfaces.instances[number].matrix
+    column, row, depth = surfaces.project(np.array([*points.values()], float) @ matrix[:3, :3].T + matrix[:3, 3])
+    near, far = surfaces.scene.clip
+    with np.errstate(invalid="ignore"):
+        inside = (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height) & (depth >= near) & (depth <= far)
+    pixels = tuple(np.where(inside, place, 0).astype(int) for place in (row, column))
+    seen = (surfaces.instance[pixels] == number) | (surfaces.depth[pixels] >= depth)
+    visible = np.where(inside, 1 + seen, 0)
+    x, y = (np.where(inside, place, 0.0) for place in (column, camera.height - row))
+    return [{"name": name, "x": float(x[i]), "y": float(y[i]), "visible": int(visible[i])} for i, name in enumerate(points)]

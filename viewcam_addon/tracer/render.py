@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..image import CHANNELS, GEOMETRY_PASSES, LIGHT_PASSES
 from . import native
 from .native import CoreLight, CoreScene, StopFlag
-from .scene import Scene
+from .scene import Mesh, Scene
 from .scene.film import LEVELS, SAMPLES
 from .tiles import Passes, Stopped, Watcher, over_threads
 
@@ -31,6 +31,7 @@ MOST_SAMPLES = 2**24
 CENTERS = ("Depth", "Object Index")
 """The passes that tell what is at the pixels' centers, at the levels of light."""
 SLOPES = ("UV Slope", "Normal Slope")
+ENLARGEMENT = "Normal Enlargement"
 """The passes that `Tracer.surfaces_at` has beside the passes of level `geometry`."""
 WITHIN = 1e-3
 """The part of a depth within which surfaces are listed: as far as float32's roundings carry a surface in any picture that is
@@ -39,6 +40,18 @@ PASSES = {name: len(CHANNELS[name]) for name in GEOMETRY_PASSES}
 """The passes of level `geometry` and their numbers of channels."""
 
 Tile = TypeVar("Tile")
+
+
+def barycentric(points: NDArray, corners: NDArray) -> NDArray[np.float64]:
+    """(n, 3): the shares of a triangle's corners, (n, 3, 3), in points of its plane, (n, 3)."""
+    across, along, reach = (each - corners[:, 0] for each in (corners[:, 1], corners[:, 2], points))
+    normal = np.cross(across, along)
+    area = (normal * normal).sum(1)
+    second, third = (
+        np.divide((np.cross(*each) * normal).sum(1), area, out=np.zeros(len(area)), where=area > 0.0)
+        for each in ((reach, along), (across, reach))
+    )
+    return np.stack([1.0 - second - third, second, third], axis=-1)
 
 
 class Tracer:
@@ -230,7 +243,8 @@ class Tracer:
 
         Returns (m,) which of the n sample points each surface is of, ascending, its nearest first; (m,) the objects' names, ""
         where nothing is, which is one, too; and pass name → (m, channels) float32, with "UV Slope" and "Normal Slope" among
-        them: how much each changes there with each pixel.
+        them, how much each changes there with each pixel, and "Normal Enlargement", how many times the error of a triangle's
+        corner normals that of the normal between them is: of the nearest surface, for all of its ray.
         """
         column, row = np.broadcast_arrays(np.add(columns, px, dtype=np.float64), np.add(rows, py, dtype=np.float64))
         counts = self._core.surface_counts(column, row, within)
@@ -238,7 +252,39 @@ class Tracer:
         objects, slopes = self._core.surfaces_at(passes, column, row, within, counts)
         for name, slope in zip(SLOPES, slopes, strict=True):
             passes[name] = slope.astype(np.float32)[:, None]
+        passes[ENLARGEMENT] = np.repeat(self._enlargements(column, row), counts).astype(np.float32)[:, None]
         return np.repeat(np.arange(len(counts)), counts), self._names[objects], passes
+
+    def _enlargements(self, columns: NDArray, rows: NDArray) -> NDArray[np.float64]:
+        """(n,): 1 over the length of the sum of weighted corner normals, by which it is divided, and with it their errors."""
+        result = np.ones(len(columns))
+        if not self._smooth:
+            return result
+        x, y = self._camera.view_plane(columns, rows)
+        directions, eye = np.stack([x, y, np.ones_like(x)], axis=-1) @ self._camera.picture_axes(), np.array(self._camera.eye)
+        depth, instances, primitives = self.closest(eye, directions)
+        for first, matrices, mesh in self._smooth:
+            here = np.flatnonzero((instances >= first) & (instances < first + len(matrices)))
+            if not len(here):
+                continue
+            matrix, triangle = matrices[instances[here] - first], primitives[here]
+            corners = mesh.vertices[mesh.triangles[triangle]] @ matrix[:, :3, :3].transpose(0, 2, 1) + matrix[:, None, :3, 3]
+            weights = barycentric(eye + depth[here, None] * directions[here], corners)
+            between = np.linalg.norm((weights[..., None] * mesh.corner_normals[triangle]).sum(axis=1), axis=-1)
+            result[here] = 1.0 / np.clip(between, np.finfo(np.float32).eps, 1.0)
+        return result
+
+    @functools.cached_property
+    def _smooth(self) -> list[tuple[int, NDArray, Mesh]]:
+        """Each object with corner normals: its first instance, the (k, 4, 4) matrices of all, and its mesh."""
+        geometries = [self._scene.geometries[placed.geometry] for placed in self._scene.objects]
+        counts = [len(placed.matrices) for placed in self._scene.objects]
+        of_objects = zip(np.cumsum([0, *counts]), self._scene.objects, geometries, strict=False)
+        return [
+            (int(first), np.asarray(placed.matrices), mesh)
+            for first, placed, mesh in of_objects
+            if isinstance(mesh, Mesh) and mesh.corner_normals is not None
+        ]
 
     @functools.cached_property
     def _names(self) -> NDArray[np.object_]:

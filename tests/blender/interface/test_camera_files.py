@@ -68,6 +68,20 @@ def test_a_folder_of_cameras_becomes_one_collection_and_each_sees_what_the_file_
     assert scene.camera == objects[0]
 
 
+def test_a_world_that_knows_no_up_is_leveled_by_its_cameras_or_by_the_ground_that_its_points_have(scene, tmp_path):
+    lying = [
+        Camera(each.name, Pinhole((x, z, -y), (0, 1, 0), (0, 1, 0), 600, 640, 360), image=each.image)
+        for each in around(4)
+        for x, y, z in [each.pinhole.eye]
+    ]
+    formats.save(lying, tmp_path / "sparse", "colmap")
+    import_(tmp_path / "sparse", set_size=True, up_from="cameras")
+    for block in imported("sparse"):
+        assert abs(block.matrix_world.translation.z - 3) < 1e-6 and block.matrix_world.to_3x3().col[1].z > 0.5
+    with pytest.raises(RuntimeError, match="no points to find the ground by"):
+        import_(tmp_path / "sparse", up_from="ground")
+
+
 @pytest.mark.parametrize("import_as", ["EACH", "FLIGHT"])
 def test_the_empty_of_an_import_turns_and_scales_all_of_its_cameras(scene, tmp_path, import_as):
     formats.save(around(3), tmp_path / "sparse", "colmap")

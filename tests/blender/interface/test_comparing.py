@@ -245,12 +245,12 @@ def test_light_is_rendered_in_pictures_that_are_counted(stand_in):
 def test_a_search_for_a_bias_tells_how_much_longer_it_takes(stand_in):
     comparison = stand_in(level="path", find="0.5%")
     with open(comparison.folder / "output.txt", "a", encoding="utf-8") as output:
-        output.write('{"event": "forecast", "samples": 256, "taken": 64, "seconds": 41.6}\n')
+        output.write('{"event": "forecast", "samples": 1024, "taken": 256, "following": 512, "seconds": 41.6}\n')
         output.flush()
         assert comparison.progress() == (1 / 4, "Rendering with Cycles, 1 of 8, about 42 s more")
         output.write('{"event": "step", "name": "rendering", "number": 6, "of": 8}\n')
         output.flush()
-        assert comparison.progress() == ((64 + 192 / 2) / 256, "Rendering with Cycles, 6 of 8, about 42 s more")
+        assert comparison.progress() == ((256 + 256 / 2) / 1024, "Rendering with Cycles, 6 of 8, about 42 s more")
     comparison.cancel()
 
 

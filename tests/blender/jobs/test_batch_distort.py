@@ -15,8 +15,8 @@ pytestmark = pytest.mark.slow
 OPENCV = (250, 250.5, 161, 88, -0.25, 0.08, 0.006, -0.004)
 FISHEYE = (200, 200, 161, 88, 0.03, -0.01, 0.002, 0.0)
 CLOSE = 0.1
-"""Pixels. A sharp edge moves by up to 0.09 where it is interpolated between two pixels; calibrated: 0.095 at most was seen, and
-0.108 of the worst corner in pictures that are interpolated twice, with 95 of 100 below 0.08."""
+"""Pixels. Calibrated: the search errs by up to 0.057 in the same picture computed with 64 rays a pixel; 0.060 at most was seen
+in pictures that the lens has bent, and 0.087 in those that are interpolated twice."""
 
 
 @pytest.fixture
@@ -73,46 +73,22 @@ def to_camera(frame):
     return np.diag([1.0, -1, -1, 1]) @ np.linalg.inv(frame["transform_matrix"])
 
 
-def on_paper(frame, document, model):
-    """The board's picture, of the rays through 8 × 8 places of each pixel that OpenCV has."""
-    width, height = document["w"], document["h"]
-    k, terms, module = of_opencv(document, model)
-    column, row = np.meshgrid(np.arange(8 * width), np.arange(8 * height))
-    places = np.stack([column + (row % 8 + 0.5) / 8, row + (column % 8 + 0.5) / 8], axis=-1) / 8  # each of 64 columns and rows
-    if module is cv2:  # whose undistortPoints ends after five steps
-        steps = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 50, 1e-9)
-        points = cv2.undistortPointsIter(places.reshape(-1, 1, 2), k, terms, None, None, steps).reshape(-1, 2)
-    else:
-        points = module.undistortPoints(places.reshape(-1, 1, 2), k, terms).reshape(-1, 2)
-    matrix = to_camera(frame)
-    eye = -matrix[:3, :3].T @ matrix[:3, 3]
-    directions = np.column_stack([points, np.ones(len(points))]) @ matrix[:3, :3]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = -eye[2] / directions[:, 2]
-        x, y = eye[:2, None] + distance * directions.T[:2]
-    squares = np.where((np.floor(x) + np.floor(y)) % 2, 230.0, 13.0)
-    light = np.where((distance > 0) & (np.abs(x) < 12) & (np.abs(y) < 8), squares, 0)
-    return light.reshape(height, 8, width, 8).mean(axis=(1, 3)).astype(np.float32)
+def distances(picture, frame, document, model):
+    """The distances in pixels of the board's corners that OpenCV finds in a picture from where it projects them.
 
-
-def corners(picture, frame, document, model):
-    """(n, 2): the board's corners that OpenCV finds in a picture near where it projects them, squares of 16 pixels and more."""
+    Of corners between squares of 16 pixels and more.
+    """
     points = np.array([(x, y, 0.0) for y in range(-7, 8) for x in range(-11, 12)])[:, None]
     matrix, (k, terms, module) = to_camera(frame), of_opencv(document, model)
     places = module.projectPoints(points, cv2.Rodrigues(matrix[:3, :3])[0], matrix[:3, 3], k, terms)[0].reshape(15, 23, 2)
     wide = np.min([np.linalg.norm(np.gradient(places, axis=axis), axis=-1) for axis in (0, 1)], axis=0)
     inside = ((places > 10) & (places < np.array([document["w"], document["h"]]) - 10)).all(axis=-1) & (wide > 16)
     assert inside.sum() > 20, "the view tests nothing"
-    starts = (places[inside] - 0.5).astype(np.float32).reshape(-1, 1, 2)
+    expected = (places[inside] - 0.5).astype(np.float32)
     blurred = cv2.GaussianBlur(picture.astype(np.float32), (0, 0), 1)  # OpenCV's gradients are of two pixels apart
     criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 50, 1e-4)
-    return cv2.cornerSubPix(blurred, starts, (5, 5), (-1, -1), criteria)[:, 0]
-
-
-def distances(picture, frame, document, model):
-    """The distances in pixels of a picture's corners from those that the same search finds in the one on paper."""
-    expected = corners(on_paper(frame, document, model), frame, document, model)
-    return np.linalg.norm(corners(picture, frame, document, model) - expected, axis=-1)
+    corners = cv2.cornerSubPix(blurred, expected[:, None].copy(), (7, 7), (-1, -1), criteria)[:, 0]
+    return np.linalg.norm(corners - expected, axis=-1)
 
 
 @pytest.mark.parametrize(("model", "numbers"), [("OPENCV", OPENCV), ("OPENCV_FISHEYE", FISHEYE)])
@@ -130,10 +106,10 @@ def test_corners_are_where_opencv_projects_them_and_back_undistorted(blend, tmp_
     (pinhole,) = pinholes["frames"]
     picture = cv2.imread(str(out / frame["file_path"]), cv2.IMREAD_GRAYSCALE)
     off = distances(picture, frame, document, model)
-    assert np.percentile(off, 95) < CLOSE and off.max() < 1.5 * CLOSE, f"{off.max():.2g} pixels aside"
+    assert off.max() < CLOSE, f"{off.max():.2g} pixels aside"
     undistorted = cv2.imread(str(straight / pinhole["file_path"]), cv2.IMREAD_GRAYSCALE)
     off = distances(undistorted, pinhole, pinholes, "PINHOLE")
-    assert np.percentile(off, 95) < CLOSE and off.max() < 1.5 * CLOSE, f"{off.max():.2g} pixels aside, undistorted"
+    assert off.max() < CLOSE, f"{off.max():.2g} pixels aside, undistorted"
     if model == "OPENCV":
         p1, p2 = document["p1"], document["p2"]
         off = distances(picture, frame, document | {"p1": p2, "p2": p1}, model)

@@ -115,10 +115,19 @@ def test_the_camera_of_four_values_stands_still_in_the_other_frames(stage, tmp_p
     assert np.abs(passes["Forward Flow"][passes["Instance"][..., 0] == instances["Suzanne"]["id"]]).max() > 1
 
 
-def test_an_instance_has_one_id_in_all_shots(stage, tmp_path):
-    shoot(tmp_path, [*FRAMES, STATED], Outputs(picture=False, labels=("masks",)))
+def test_an_instance_has_one_id_in_all_shots_and_what_its_properties_say(stage, tmp_path):
+    monkey, nose = stage.objects["Suzanne"], bpy.data.objects.new("Empty", None)
+    stage.collection.objects.link(nose)
+    nose.parent, nose.location, nose["keypoint"], monkey["category"] = monkey, (0, -0.7, 0.1), "nose", "ape"
+    records = shoot(tmp_path, [*FRAMES, STATED], Outputs(picture=False, labels=("masks",)))
     ids = [{name: each["id"] for name, each in read_labels(tmp_path, shot.name)[1].items()} for shot in (*FRAMES, STATED)]
     assert ids[0] == ids[1] == ids[2] == ids[3] and len(set(ids[0].values())) == 3
+    ape = read_labels(tmp_path, "frame_2")[1]["Suzanne"]
+    camera, matrix = Pinhole(**records["frame_2"]["camera"]), np.array(ape["object_to_world"])
+    column, row, _ = camera.project(matrix[:3, :3] @ (0, -0.7, 0.1) + matrix[:3, 3])
+    (point,) = ape["keypoints"]
+    assert (ape["category"], point["name"], point["visible"]) == ("ape", "nose", 2)
+    assert np.hypot(point["x"] - column, camera.height - point["y"] - row) < ALLOWED
 
 
 def test_pictures_are_the_same_bytes_with_and_without_labels_and_the_scene_is_as_before(stage, tmp_path):

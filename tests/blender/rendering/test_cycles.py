@@ -166,9 +166,8 @@ def settings_of_renders(monkeypatch):
     def look(scene, to_file):
         names = ("samples", "seed", "max_bounces", "diffuse_bounces", "pixel_filter_type", "film_exposure")
         seen.append({name: getattr(scene.cycles, name) for name in names})
-        seen[-1]["passes"] = {
-            f"use_pass_{name}" for name in ("z", "emit", "position") if getattr(scene.view_layers[0], f"use_pass_{name}")
-        }
+        passes = (f"use_pass_{name}" for name in ("z", "emit", "position", "diffuse_indirect"))
+        seen[-1]["passes"] = {name for name in passes if getattr(scene.view_layers[0], name)}
 
     monkeypatch.setattr(cycles, "render_still", look)
     monkeypatch.setattr(cycles, "is_whole", lambda path: path.touch() is None)
@@ -185,14 +184,29 @@ def test_pictures_of_light_share_samples_and_count_seeds(scene, camera_object, t
     assert [each["seed"] for each in settings_of_renders] == [7, 8, 9]
     assert settings_of_renders[0]["max_bounces"] == 9 and settings_of_renders[0]["diffuse_bounces"] == 3
     assert settings_of_renders[0]["pixel_filter_type"] == "BOX" and settings_of_renders[0]["film_exposure"] == 2.0
-    assert settings_of_renders[0]["passes"] == {"use_pass_emit"}, "what is at the center needs the first sample"
+    assert settings_of_renders[0]["passes"] == {"use_pass_emit", "use_pass_diffuse_indirect"}, "centers need the first sample"
+
+
+def test_indirect_light_of_diffuse_surfaces_is_not_asked_for_where_they_may_not_scatter(
+    scene, camera_object, tmp_path, settings_of_renders
+):
+    """A ray of a glossy lobe carries the diffuse lobe's value: Cycles' pass is not black, and different from the tracer's."""
+    scene.cycles.diffuse_bounces = 0
+    scene.view_layers[0].use_pass_diffuse_indirect = True
+    exported = jobs.both_sides(Job(level="path", samples=48), [tmp_path / "picture.exr"])
+    assert settings_of_renders[0]["passes"] == {"use_pass_emit"} and scene.view_layers[0].use_pass_diffuse_indirect
+    assert "Diffuse Indirect" in {entry.object: entry.reason for entry in exported.ledger}[scene.name]
 
 
 def test_direct_light_has_no_bounces_and_one_sample_is_the_center(scene, camera_object, tmp_path, settings_of_renders):
     jobs.both_sides(Job(level="direct", samples=1), [tmp_path / "picture.exr"])
     (seen,) = settings_of_renders
     assert (seen["samples"], seen["max_bounces"], seen["diffuse_bounces"]) == (1, 0, 0)
-    assert seen["pixel_filter_type"] == "BLACKMAN_HARRIS" and seen["passes"] == {"use_pass_emit", "use_pass_z"}
+    assert seen["pixel_filter_type"] == "BLACKMAN_HARRIS" and seen["passes"] == {
+        "use_pass_emit",
+        "use_pass_diffuse_indirect",
+        "use_pass_z",
+    }
 
 
 def test_the_level_is_the_least_where_it_is_left_to_the_scene(scene, camera_object, tmp_path, settings_of_renders):

@@ -19,7 +19,7 @@ _POSES = {
     "w2c_opengl": "World to Camera, OpenGL's Axes",
     "c2w_opengl": "Camera to World, OpenGL's Axes",
 }
-_MAY_BE_STATED = ("angle_unit", "pixel", "pose")
+_MAY_BE_STATED = ("up_from", "angle_unit", "pixel", "pose")
 
 
 def axes(**look: Any) -> Any:
@@ -59,9 +59,13 @@ class WorldOptions:
 class ReadingOptions(WorldOptions):
     """The options with which cameras are read, beside axes and scale."""
 
-    level: bpy.props.BoolProperty(
-        name="Level by Cameras",
-        description="Turn the world so that the mean of the cameras' up is Z, as of a reconstruction that knows no up",
+    up_from: bpy.props.EnumProperty(
+        name="Level by",
+        description="By what a world is turned upright that knows no up, as a reconstruction's",
+        items=[
+            (_UNSTATED, "Nothing", "Leave the world as it is"),
+            *((key, {"cameras": "Cameras", "ground": "Ground of the Points"}[key], text) for key, text in formats.UPS.items()),
+        ],
         options={"SKIP_SAVE"},
     )
     unmirrored: bpy.props.BoolProperty(
@@ -105,10 +109,9 @@ class ReadingOptions(WorldOptions):
 
     def chosen(self, **more: Any) -> Options:
         stated = {name: None if getattr(self, name) == _UNSTATED else getattr(self, name) for name in _MAY_BE_STATED}
-        up_from = "cameras" if self.level else None
-        taken = {"unmirrored": self.unmirrored, "without_distortion": self.without_distortion, "up_from": up_from}
+        taken = {"unmirrored": self.unmirrored, "without_distortion": self.without_distortion}
         return super().chosen(**taken, **stated, **more)
 
 
-READING = ("axes", "scale", "level", "unmirrored", "without_distortion", *_MAY_BE_STATED)
+READING = ("axes", "scale", "up_from", "unmirrored", "without_distortion", *_MAY_BE_STATED[1:])
 """The names of all of them, in the order in which they are shown."""

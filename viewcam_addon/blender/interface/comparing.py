@@ -24,7 +24,6 @@ import bpy
 
 from ... import child_process
 from ...comparison.answer import DIFFERENT, SAME_BUT, but_for
-from ...comparison.sequential import TOTALS
 from ...comparison.statistics import plain
 from ...errors import InputError
 from ...files import written_whole
@@ -150,19 +149,18 @@ class RunningComparison:
     def progress(self) -> tuple[float, str]:
         """The progress, from 0 to 1 in steps of unequal length, and the name of the step."""
         done, words = _step({"name": "rendering", "number": 1}, self._pictures)
-        traced, taken, expected, left = 0.0, 0, 1, ""
+        traced, taken, following, expected, left = 0.0, 0, 0, 1, ""
         for event in child_process.events_in(self._output().splitlines()):
             if event["event"] == "step":
                 done, words = _step(event, self._pictures)
             elif event["event"] == "progress":
                 traced = event["share"]
             elif event["event"] == "forecast":
-                taken, expected = event["taken"], event["samples"]
+                taken, following, expected = event["taken"], event["following"], event["samples"]
                 left, done = f", about {event['seconds']:.0f} s more", 0
         share = (done + (traced if words == "Tracing" else 0)) / (self._pictures + 2)
         if taken:
-            after = next(total for total in TOTALS if total > taken)
-            share = (taken + share * (after - taken)) / expected
+            share = (taken + share * (following - taken)) / expected
         return share, words + left
 
     @property

@@ -15,8 +15,9 @@ a change, too.
 import contextlib
 import dataclasses
 import functools
+import itertools
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ from ...tracer.scene.film import LEVELS, SAMPLES, seeds
 from ...tracer.scene.levels import least_level
 from .. import datablocks
 from ..rendering import cycles, displayed, exr
+from ..scenes import features
 from ..scenes.export import Lighting
 from ..temporary_settings import numbered_indices
 from . import persistent_data, pictures
@@ -86,7 +88,8 @@ class Checker:
             camera = None if job.is_of_scenes_camera else camera_object
             ledger, render = export.ledger, functools.partial(cycles.render, scene, stage.view_layer, camera)
             render(image, ledger.remedies.values(), job.threads, keep=True)
-            everything = self._files.folder / "everything.exr" if export.scene.not_modeled else None
+            has_more = export.scene.not_modeled and not features.lacks_gas(scene)
+            everything = self._files.folder / "everything.exr" if has_more else None
             if everything:
                 render(everything, ledger.remedies_of_everything, job.threads, keep=True, everything=True)
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
@@ -145,7 +148,9 @@ class Checker:
             if of.find:  # the check before ended with more samples than this one begins with
                 persistent_data.drop(scene)
             rendered = traced = 0.0
-            for number, part in enumerate(_rounds(of)):
+            taken, total = 0, TOTALS[0]
+            for number in itertools.count():
+                part = _round(of, number, total - taken)
                 begun = time.perf_counter() if number else started
                 self._render(stage, exported, part, tests, everything)
                 if not keep:  # the page has to be the same bytes each time
@@ -159,7 +164,8 @@ class Checker:
                 traced += comparison["seconds"]
                 if "undecided" not in comparison:
                     break
-                self._forecast(comparison["undecided"], TOTALS[number], part.samples or 0, time.perf_counter() - begun)
+                self._forecast(comparison["undecided"], total, total - taken, time.perf_counter() - begun)
+                taken, total = total, comparison["undecided"]["following"]
         for path in sorted(Path(written.sides).glob("*.npy")) if written and written.sides else ():
             displayed.write_png(scene, path)
         result = {"result": comparison["result"], "lines": comparison["lines"], "level": level}
@@ -187,13 +193,17 @@ class Checker:
 
         lighting = Lighting(exported.lamps, exported.world, exported.film, exported.bounces)
         has_more = exported.not_modeled and job.engine not in ("EEVEE", "WORKBENCH") and not job.recenter
+        has_more = has_more and not features.lacks_gas(stage.scene)
         stage.render(job, paths, lighting, rendering, keep=True, everything=everything if has_more else None)
 
     def _forecast(self, undecided: dict[str, Any], taken: int, latest: int, seconds: float) -> None:
         """Tell how much longer a search for a bias takes. taken : samples so far. latest, seconds : of the last round."""
         if self._events:
             left = seconds * (undecided["expected"] - taken) / latest
-            self._events.tell("forecast", samples=undecided["expected"], taken=taken, seconds=round(left, 1))
+            following = undecided["following"]
+            self._events.tell(
+                "forecast", samples=undecided["expected"], taken=taken, following=following, seconds=round(left, 1)
+            )
 
     def __enter__(self) -> "Checker":
         return self
@@ -202,14 +212,11 @@ class Checker:
         self._ends.close()
 
 
-def _rounds(job: Job) -> Iterator[Job]:
-    """The rounds that the search for a bias may take, each of other seeds; of any other job itself."""
+def _round(job: Job, number: int, samples: int) -> Job:
+    """A round of the search for a bias, of seeds of its own; of any other job itself. samples : of this round."""
     if job.find is None:
-        yield job
-        return
-    for number, total in enumerate(TOTALS):
-        samples = total - (TOTALS[number - 1] if number else 0)
-        yield dataclasses.replace(job, samples=samples, seed=((job.seed or 0) + number * seeds(LEVELS[-1], samples)) % 2**31)
+        return job
+    return dataclasses.replace(job, samples=samples, seed=((job.seed or 0) + number * seeds(LEVELS[-1], samples)) % 2**31)
 
 
 def _numbered(scene_path: str | None) -> tuple[str, ...]:

@@ -1,5 +1,8 @@
 """The labels of a shot: the scene goes to the tracer's process (jobs/tracing.py), which writes them.
 
+What objects are and where their joints are, custom properties say: `category` of an object, and `keypoint`, its name, of an
+empty below it, or below the armature that moves it.
+
 Flow goes to the frames before and after through the shot's own camera, as it stands in each of them: one of the file moves as
 it is animated, and the four values stand still. The scene is exported at those frames as well, and given back at the shot's.
 """
@@ -53,6 +56,7 @@ class ShotLabels:
             if the scene can't be exported, or the labels not be written.
         """
         calibration = job.calibration
+        annotations = _annotations(scene)
         with overridden() as overrides:
             frames = {"here": self._seen(scene, camera_object, pinhole, calibration)}
             if "flow" in kinds:
@@ -63,7 +67,7 @@ class ShotLabels:
                     still = pinhole if job.eye is not None else None
                     frames[name] = self._seen(scene, camera_object, still, calibration)
         lens = calibration.lens if calibration else None
-        return self._tracing.label(frames, picture, kinds, depth_steps, job.threads, lens)
+        return self._tracing.label(frames, picture, kinds, depth_steps, job.threads, lens, annotations)
 
     def _seen(
         self,
@@ -85,3 +89,26 @@ class ShotLabels:
 
     def __exit__(self, *_: object) -> None:
         self._ends.close()
+
+
+def _annotations(scene: bpy.types.Scene) -> dict[str, dict[str, Any]]:
+    """The category and the keypoints of each object that has some, by its name."""
+    graph = datablocks.depsgraph_of(scene)
+    result: dict[str, dict[str, Any]] = {
+        each.name: {"category": str(each["category"])} for each in bpy.data.objects if "category" in each
+    }
+    for empty in bpy.data.objects:
+        if empty.type != "EMPTY" or "keypoint" not in empty:
+            continue
+        owner = empty.parent
+        while owner is not None and owner.type == "EMPTY":
+            owner = owner.parent
+        if owner is None:
+            continue
+        owners = [owner] if owner.type != "ARMATURE" else [each for each in bpy.data.objects if each.find_armature() == owner]
+        place = empty.evaluated_get(graph).matrix_world.translation
+        for each in owners:
+            local = each.evaluated_get(graph).matrix_world.inverted_safe() @ place
+            name = str(empty["keypoint"]) or empty.name
+            result.setdefault(each.name, {}).setdefault("keypoints", {})[name] = [*local]
+    return result

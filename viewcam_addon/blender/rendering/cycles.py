@@ -148,6 +148,8 @@ def override_settings(
         override_all(overrides, scene.cycles, _LIGHT | _settings_of(light))
         passes = LIGHT_PASSES + (_PASSES_OF_CENTERS if light.samples == 1 else ())
     _override_passes(overrides, view_layer, passes)
+    if light and not light.bounces.parts_diffuse:
+        overrides.set(view_layer, SETTINGS["Diffuse Indirect"], False)
     if not everything:
         override_all(overrides, scene.cycles, _LIGHT_OF_SURFACES if light else {})
         override_all(overrides, view_layer, {"use_strand": False, "use_volumes": False})

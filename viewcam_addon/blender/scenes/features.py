@@ -93,8 +93,10 @@ def is_surface(placed: Placed, ledger: Ledger, shading: Shading | None) -> bool:
     elif evaluated.type == "LIGHT":
         if not shading:
             ledger.note(name, "exported", "a light, which leaves no mark in the passes of level geometry")
-    elif _holds_gas(real) and evaluated.data == real.data:
+    elif (modifier := _gas(real)) and evaluated.data == real.data:
         ledger.note(name, "skipped", _NO_SURFACE["VOLUME"])
+        if not modifier.show_render:  # Cycles reads its smoke all the same, and a modifier that is off has none: SIGSEGV
+            ledger.set_for_cycles(real.original, "hide_render", True, stands_in=False)
     else:
         return isinstance(evaluated.data, bpy.types.Mesh | bpy.types.PointCloud)
     return False
@@ -187,11 +189,17 @@ def note_hair(instance: bpy.types.DepsgraphObjectInstance, ledger: Ledger) -> No
         ledger.note(evaluated.original.name, "skipped", "particle hair is not modeled")
 
 
-def _holds_gas(real: bpy.types.Object) -> bool:
-    return any(
-        modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" and modifier.domain_settings.domain_type == "GAS"
-        for modifier in real.modifiers
-    )
+def lacks_gas(scene: bpy.types.Scene) -> bool:
+    """True if smoke is off that Blender may show: what was baked elsewhere, or is simulated as it plays (opening.py)."""
+    off = (modifier for each in scene.objects if (modifier := _gas(each)) and not modifier.show_render)
+    settings = [modifier.domain_settings for modifier in off]
+    return any(each.cache_type == "REPLAY" or each.has_cache_baked_any or each.is_cache_baking_any for each in settings)
+
+
+def _gas(real: bpy.types.Object) -> bpy.types.FluidModifier | None:
+    """The modifier by which an object holds smoke or fire, if any."""
+    domains = (each for each in real.modifiers if each.type == "FLUID" and each.fluid_type == "DOMAIN")
+    return next((each for each in domains if each.domain_settings.domain_type == "GAS"), None)
 
 
 def _layer_collections(top: bpy.types.LayerCollection) -> list[bpy.types.LayerCollection]:

@@ -35,4 +35,10 @@ def bounces_of(scene: bpy.types.Scene, ledger: Ledger) -> Bounces:
         return Bounces()
     if not all(getattr(cycles, name) for name in CAUSTICS):
         ledger.note(scene.name, "approximated", "caustics are on on both sides")
-    return Bounces(**{field: getattr(cycles, setting) for field, setting in BOUNCES.items()})
+    bounces = Bounces(**{field: getattr(cycles, setting) for field, setting in BOUNCES.items()})
+    if not bounces.parts_diffuse:
+        reason = (
+            "without diffuse bounces Cycles puts light of other closures into Diffuse Indirect, which level path leaves out"
+        )
+        ledger.note(scene.name, "exported", reason)
+    return bounces

@@ -76,7 +76,7 @@ typedef struct {
     int (*render_geometry)(const ViewcamScene*, uint32_t first_row, uint32_t end_row, float* const* planes, size_t stride, const volatile int* stop);
     /* The same, and of each pixel what `closest` tells of a ray as long as the camera's axis. */
     int (*render_hits)(const ViewcamScene*, uint32_t first_row, uint32_t end_row, float* const* planes, size_t stride, double* depth, uint32_t* objects, uint32_t* primitives, const volatile int* stop);
-    /* Whether anything is seen through the centres of a camera's pixels, whose axes need not have unit length: 0 or 1 each. */
+    /* Whether anything is seen through the centers of a camera's pixels, whose axes need not have unit length: 0 or 1 each. */
     int (*silhouette)(const ViewcamScene*, const ViewcamCamera*, uint8_t* covered);
     int (*surface_at)(const ViewcamScene*, size_t count, const double* columns, const double* rows, float* const* planes);
     /* Of each of some places in the picture all surfaces that lie up to `within` times the nearest one's depth beyond it, the

@@ -14,7 +14,7 @@ typedef struct {
     ViewcamColor color;
 } ViewcamInput;
 
-/* A factor of a closure's weight. rest: whether it is 1 less the colour's luminance. */
+/* A factor of a closure's weight. rest: whether it is 1 less the color's luminance. */
 typedef struct {
     ViewcamColor value;
     int32_t rest;

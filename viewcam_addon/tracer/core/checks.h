@@ -81,7 +81,7 @@ inline void texture(int width, int height, int channels, int texel, const void* 
     that(texel >= VIEWCAM_FLOAT && texel <= VIEWCAM_RGBE, "an image has pixels of no kind");
 }
 inline void color(const Scene& scene, const ViewcamColor& given) {
-    that(given.image < int64_t(scene.illumination.textures.size()), "a colour is that of an image that the scene does not have");
+    that(given.image < int64_t(scene.illumination.textures.size()), "a color is that of an image that the scene does not have");
 }
 inline void node(const Scene& scene, const ViewcamNode& given) {
     for (int i = 0; i < given.input_count; i++) color(scene, given.inputs[i].color);
@@ -95,7 +95,7 @@ inline void material(const Scene& scene, const ViewcamClosure* closures, int cou
 }
 inline void lamp(const ViewcamLamp& given) {
     that(all_within(given.matrix, 12, -LARGEST, LARGEST), "a lamp has a matrix with too large a number, or none");
-    that(all_finite(given.color, 3), "a lamp has a colour that is no number");
+    that(all_finite(given.color, 3), "a lamp has a color that is no number");
     for (int i = 0; i < given.kind.input_count; i++) {
         const ViewcamColor& input = given.kind.inputs[i].color;
         that(all_within(input.rgb, 3, 0, LARGEST) && input.node < 0, "a lamp has a size that is no number");

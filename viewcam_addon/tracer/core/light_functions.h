@@ -28,9 +28,10 @@ inline void add_node(Scene& scene, const ViewcamNode& given) {
 }
 inline WeightedClosure closure_of(const ViewcamClosure& given, const ValueNodes& nodes) {
     Inputs inputs = inputs_of(given.node, nodes);
-    WeightedClosure made{of_name<Closure>("closure", given.node.name, inputs), {}, nodes.need_tangents(inputs)};
+    WeightedClosure made{of_name<Closure>("closure", given.node.name, inputs), {}, !inputs.all_constant(), nodes.need_tangents(inputs)};
     for (int i = 0; i < given.factor_count; i++) {
         made.factors.push_back({color_of(given.factors[i].value, nodes), bool(given.factors[i].rest)});
+        made.varies |= made.factors.back().value.varies();
         made.on_tangents |= nodes.need_tangents(Inputs({{"", "", made.factors.back().value}}));
     }
     return made;
@@ -181,7 +182,7 @@ inline void bsdf(const ViewcamClosure& closure, int version, size_t count, const
         Interaction point;
         point.normal = point.shading = {0, 0, 1}, point.backside = given[6] != 0;
         Vec3 direction{given[3], given[4], given[5]};
-        BSDF bsdf = material.bsdf({point, {given[0], given[1], given[2]}, none, version});
+        BSDF bsdf = material.bsdf(ShadingPoint{point, {given[0], given[1], given[2]}, none, version});
         double pdf = 0;
         ScatteredLight light = bsdf.eval(direction, direction.z > 0 ? DIFFUSE | GLOSSY : TRANSMISSION, [&](RayKind, auto&& of_lobe) {
             pdf += of_lobe();
@@ -196,7 +197,7 @@ inline void bsdf(const ViewcamClosure& closure, int version, size_t count, const
     }
 }
 // What the last of some nodes makes on a floor, z up, whose UV is (u, v): given: (count, 6), the unit way that a path came along, u,
-// v, and whether the floor is met from behind. out: (count, 4), a colour or vector, and the number that it is.
+// v, and whether the floor is met from behind. out: (count, 4), a color or vector, and the number that it is.
 inline void nodes(const Scene& scene, size_t count, const double* given, double* out) {
     const Illumination& light = scene.illumination;
     if (light.nodes.all.empty()) throw std::invalid_argument("there is no node");

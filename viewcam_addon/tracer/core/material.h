@@ -16,7 +16,7 @@ struct MixFactor {
 struct WeightedClosure {
     Closure closure;
     std::vector<MixFactor> factors;
-    bool on_tangents = false;  // whether its inputs ask for the tangents of a UV map
+    bool varies = false, on_tangents = false;  // whether its inputs are not the same everywhere, and ask for the tangents of a UV map
 };
 
 struct Material {
@@ -35,12 +35,9 @@ struct Material {
     bool is_transparent() const { return transparent_; }
     // Whether it has normals of its own.
     bool is_bumped() const { return bumped_; }
-    // The colour of what is nothing but Lambert's reflection of one colour, else black.
-    Vec3 matte_color() const {
-        auto diffuse = closures.size() == 1 ? std::get_if<DiffuseClosure>(&closures[0].closure) : nullptr;
-        bool is_matte = diffuse && closures[0].factors.empty() && !bumped_ && !VIEWCAM_ISA::is_bumped(normal) && !diffuse->color.varies() && diffuse->roughness.is_black();
-        return is_matte ? diffuse->color.rgb : Vec3{};
-    }
+    // Whether the BSDFs of four points can be made at once, and whether the points' own values are needed for that.
+    bool is_wide() const { return wide_ && scatters() && !emits() && !transparent_ && !VIEWCAM_ISA::is_bumped(normal); }
+    bool varies() const { return bumped_ || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.varies; }); }
     // Whether it asks for the tangents of a UV map.
     bool needs_tangents() const {
         return normal_on_tangents || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.on_tangents; });
@@ -61,6 +58,7 @@ struct Material {
                         if (closure.is_rough()) rough_kinds_ |= kinds & ~DIFFUSE;
                     if constexpr (requires { closure.normal; }) bumped_ |= VIEWCAM_ISA::is_bumped(closure.normal);
                     if constexpr (requires { closure.coat_normal; }) bumped_ |= VIEWCAM_ISA::is_bumped(closure.coat_normal);
+                    if constexpr (requires { closure.is_wide(); }) wide_ &= closure.is_wide(); else wide_ = false;
                     if constexpr (requires { closure.lets_through(); }) transparent_ |= closure.lets_through();
                     if constexpr (requires { closure.mean_emission(textures); }) {
                         mean_emission_ += closure.mean_emission(textures) * mean_weight(one, textures);
@@ -70,10 +68,12 @@ struct Material {
                 one.closure);
     }
 
-    BSDF bsdf(const ShadingPoint& at) const {
-        BSDF bsdf;
+    template <class At> BSDFAt<At> bsdf(const At& at) const {
+        BSDFAt<At> bsdf;
         // What is no plain diffuse surface has its smooth normals bent, too (specular_normal).
-        if (bumped_ || (kinds_ != DIFFUSE && !is_black(at.point.shading - at.point.normal))) bsdf.bump({at.point.shading, at.version >= CYCLES_4_3, at.version >= CYCLES_5_0});
+        Mask<NumberOf<At>> bent = VIEWCAM_ISA::is_black(at.point.shading - at.point.normal) == Mask<NumberOf<At>>{};
+        if (bumped_) bent = bent == bent;
+        if (bumped_ || (kinds_ != DIFFUSE && any(bent))) bsdf.bump(bent, {at.point.shading, at.version >= CYCLES_4_3, at.version >= CYCLES_5_0});
         for (const WeightedClosure& one : closures) add(one, at, bsdf);
         return bsdf;
     }
@@ -89,13 +89,14 @@ struct Material {
     }
 
    private:
-    static void add(const WeightedClosure& one, const ShadingPoint& at, BSDF& bsdf) {
-        Vec3 weight{1, 1, 1};
+    template <class At> static void add(const WeightedClosure& one, const At& at, BSDFAt<At>& bsdf) {
+        NumberOf<At> weight = splat<NumberOf<At>>(1);
         for (const MixFactor& factor : one.factors) {
-            double value = unit_range(at.number(factor.value));
-            weight *= factor.rest ? 1 - value : value;
+            NumberOf<At> value = unit_range(at.number(factor.value));
+            weight *= factor.rest ? 1.0 - value : value;
         }
-        if (weight.x > 0) std::visit([&](const auto& closure) { closure.add_to(bsdf, at, weight); }, one.closure);
+        if (!any(weight > 0.0)) return;
+        std::visit([&](const auto& closure) { if constexpr (requires { closure.add_to(bsdf, at, gray(weight)); }) closure.add_to(bsdf, at, gray(weight)); }, one.closure);
     }
     // The mean over images, and above 0 where these may be.
     static double mean_weight(const WeightedClosure& one, const std::vector<Texture>& textures) {
@@ -110,7 +111,7 @@ struct Material {
 
     uint32_t kinds_ = 0, rough_kinds_ = 0;
     Vec3 mean_emission_;
-    bool shines_evenly_ = true, transparent_ = false, bumped_ = false;
+    bool shines_evenly_ = true, transparent_ = false, bumped_ = false, wide_ = true;
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

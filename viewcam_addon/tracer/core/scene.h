@@ -132,12 +132,13 @@ class Scene {
             if (some == 4) finish_triangles();
         }
         if (some) finish_triangles();
-        for (int i = 0; i < count; i++) {
-            found[i].slot = objects[hits[i].object].first_slot + found[i].material;
-            found[i].material = slots[found[i].slot].material;
-            found[i].object = hits[i].object;
-            found[i].primitive = hits[i].primitive;
-        }
+        for (int i = 0; i < count; i++) name(found[i], hits[i].object, hits[i].primitive);
+    }
+    // The surfaces of four triangles, of which not all may be others.
+    void interactions(const TriangleSurfaces& surfaces, const TriangleHit (&hits)[4], Interaction (&found)[4]) const {
+        Interaction* const to[] = {&found[0], &found[1], &found[2], &found[3]};
+        surfaces.interactions(to);
+        for (int i = 0; i < 4; i++) name(found[i], uint32_t(hits[i].object - objects.data()), hits[i].triangle);
     }
     Interaction interaction(const Ray& ray, const Hit& hit) const {
         const Ray* one = &ray;
@@ -200,6 +201,14 @@ class Scene {
     }
 
    private:
+    // Tells an interaction whose it is, once it has the number of its material in the object.
+    void name(Interaction& found, uint32_t object, uint32_t primitive) const {
+        found.slot = objects[object].first_slot + found.material;
+        found.material = slots[found.slot].material;
+        found.object = object;
+        found.primitive = primitive;
+    }
+
     struct Merged {
         uint32_t visible;
         TriangleBvh triangles;
@@ -275,9 +284,9 @@ class Scene {
         const Bvh& bvh = spheres ? spheres->bvh : triangles_[object.geometry].bvh;
         Bounds box;
         if (bvh.root == NOTHING || object.flat) return box;
-        Vec3 half = bvh.half / bvh.scale, reach = abs(bvh.centre) + half;
+        Vec3 half = bvh.half / bvh.scale, reach = abs(bvh.center) + half;
         double rounding = 16 * DOUBLE_ROUNDING * (object.stretched(max_component(reach)) + max_component(abs(object.to_world.translation())));
-        Vec3 middle = object.to_world.point(bvh.centre), size;
+        Vec3 middle = object.to_world.point(bvh.center), size;
         for (int row = 0; row < 3; row++) {
             const double* m = object.to_world.m[row];
             double sum = std::fabs(m[0]) * half.x + std::fabs(m[1]) * half.y + std::fabs(m[2]) * half.z + rounding;
@@ -402,7 +411,7 @@ inline Vec3 tangent_within(const ShadingPoint& at, Vec3 direction) {
     return cross(normal, safe::normalized(cross(at.to_world_normal(direction), normal)));
 }
 inline Vec3 ShadingPoint::tangent_round(int axis) const {
-    Vec3 out = generated() - grey(0.5);
+    Vec3 out = generated() - gray(0.5);
     return tangent_within(*this, axis == 0 ? Vec3{0, -out.z, out.y} : axis == 1 ? Vec3{-out.z, 0, out.x} : Vec3{-out.y, out.x, 0});
 }
 inline Vec3 ShadingPoint::tangent_along(const std::string& uv) const {

@@ -1,8 +1,8 @@
-// What colours surfaces have: constants, images and the mesh's own colours.
+// What colors surfaces have: constants, images and the mesh's own colors.
 //
-// As in Cycles (measured with 4.2, 5.0 and 5.2): of n pixels, that of number i has its centre at (i + ½)/n of UV; where images repeat,
+// As in Cycles (measured with 4.2, 5.0 and 5.2): of n pixels, that of number i has its center at (i + ½)/n of UV; where images repeat,
 // pixels at their border are blended with those on the other side; sRGB is decoded after blending, which makes blends of
-// light and dark darker than half-way. Cycles has UV in float32: at 64 pixels, its colours are off by up to 2e-5 of the contrast.
+// light and dark darker than half-way. Cycles has UV in float32: at 64 pixels, its colors are off by up to 2e-5 of the contrast.
 //
 // Rejected: decoding images when they are loaded (not what Cycles does, and up to twelve times the memory), and mip maps, which it
 // has not; floats rounded to eight bytes a pixel (docs/light.md).
@@ -28,7 +28,7 @@ inline Vec2 mirror_ball(Vec3 direction) {
     return size > 0 ? Vec2{(half.x / size + 1) / 2, (half.z / size + 1) / 2} : Vec2{0.5, 0.5};
 }
 
-// How an image is looked up. straight: whether colours are divided by the alpha that they were multiplied by.
+// How an image is looked up. straight: whether colors are divided by the alpha that they were multiplied by.
 struct Lookup {
     enum Interpolation { LINEAR, CLOSEST, CUBIC } interpolation = LINEAR;
     enum Extension { REPEAT, EXTEND, CLIP, MIRROR } extension = REPEAT;
@@ -36,7 +36,7 @@ struct Lookup {
 };
 
 // What a pixel's numbers are: floats, half floats, or whole numbers that are shares of the largest of their kind, rounded as Blender
-// and Cycles round them. RGBE: a byte for each colour and one for their exponent (Ward, Real Pixels, Graphics Gems II, 1991).
+// and Cycles round them. RGBE: a byte for each color and one for their exponent (Ward, Real Pixels, Graphics Gems II, 1991).
 enum class Texel { FLOAT, HALF, BYTE, SHORT, RGBE };
 
 // The number of a finite half float.
@@ -47,7 +47,7 @@ inline float half_float(uint16_t bits) {
 }
 
 // An image laid out over UV (0, 0) to (1, 1). pixels: somebody else's, as they are encoded, rows from the bottom, RGB or, with that
-// many channels, RGBA. Colours that are encoded are multiplied by their alpha in whole bytes, before they are blended.
+// many channels, RGBA. Colors that are encoded are multiplied by their alpha in whole bytes, before they are blended.
 struct Texture {
     int width, height;
     bool srgb;
@@ -55,7 +55,7 @@ struct Texture {
     int channels = 3;
     Texel texel = Texel::FLOAT;
 
-    // The linear colour at UV; that at 0 where UV is not finite. closest: of the nearest pixel instead of between four.
+    // The linear color at UV; that at 0 where UV is not finite. closest: of the nearest pixel instead of between four.
     Vec3 at(Vec2 uv, bool closest) const { return at(uv, Lookup{closest ? Lookup::CLOSEST : Lookup::LINEAR}); }
     Vec3 at(Vec2 uv, Lookup lookup) const {
         Vec3 rgb = blend<Vec3>(uv, lookup, [&](int column, int row) { return pixel(place(column, row)); });
@@ -114,7 +114,7 @@ struct Texture {
             return {times(rgb.x), times(rgb.y), times(rgb.z)};
         });
     }
-    // The byte of a colour's channel, multiplied by its alpha.
+    // The byte of a color's channel, multiplied by its alpha.
     size_t byte(size_t first, size_t channel) const {
         auto bytes = static_cast<const uint8_t*>(pixels) + first;
         return channels == 4 ? bytes[channel] * bytes[3] / 255u : bytes[channel];
@@ -183,7 +183,7 @@ struct Texture {
         }();
         return LINEAR;
     }
-    // The linear colour of what is often made of bytes: looked up, which takes an eighth of the time.
+    // The linear color of what is often made of bytes: looked up, which takes an eighth of the time.
     static Vec3 decoded_bytes(Vec3 rgb) {
         const std::array<double, 256>& light = linear_bytes();
         auto of = [&](double encoded) {
@@ -197,7 +197,7 @@ struct Texture {
     static double linear(double encoded) { return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4); }
 };
 
-// A colour, the same everywhere or times what an image or the mesh's own colours say; or what a node makes (nodes/value_node.h),
+// A color, the same everywhere or times what an image or the mesh's own colors say; or what a node makes (nodes/value_node.h),
 // the rest then being white. image: in the scene's textures, or NONE. node: likewise, in its nodes.
 struct Color {
     Vec3 rgb;
@@ -213,7 +213,7 @@ struct Color {
         if (vertex) color *= point.vertex_color;
         return color;
     }
-    // Over its image, as if vertex colours and what a node makes were white.
+    // Over its image, as if vertex colors and what a node makes were white.
     Vec3 mean(const std::vector<Texture>& textures) const { return image == NONE ? rgb : rgb * textures[image].mean(); }
 };
 

@@ -87,6 +87,13 @@ class Bounces:
         values.check(self, "the bounces")
 
     @property
+    def parts_diffuse(self) -> bool:
+        """True if Cycles' Diffuse Indirect is what diffuse surfaces have scattered. Where these may not scatter and others may,
+        it is what a ray of a glossy lobe carries of the diffuse one beside it (docs/light.md): Combined alone is right there.
+        """
+        return self.diffuse > 0 or self.total == 0
+
+    @property
     def none(self) -> "Bounces":
         """The bounces of level direct: light comes straight, if through what is transparent."""
         return Bounces(0, 0, 0, 0, self.transparent)

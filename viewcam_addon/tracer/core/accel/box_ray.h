@@ -59,8 +59,8 @@ inline bool enter(const Bvh& bvh, const Ray& ray, double t_max, double origin_er
     double inverse = 1 / longest;
     double4 unit = direction * splat4(inverse), reciprocal = splat4(longest) * (splat4(1.0) / direction);
     reciprocal = copysign(min(abs(reciprocal), splat4(1e200)), unit);
-    double4 centre = load<double4>(&bvh.centre.x), half = load<double4>(&bvh.half.x), scale = splat4(bvh.scale);
-    double4 from = (origin - centre) * scale;
+    double4 center = load<double4>(&bvh.center.x), half = load<double4>(&bvh.half.x), scale = splat4(bvh.scale);
+    double4 from = (origin - center) * scale;
     double4 edge = half * splat4(1 + 1e-9) + splat4(4e-16) * abs(from) + splat4(origin_error * bvh.scale + 1e-300);
     double4 one = (-edge - from) * reciprocal, other = (edge - from) * reciprocal, first = min(one, other), last = max(one, other);
     first -= abs(first) * splat4(4e-15);

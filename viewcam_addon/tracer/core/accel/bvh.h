@@ -1,10 +1,10 @@
 // A hierarchy of boxes, eight to a node, over anything that has a box: built by the surface area heuristic, the same for any
 // number of threads.
 //
-// Boxes are float32 in units of the hierarchy's own size, about its own centre, rounded outward: neither a scene's scale nor its
+// Boxes are float32 in units of the hierarchy's own size, about its own center, rounded outward: neither a scene's scale nor its
 // place costs a digit. What a ray does not hit is left out without a doubt, since box_ray.h rounds to the other side as well.
 //
-// Rejected: quantised boxes (half the memory of the nodes, which are a quarter of all, for a tenth of the speed), spatial splits
+// Rejected: quantized boxes (half the memory of the nodes, which are a quarter of all, for a tenth of the speed), spatial splits
 // (a third faster on long thin triangles, twice the memory), and a refit where things move (nothing moves here but the camera).
 #pragma once
 #include <cmath>
@@ -48,8 +48,8 @@ struct Bvh {
     uint32_t root = NOTHING;
     uint32_t leaf_size = 1;
     Array<uint32_t> leaves;  // leaf_size primitives each, NOTHING where there are fewer
-    // Boxes hold (p − centre) · scale, scale a power of two, within ±half, which is below 1.
-    Vec3 centre, half;
+    // Boxes hold (p − center) · scale, scale a power of two, within ±half, which is below 1.
+    Vec3 center, half;
     double scale = 1;
 
     size_t leaf_count() const { return leaves.size() / leaf_size; }
@@ -104,38 +104,33 @@ class Builder {
     // Below this the surface area heuristic ends and halves are split, so that no path is longer than Bvh::MAX_DEPTH.
     static constexpr int DEEP = 60;
 
+    // Boxes and numbers of what has its center in each of a node's bins, along all axes.
     struct Bins {
-        float4 low[3][BINS], high[3][BINS];
-        uint32_t count[3][BINS];
+        float4 low[BINS][3], high[BINS][3];
+        uint4 count[BINS];
 
         void clear() {
-            for (int axis = 0; axis < 3; axis++)
-                for (int bin = 0; bin < BINS; bin++) {
-                    low[axis][bin] = EMPTY_LOW;
-                    high[axis][bin] = EMPTY_HIGH;
-                    count[axis][bin] = 0;
-                }
+            for (int bin = 0; bin < BINS; bin++) {
+                for (int axis = 0; axis < 3; axis++) low[bin][axis] = EMPTY_LOW, high[bin][axis] = EMPTY_HIGH;
+                count[bin] = uint4{};
+            }
         }
         void add(const Bins& other) {
-            for (int axis = 0; axis < 3; axis++)
-                for (int bin = 0; bin < BINS; bin++) {
-                    low[axis][bin] = min(low[axis][bin], other.low[axis][bin]);
-                    high[axis][bin] = max(high[axis][bin], other.high[axis][bin]);
-                    count[axis][bin] += other.count[axis][bin];
+            for (int bin = 0; bin < BINS; bin++) {
+                for (int axis = 0; axis < 3; axis++) {
+                    low[bin][axis] = min(low[bin][axis], other.low[bin][axis]);
+                    high[bin][axis] = max(high[bin][axis], other.high[bin][axis]);
                 }
+                count[bin] += other.count[bin];
+            }
         }
     };
-    struct Extent {  // of boxes, and of their doubled centres
-        float4 low = EMPTY_LOW, high = EMPTY_HIGH, centre_low = EMPTY_LOW, centre_high = EMPTY_HIGH;
+    struct Extent {  // of boxes, and of their doubled centers
+        float4 low = EMPTY_LOW, high = EMPTY_HIGH, center_low = EMPTY_LOW, center_high = EMPTY_HIGH;
     };
     struct Place {
         int axis = -1, bin = 0;
     };
-
-    static int bin_of(float doubled_centre, float low, float factor) {
-        int bin = int((doubled_centre - low) * factor);
-        return bin < 0 ? 0 : bin >= BINS ? BINS - 1 : bin;
-    }
 
     void split(uint32_t me, size_t begin, size_t end, int depth) {
         BinaryNode& node = nodes[me];
@@ -147,11 +142,11 @@ class Builder {
         parallel_for(parts, size_t(parts), [&](size_t i) {
             Extent e;
             for (size_t k = part(int(i)); k < part(int(i) + 1); k++) {
-                float4 low = references[k].low, high = references[k].high, centre = low + high;
+                float4 low = references[k].low, high = references[k].high, center = low + high;
                 e.low = min(e.low, low);
                 e.high = max(e.high, high);
-                e.centre_low = min(e.centre_low, centre);
-                e.centre_high = max(e.centre_high, centre);
+                e.center_low = min(e.center_low, center);
+                e.center_high = max(e.center_high, center);
             }
             extents[i] = e;
         });
@@ -159,8 +154,8 @@ class Builder {
         for (int i = 1; i < parts; i++) {
             all.low = min(all.low, extents[i].low);
             all.high = max(all.high, extents[i].high);
-            all.centre_low = min(all.centre_low, extents[i].centre_low);
-            all.centre_high = max(all.centre_high, extents[i].centre_high);
+            all.center_low = min(all.center_low, extents[i].center_low);
+            all.center_high = max(all.center_high, extents[i].center_high);
         }
         node.low = all.low;
         node.high = all.high;
@@ -172,9 +167,9 @@ class Builder {
         }
 
         size_t middle = begin + count / 2;
-        float4 size = all.centre_high - all.centre_low, factor{};
+        float4 size = all.center_high - all.center_low, factor{};
         for (int axis = 0; axis < 3; axis++) {
-            float f = float(BINS) * (1 - 1e-6f) / size[axis];
+            float f = float(BINS) * (1 - 1e-6f) / size[axis];  // times a part of it less than BINS, however that is rounded
             factor[axis] = size[axis] > 0 && f < FAR ? f : 0;
         }
         if (depth < DEEP && (factor[0] > 0 || factor[1] > 0 || factor[2] > 0)) {
@@ -185,20 +180,20 @@ class Builder {
                 Bins& mine = bins[i];
                 mine.clear();
                 for (size_t k = part(int(i)); k < part(int(i) + 1); k++) {
-                    float4 low = references[k].low, high = references[k].high, centre = low + high;
+                    float4 low = references[k].low, high = references[k].high;
+                    int4 bin = __builtin_convertvector((low + high - all.center_low) * factor, int4);
                     for (int axis = 0; axis < 3; axis++) {
-                        int bin = bin_of(centre[axis], all.centre_low[axis], factor[axis]);
-                        mine.low[axis][bin] = min(mine.low[axis][bin], low);
-                        mine.high[axis][bin] = max(mine.high[axis][bin], high);
-                        mine.count[axis][bin]++;
+                        mine.low[bin[axis]][axis] = min(mine.low[bin[axis]][axis], low);
+                        mine.high[bin[axis]][axis] = max(mine.high[bin[axis]][axis], high);
+                        mine.count[bin[axis]][axis] += 1;
                     }
                 }
             });
             for (int i = 1; i < parts; i++) bins[0].add(bins[i]);
-            Place best = cheapest(bins[0], factor);
+            Place best = cheapest(bins[0]);
             if (best.axis >= 0) {
-                float low = all.centre_low[best.axis], f = factor[best.axis];
-                auto is_left = [&](const Reference& r) { return bin_of(r.low[best.axis] + r.high[best.axis], low, f) < best.bin; };
+                float low = all.center_low[best.axis], f = factor[best.axis], first_right = float(best.bin);
+                auto is_left = [&](const Reference& r) { return (r.low[best.axis] + r.high[best.axis] - low) * f < first_right; };
                 middle = size_t(std::partition(&references[begin], &references[begin] + count, is_left) - references.begin());
                 if (middle == begin || middle == end) middle = begin + count / 2;
             }
@@ -219,37 +214,36 @@ class Builder {
         split(children + 1, middle, end, depth + 1);
     }
 
-    // Where both sides' areas, each times its leaves, are least.
-    Place cheapest(const Bins& bins, float4 factor) const {
-        Place best;
-        float least = FAR;
-        auto leaves = [&](uint32_t count) { return float((count + leaf_size_ - 1) / leaf_size_); };
-        for (int axis = 0; axis < 3; axis++) {
-            if (!(factor[axis] > 0)) continue;
-            float right_area[BINS];
-            uint32_t right_count[BINS], count = 0;
-            float4 low = EMPTY_LOW, high = EMPTY_HIGH;
-            for (int bin = BINS - 1; bin > 0; bin--) {
-                low = min(low, bins.low[axis][bin]);
-                high = max(high, bins.high[axis][bin]);
-                count += bins.count[axis][bin];
-                right_area[bin] = count ? half_area(low, high) : 0;
-                right_count[bin] = count;
+    // Where both sides' areas, each times its leaves, are least; all axes at a time.
+    Place cheapest(const Bins& bins) const {
+        float4 right_area[BINS];
+        uint4 right_count[BINS], count{};
+        float4 low[3] = {EMPTY_LOW, EMPTY_LOW, EMPTY_LOW}, high[3] = {EMPTY_HIGH, EMPTY_HIGH, EMPTY_HIGH};
+        auto add = [&](int bin) {
+            float4 area{};
+            for (int axis = 0; axis < 3; axis++) {
+                low[axis] = min(low[axis], bins.low[bin][axis]);
+                high[axis] = max(high[axis], bins.high[bin][axis]);
+                area[axis] = half_area(low[axis], high[axis]);
             }
-            low = EMPTY_LOW, high = EMPTY_HIGH, count = 0;
-            for (int bin = 1; bin < BINS; bin++) {
-                low = min(low, bins.low[axis][bin - 1]);
-                high = max(high, bins.high[axis][bin - 1]);
-                count += bins.count[axis][bin - 1];
-                if (!count || !right_count[bin]) continue;
-                float cost = half_area(low, high) * leaves(count) + right_area[bin] * leaves(right_count[bin]);
-                if (cost < least) {
-                    least = cost;
-                    best = {axis, bin};
-                }
-            }
+            count += bins.count[bin];
+            return area;
+        };
+        auto leaves = [&](uint4 count) { return __builtin_convertvector(int4((count + splat4(leaf_size_ - 1)) >> splat4(leaf_shift_)), float4); };
+        for (int bin = BINS - 1; bin > 0; bin--) right_area[bin] = add(bin), right_count[bin] = count;
+        std::fill(low, low + 3, EMPTY_LOW), std::fill(high, high + 3, EMPTY_HIGH), count = uint4{};
+        float4 least = {FAR, FAR, FAR, FAR};
+        int4 best{};
+        for (int bin = 1; bin < BINS; bin++) {
+            float4 cost = add(bin - 1) * leaves(count) + right_area[bin] * leaves(right_count[bin]);
+            int4 better = int4(count != uint4{}) & int4(right_count[bin] != uint4{}) & int4(cost < least);
+            least = better ? cost : least;
+            best = better ? int4{bin, bin, bin, bin} : best;
         }
-        return best;
+        Place place;
+        for (int axis = 0; axis < 3; axis++)
+            if (least[axis] < (place.axis < 0 ? FAR : least[place.axis])) place = {axis, best[axis]};
+        return place;
     }
 
     bool take_thread() {
@@ -258,7 +252,8 @@ class Builder {
         return spare > 0;
     }
 
-    uint32_t leaf_size_;
+    uint32_t leaf_size_;  // a power of two
+    uint32_t leaf_shift_ = uint32_t(std::countr_zero(leaf_size_));
     std::atomic<int> spare_;
 };
 
@@ -351,8 +346,8 @@ template <class BoxOf> Bvh build_bvh(size_t count, const BoxOf& box_of, uint32_t
     }
     if (!solid) return bvh;
 
-    bvh.centre = extent.low * 0.5 + extent.high * 0.5;
-    Vec3 up = extent.high - bvh.centre, down = bvh.centre - extent.low;
+    bvh.center = extent.low * 0.5 + extent.high * 0.5;
+    Vec3 up = extent.high - bvh.center, down = bvh.center - extent.low;
     bvh.half = {max(up.x, down.x), max(up.y, down.y), max(up.z, down.z)};
     double largest = max_component(bvh.half);
     if (largest > 0) bvh.scale = std::ldexp(1.0, -std::max(std::ilogb(largest), -1000) - 2);
@@ -367,8 +362,8 @@ template <class BoxOf> Bvh build_bvh(size_t count, const BoxOf& box_of, uint32_t
             build::Reference& reference = builder.references[to++];
             for (int axis = 0; axis < 3; axis++) {
                 // One float beyond the rounded value covers the rounding of the difference as well as that to float.
-                float low = float((box.low[axis] - bvh.centre[axis]) * bvh.scale);
-                float high = float((box.high[axis] - bvh.centre[axis]) * bvh.scale);
+                float low = float((box.low[axis] - bvh.center[axis]) * bvh.scale);
+                float high = float((box.high[axis] - bvh.center[axis]) * bvh.scale);
                 reference.low[axis] = std::nextafterf(low, -build::FAR);
                 reference.high[axis] = std::nextafterf(high, build::FAR);
             }

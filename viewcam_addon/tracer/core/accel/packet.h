@@ -128,7 +128,7 @@ inline void enter(const Bvh& bvh, const Rays& rays, const Hits& nearest, int cou
         for (int axis = 0; axis < 3; axis++) {
             unit[axis] = d[axis] * inverse;
             reciprocal[axis] = copysign(min(abs(longest * reciprocal[axis]), splat4(1e200)), unit[axis]);
-            from[axis] = (origin[axis] - splat4(bvh.centre[axis])) * splat4(bvh.scale);
+            from[axis] = (origin[axis] - splat4(bvh.center[axis])) * splat4(bvh.scale);
             double4 edge = splat4(bvh.half[axis] * (1 + 1e-9) + 1e-300) + splat4(4e-16) * abs(from[axis]);
             double4 one = (-edge - from[axis]) * reciprocal[axis], other = (edge - from[axis]) * reciprocal[axis];
             double4 first = min(one, other), last = max(one, other);

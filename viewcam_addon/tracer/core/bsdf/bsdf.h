@@ -1,11 +1,12 @@
 // What closures become at a point of a surface: the BSDF, a sum of lobes, what it gives off and what it lets straight through.
 //
-// A path takes one lobe only, chosen in proportion to the lobes' colours, and its weight is divided by that share: where there
+// A path takes one lobe only, chosen in proportion to the lobes' colors, and its weight is divided by that share: where there
 // is one lobe, it is taken and nothing is random. Glass is two lobes, shared out by Fresnel's equations.
 #pragma once
 #include <concepts>
 #include <cstddef>
 #include <new>
+#include <optional>
 #include <variant>
 
 #include "dielectric.h"
@@ -19,10 +20,15 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-// One line a kind of lobe. Each has a colour (the most that it sends on), KIND (by which objects and lights hide and by which
+// One line a kind of lobe. Each has a color (the most that it sends on), KIND (by which objects and lights hide and by which
 // bounces are counted), DELTA (whether its direction is no matter of chance), IS_DIFFUSE (whether passes count it so), eval, pdf
-// and sample; `importance` where what it scatters is not its colour.
-using Lobe = std::variant<Lambert, SpecularReflection, SpecularTransmission, OrenNayar, Translucent, MicrofacetReflection, MicrofacetTransmission, SheenLobe, VelvetLobe>;
+// and sample; `importance` where what it scatters is not its color. Those of four points at once are templates.
+template <class T> struct LobeOf {
+    using Kinds = std::variant<LambertOf<T>, OrenNayarOf<T>, SpecularReflectionOf<T>, MicrofacetReflectionOf<T>>;
+};
+template <> struct LobeOf<double> {
+    using Kinds = std::variant<Lambert, SpecularReflection, SpecularTransmission, OrenNayar, Translucent, MicrofacetReflection, MicrofacetTransmission, SheenLobe, VelvetLobe>;
+};
 template <class Kind>
 concept IsLobe = requires(const Kind& lobe, Vec3 to_light, Vec2 u) {
     { Kind::KIND } -> std::convertible_to<RayKind>;
@@ -36,29 +42,32 @@ concept IsLobe = requires(const Kind& lobe, Vec3 to_light, Vec2 u) {
 };
 template <class Kinds> constexpr bool ALL_ARE_LOBES = false;
 template <class... Kinds> constexpr bool ALL_ARE_LOBES<std::variant<Kinds...>> = (IsLobe<Kinds> && ...);
-static_assert(ALL_ARE_LOBES<Lobe>);
+static_assert(ALL_ARE_LOBES<LobeOf<double>::Kinds>);
 
 // Light that lobes send on, by the passes that count it.
-struct ScatteredLight {
-    Vec3 diffuse, other;
+template <class T> struct ScatteredLightOf {
+    Vec3Of<T> diffuse, other;
 };
 
-class BSDF {
+// At one point, or at four of one material: there a lobe has lanes, which are those of its points where it scatters anything.
+template <class T> class BSDFOf {
    public:
     static constexpr int MOST_LOBES = 64;
+    using Lobe = typename LobeOf<T>::Kinds;
 
     // Black lobes are left out.
     template <class Kind> void add(const Kind& lobe) {
-        double share = importance(lobe);
-        if (!(share > 0) || count_ == MOST_LOBES) return;
+        T share = importance(lobe);
+        Mask<T> lanes(share > 0.0);
+        if (!any(lanes) || count_ == MOST_LOBES) return;
         new (&storage_[count_]) Lobe(lobe);
-        shares_[count_++] = share, total_ += share;
-        kinds_ |= Kind::KIND;
-        if (!Kind::DELTA) spread_ |= Kind::KIND;
+        lanes_[count_] = lanes, shares_[count_] = select(lanes, share, T{}), total_ += shares_[count_], count_++;
+        kinds_ |= where(lanes, Kind::KIND);
+        if (!Kind::DELTA) spread_ |= where(lanes, Kind::KIND);
     }
     void emit(Vec3 radiance) { emission_ += radiance; }
     // Its lobes have bumped normals, and light ends on them so.
-    void bump(const ShadowTerminator& terminator) { bumped_ = true, terminator_ = terminator; }
+    void bump(Mask<T> bumped, const ShadowTerminatorOf<T>& terminator) { bumped_ = bumped, terminator_ = terminator; }
     void let_through(Vec3 transparency) { transparency_ += transparency; }
 
     bool is_black() const { return count_ == 0; }
@@ -70,75 +79,87 @@ class BSDF {
         return through > 0 ? through / (through + total_) : 0;
     }
     // Makes `sample` choose lobes of a kind so much less often.
-    void thin(RayKind kind, double factor) {
-        total_ = 0;
-        for (int i = 0; i < count_; i++) total_ += shares_[i] *= std::visit([&](const auto& lobe) { return lobe.KIND == kind ? factor : 1; }, lobe(i));
+    void thin(RayKind kind, T factor) {
+        total_ = T{};
+        for (int i = 0; i < count_; i++) total_ += shares_[i] *= std::visit([&](const auto& lobe) { return lobe.KIND == kind ? factor : splat<T>(1); }, lobe(i));
     }
     // The kinds of rays that light from any one direction is scattered into all over: what lights can be sampled for.
-    uint32_t spread_kinds() const { return spread_; }
+    Flags<T> spread_kinds() const { return spread_; }
     // The albedo of what is diffuse, which a pass of its own shows.
-    Vec3 diffuse_color() const {
-        Vec3 sum;
+    Vec3Of<T> diffuse_color() const {
+        Vec3Of<T> sum;
         for (int i = 0; i < count_; i++)
-            std::visit([&](const auto& lobe) { if (lobe.IS_DIFFUSE) sum += lobe.color; }, lobe(i));
+            std::visit([&](const auto& lobe) { if (lobe.IS_DIFFUSE) sum = sum + select(lanes_[i], lobe.color, Vec3Of<T>{}); }, lobe(i));
         return sum;
     }
 
     // What of light from a unit direction is sent on to where the path came from, cosine included, by lobes of some kinds.
     // weight(kind, pdf): what of it counts, by the density with which `sample` chooses that lobe and this direction.
-    template <class Weight> ScatteredLight eval(Vec3 to_light, uint32_t kinds, Weight&& weight) const {
-        ScatteredLight sum;
+    template <class Weight> ScatteredLightOf<T> eval(Vec3Of<T> to_light, Flags<T> kinds, Weight&& weight) const {
+        ScatteredLightOf<T> sum;
         for (int i = 0; i < count_; i++)
             std::visit(
                 [&](const auto& lobe) {
-                    if (lobe.DELTA || !(lobe.KIND & kinds)) return;
-                    Vec3 light = lobe.eval(to_light);
-                    if (bumped_) light *= terminator_.left(normal_of(lobe), lobe.IS_DIFFUSE, to_light);
-                    if (viewcam::VIEWCAM_ISA::is_black(light)) return;
-                    (lobe.IS_DIFFUSE ? sum.diffuse : sum.other) += light * weight(lobe.KIND, [&] { return share(i) * lobe.pdf(to_light); });
+                    if (lobe.DELTA) return;
+                    Mask<T> lanes = lanes_[i] & has(kinds, lobe.KIND);
+                    if (!any(lanes)) return;
+                    Vec3Of<T> light = lobe.eval(to_light);
+                    if (any(bumped_)) light = light * select(bumped_, terminator_.left(normal_of(lobe), lobe.IS_DIFFUSE, to_light), splat<T>(1));
+                    lanes = lanes & (viewcam::VIEWCAM_ISA::is_black(light) == Mask<T>{});
+                    if (!any(lanes)) return;
+                    Vec3Of<T>& to = lobe.IS_DIFFUSE ? sum.diffuse : sum.other;
+                    to = to + select(lanes, light * weight(lobe.KIND, [&]() -> T { return share(i) * lobe.pdf(to_light); }), Vec3Of<T>{});
                 },
                 lobe(i));
         return sum;
     }
     // u_lobe: which lobe, in [0, 1). direction: two numbers in [0, 1) that are made where they are asked for.
     template <class Numbers>
-    BSDFSample sample(double u_lobe, Numbers&& direction) const {
-        int chosen = 0;
-        double reached = 0;
+    BSDFSampleOf<T> sample(T u_lobe, Numbers&& direction) const {
+        T chosen{}, reached{};
         for (int i = 0; i < count_; i++) {  // the last is taken even where the sum is rounded to less than u
-            if (u_lobe >= reached && shares_[i] > 0) chosen = i;
+            chosen = select(Mask<T>(u_lobe >= reached) & Mask<T>(shares_[i] > 0.0), splat<T>(i), chosen);
             reached += share(i);
         }
-        BSDFSample sample;
-        std::visit(
-            [&](const auto& lobe) {
-                static_cast<LobeSample&>(sample) = lobe.sample(lobe.DELTA ? Vec2{} : direction());
-                sample.kind = lobe.KIND, sample.is_diffuse = lobe.IS_DIFFUSE;
-                if (bumped_ && lobe.IS_DIFFUSE) sample.weight *= terminator_.left(normal_of(lobe), true, sample.direction);
-            },
-            lobe(chosen));
-        sample.weight = sample.weight / share(chosen);
-        sample.pdf *= share(chosen);
+        BSDFSampleOf<T> sample;
+        std::optional<Vec2Of<T>> u;
+        for (int i = 0; i < count_; i++) {
+            Mask<T> lanes(chosen == double(i));
+            if (!any(lanes)) continue;
+            std::visit(
+                [&](const auto& lobe) {
+                    if (!lobe.DELTA && !u) u = direction();
+                    LobeSampleOf<T> of_lobe = lobe.sample(lobe.DELTA ? Vec2Of<T>{} : *u);
+                    if (any(bumped_) && lobe.IS_DIFFUSE)
+                        of_lobe.weight = of_lobe.weight * select(bumped_, terminator_.left(normal_of(lobe), true, of_lobe.direction), splat<T>(1));
+                    sample.direction = select(lanes, of_lobe.direction, sample.direction);
+                    sample.weight = select(lanes, of_lobe.weight / share(i), sample.weight);
+                    sample.pdf = select(lanes, of_lobe.pdf * share(i), sample.pdf);
+                    sample.kind |= where(lanes, lobe.KIND);
+                    if (lobe.IS_DIFFUSE) sample.is_diffuse = sample.is_diffuse | lanes;
+                },
+                lobe(i));
+        }
         return sample;
     }
     bool needs_choice() const { return count_ > 1; }
     // The kinds of rays that the lobes scatter.
-    uint32_t kinds() const { return kinds_; }
+    Flags<T> kinds() const { return kinds_; }
 
    private:
-    template <class Kind> static double importance(const Kind& lobe) {
+    template <class Kind> static T importance(const Kind& lobe) {
         if constexpr (requires { lobe.importance(); })
             return lobe.importance();
         else
             return lobe.color.x + lobe.color.y + lobe.color.z;
     }
-    template <class Kind> static Vec3 normal_of(const Kind& lobe) {
+    template <class Kind> static Vec3Of<T> normal_of(const Kind& lobe) {
         if constexpr (requires { lobe.frame; })
             return lobe.frame.n;
         else
             return lobe.normal;
     }
-    double share(int lobe) const { return count_ == 1 ? 1 : shares_[lobe] / total_; }
+    T share(int lobe) const { return count_ == 1 ? splat<T>(1) : shares_[lobe] / total_; }
 
     static_assert(std::is_trivially_destructible_v<Lobe>);
     struct Storage {  // not filled before there is a lobe
@@ -147,12 +168,15 @@ class BSDF {
     const Lobe& lobe(int i) const { return *reinterpret_cast<const Lobe*>(&storage_[i]); }
 
     Storage storage_[MOST_LOBES];
-    double shares_[MOST_LOBES], total_ = 0;
+    T shares_[MOST_LOBES], total_{};
+    Mask<T> lanes_[MOST_LOBES], bumped_{};
     int count_ = 0;
-    uint32_t kinds_ = 0, spread_ = 0;
-    bool bumped_ = false;
-    ShadowTerminator terminator_;
-    Vec3 emission_, transparency_;
+    Flags<T> kinds_{}, spread_{};
+    ShadowTerminatorOf<T> terminator_;
+    Vec3 emission_, transparency_;  // of one point: what shines or is transparent is met by each path alone
 };
+using ScatteredLight = ScatteredLightOf<double>;
+using BSDF = BSDFOf<double>;
+using BSDFSample = BSDFSampleOf<double>;
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -10,9 +10,10 @@ template <class T> struct LobeSampleOf {
     T pdf{};
 };
 using LobeSample = LobeSampleOf<double>;
-struct BSDFSample : LobeSample {
-    RayKind kind = DIFFUSE;
-    bool is_diffuse = true;
+// kind: of the ray that goes on, a RayKind.
+template <class T> struct BSDFSampleOf : LobeSampleOf<T> {
+    Flags<T> kind{};
+    Mask<T> is_diffuse{};
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

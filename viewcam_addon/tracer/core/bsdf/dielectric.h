@@ -16,16 +16,16 @@ inline Vec3 refracted(Vec3 incoming, Vec3 normal, double ratio) {
     return across - normal * std::sqrt(1 - squared);
 }
 
-// The part of unpolarised light that a clear surface reflects; the rest is refracted.
+// The part of unpolarized light that a clear surface reflects; the rest is refracted.
 // cosine: of the angle between ray and normal, 0 to 1. ratio: as of `refracted`.
-inline double fresnel(double cosine, double ratio) {
-    double excess = ratio * ratio - 1, squared = excess + cosine * cosine;
-    if (!(squared > 0)) return 1;
-    double far = std::sqrt(squared);  // the cosine on the far side, times the ratio
-    double slowed = ratio * ratio * cosine;
-    double perpendicular = excess / ((far + cosine) * (far + cosine));  // (far − cosine) / (far + cosine) without cancellation
-    double parallel = (far - slowed) / (far + slowed);
-    return min(0.5 * (perpendicular * perpendicular + parallel * parallel), 1.0);
+template <class T> inline T fresnel(T cosine, T ratio) {
+    T excess = ratio * ratio - 1.0, squared = excess + cosine * cosine;
+    T far = sqrt(squared);  // the cosine on the far side, times the ratio
+    T slowed = ratio * ratio * cosine;
+    T perpendicular = excess / ((far + cosine) * (far + cosine));  // (far − cosine) / (far + cosine) without cancellation
+    T parallel = (far - slowed) / (far + slowed);
+    T reflected = min(0.5 * (perpendicular * perpendicular + parallel * parallel), splat<T>(1));
+    return select(Mask<T>(squared > 0.0), reflected, splat<T>(1));
 }
 
 struct SpecularTransmission {

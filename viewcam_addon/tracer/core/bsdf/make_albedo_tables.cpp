@@ -125,7 +125,7 @@ Scattered curve(double ior) {
     };
 }
 
-// Schlick's power of five, as Cycles has it half-way between the neighbours of its table.
+// Schlick's power of five, as Cycles has it half-way between the neighbors of its table.
 double schlick(const Viewer& viewer, Vec3 h) {
     if (!(reflected_rise(viewer.wi, h) > 0)) return 0;
     double sine = 1 - dot(viewer.wi, h), sum = 0;

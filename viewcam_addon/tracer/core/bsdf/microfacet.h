@@ -16,57 +16,62 @@ inline Frame frame_along(Vec3 normal, Vec3 tangent) {
 }
 
 // Facets in a frame, seen by a viewer.
-struct MicrofacetLobe {
-    Vec3 color;
-    Frame frame;
-    Vec3 wi;  // to the viewer, in the frame
-    Microfacets facets;
-    Fresnel fresnel;
+template <class T> struct MicrofacetLobeOf {
+    Vec3Of<T> color;
+    FrameOf<T> frame;
+    Vec3Of<T> wi;  // to the viewer, in the frame
+    MicrofacetsOf<T> facets;
+    FresnelOf<T> fresnel;
 
     // About how much light it scatters, which lobes are chosen by: never nothing where there may be something.
-    double albedo(Vec3 scattered) const {
+    T albedo(Vec3Of<T> scattered) const {
         constexpr double LEAST = 0.05;
-        Vec3 part = color * (grey(LEAST) + unit_range(scattered) * (1 - LEAST));
+        Vec3Of<T> part = color * (gray(splat<T>(LEAST)) + unit_range(scattered) * splat<T>(1 - LEAST));
         return part.x + part.y + part.z;
     }
 };
 
-struct MicrofacetReflection : MicrofacetLobe {
+template <class T> struct MicrofacetReflectionOf : MicrofacetLobeOf<T> {
     static constexpr RayKind KIND = GLOSSY;
     static constexpr bool DELTA = false, IS_DIFFUSE = false;
+    using MicrofacetLobeOf<T>::color, MicrofacetLobeOf<T>::frame, MicrofacetLobeOf<T>::wi, MicrofacetLobeOf<T>::facets, MicrofacetLobeOf<T>::fresnel;
 
-    double importance() const { return albedo(reflectance(fresnel, wi.z)); }
-    Vec3 eval(Vec3 to_light) const { return eval_local(frame.to_local(to_light)); }
-    double pdf(Vec3 to_light) const { return pdf_local(frame.to_local(to_light)); }
-    LobeSample sample(Vec2 u) const {
-        Vec3 h = facets.sample_visible(wi, u), wo = h * (2 * dot(wi, h)) - wi;
-        double pdf = pdf_local(wo);
-        return {frame.to_world(wo), pdf > 0 ? eval_local(wo) / pdf : Vec3{}, pdf};
+    T importance() const { return this->albedo(reflectance(fresnel, wi.z)); }
+    Vec3Of<T> eval(Vec3Of<T> to_light) const { return eval_local(frame.to_local(to_light)); }
+    T pdf(Vec3Of<T> to_light) const { return pdf_local(frame.to_local(to_light)); }
+    LobeSampleOf<T> sample(Vec2Of<T> u) const {
+        Vec3Of<T> h = facets.sample_visible(wi, u), wo = h * (2.0 * dot(wi, h)) - wi;
+        T pdf = pdf_local(wo);
+        return {frame.to_world(wo), select(Mask<T>(pdf > 0.0), eval_local(wo) / pdf, Vec3Of<T>{}), pdf};
     }
 
    private:
-    Vec3 eval_local(Vec3 wo) const {
-        if (!(wi.z > 0 && wo.z > 0)) return {};
-        Vec3 h = normalize(wi + wo);
-        return color * reflectance(fresnel, dot(wi, h)) * (facets.d(h) * facets.g(wi, wo) / (4 * wi.z));
+    Vec3Of<T> eval_local(Vec3Of<T> wo) const {
+        Mask<T> above = Mask<T>(wi.z > 0.0) & Mask<T>(wo.z > 0.0);
+        if (!any(above)) return {};
+        Vec3Of<T> h = normalize(wi + wo);
+        Vec3Of<T> light = color * reflectance(fresnel, dot(wi, h)) * (facets.d(h) * facets.g(wi, wo) / (4.0 * wi.z));
+        return select(above, light, Vec3Of<T>{});
     }
-    double pdf_local(Vec3 wo) const {
-        if (!(wi.z > 0 && wo.z > 0)) return 0;
-        Vec3 h = normalize(wi + wo);
-        return facets.pdf_visible(wi, h) / (4 * dot(wi, h));
+    T pdf_local(Vec3Of<T> wo) const {
+        Mask<T> above = Mask<T>(wi.z > 0.0) & Mask<T>(wo.z > 0.0);
+        if (!any(above)) return T{};
+        Vec3Of<T> h = normalize(wi + wo);
+        return select(above, facets.pdf_visible(wi, h) / (4.0 * dot(wi, h)), T{});
     }
 };
+using MicrofacetReflection = MicrofacetReflectionOf<double>;
 
 // What the Fresnel term does not reflect, refracted. ratio: as of `fresnel`.
 //
 // As in Cycles, light from a lamp also comes in by half vectors that no facet can have which sends light down: so do the pictures
 // that this is compared with. What is found by scattered rays has none of it.
-struct MicrofacetTransmission : MicrofacetLobe {
+struct MicrofacetTransmission : MicrofacetLobeOf<double> {
     static constexpr RayKind KIND = TRANSMISSION;
     static constexpr bool DELTA = false, IS_DIFFUSE = false;
     double ratio;
 
-    double importance() const { return albedo(grey(1) - reflectance(fresnel, wi.z)); }
+    double importance() const { return albedo(gray(1) - reflectance(fresnel, wi.z)); }
     Vec3 eval(Vec3 to_light) const { return eval_local(frame.to_local(to_light)); }
     double pdf(Vec3 to_light) const { return pdf_local(frame.to_local(to_light)); }
     LobeSample sample(Vec2 u) const {
@@ -85,7 +90,7 @@ struct MicrofacetTransmission : MicrofacetLobe {
         double squared = dot(bent, bent);
         Vec3 h = bent / std::sqrt(squared);
         double in = dot(wi, h), out = dot(wo, h), spread = ratio * ratio / squared * std::fabs(in * out);
-        Vec3 let_through = grey(1) - reflectance(fresnel, std::fabs(in));
+        Vec3 let_through = gray(1) - reflectance(fresnel, std::fabs(in));
         return color * let_through * (facets.d(h) * facets.g(wi, wo) / wi.z * spread);
     }
     double pdf_local(Vec3 wo) const {

@@ -6,47 +6,48 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-struct OrenNayar {
+template <class T> struct OrenNayarOf {
     static constexpr RayKind KIND = DIFFUSE;
     static constexpr bool DELTA = false, IS_DIFFUSE = true;
-    Vec3 color, normal, to_viewer;
-    double a, b;
-    Vec3 multiple;  // of light that is reflected more than once, what depends on no direction
+    Vec3Of<T> color, normal, to_viewer;
+    T a, b;
+    Vec3Of<T> multiple;  // of light that is reflected more than once, what depends on no direction
 
     // albedo: of what is reflected once, which is not `color` where that has other factors. multiple: whether more counts.
-    OrenNayar(Vec3 color, Vec3 normal, Vec3 to_viewer, double roughness, Vec3 albedo, bool multiple)
+    OrenNayarOf(Vec3Of<T> color, Vec3Of<T> normal, Vec3Of<T> to_viewer, T roughness, Vec3Of<T> albedo, bool multiple)
         : color(color), normal(normal), to_viewer(to_viewer) {
-        a = 1 / (PI + roughness * (PI / 2 - 2.0 / 3)), b = roughness * a;
+        a = 1.0 / (PI + roughness * (PI / 2 - 2.0 / 3)), b = roughness * a;
         if (!multiple) return;
-        double mean = a * PI + (2 * PI - 5.6) / 3 * b, lost = (1 - albedo_under(max(dot(normal, to_viewer), 0.0))) * mean / (1 - mean) / PI;
-        auto kept = [&](double rho) { return lost * rho * rho / (1 - rho * (1 - mean)); };
-        Vec3 rho = unit_range(albedo);
+        T mean = a * PI + (2 * PI - 5.6) / 3 * b, lost = (1.0 - albedo_under(max(dot(normal, to_viewer), T{}))) * mean / (1.0 - mean) / PI;
+        auto kept = [&](T rho) -> T { return lost * rho * rho / (1.0 - rho * (1.0 - mean)); };
+        Vec3Of<T> rho = unit_range(albedo);
         this->multiple = {kept(rho.x), kept(rho.y), kept(rho.z)};
     }
 
-    double importance() const { return color.x + color.y + color.z; }
-    Vec3 eval(Vec3 to_light) const {
-        double light = max(dot(normal, to_light), 0.0), viewer = max(dot(normal, to_viewer), 0.0);
-        if (!(light > 0)) return {};
-        double t = dot(to_viewer, to_light) - light * viewer;
-        if (t > 0) t /= max(light, viewer);
-        return color * ((grey(a + b * t) + multiple * (1 - albedo_under(light))) * light);
+    T importance() const { return color.x + color.y + color.z; }
+    Vec3Of<T> eval(Vec3Of<T> to_light) const {
+        T light = max(dot(normal, to_light), T{}), viewer = max(dot(normal, to_viewer), T{});
+        Mask<T> lit(light > 0.0);
+        if (!any(lit)) return {};
+        T t = dot(to_viewer, to_light) - light * viewer;
+        t = select(Mask<T>(t > 0.0), t / max(light, viewer), t);
+        return select(lit, color * ((gray(a + b * t) + multiple * (1.0 - albedo_under(light))) * light), Vec3Of<T>{});
     }
-    double pdf(Vec3 to_light) const { return max(dot(normal, to_light), 0.0) / PI; }
-    LobeSample sample(Vec2 u) const {
-        double cosine;
-        Vec3 direction = cosine_direction(normal, u, cosine);
+    T pdf(Vec3Of<T> to_light) const { return max(dot(normal, to_light), T{}) / PI; }
+    LobeSampleOf<T> sample(Vec2Of<T> u) const {
+        T cosine;
+        Vec3Of<T> direction = cosine_direction(normal, u, cosine);
         return {direction, eval(direction) * (PI / cosine), cosine / PI};
     }
 
    private:
     // What is reflected once of light that comes under a cosine.
-    double albedo_under(double cosine) const {
-        if (cosine < 1e-6) return a * PI + b * (PI / 2 - 2.0 / 3 - cosine);
-        double sine = std::sqrt(max(1 - cosine * cosine, 0.0));
-        double g = sine * (acos(cosine) - 2.0 / 3 - sine * cosine) + 2.0 / 3 * (sine / cosine) * (1 - sine * sine * sine);
-        return a * PI + b * g;
+    T albedo_under(T cosine) const {
+        T sine = sqrt(max(1.0 - cosine * cosine, T{}));
+        T g = sine * (acos(cosine) - 2.0 / 3 - sine * cosine) + 2.0 / 3 * (sine / cosine) * (1.0 - sine * sine * sine);
+        return select(Mask<T>(cosine < 1e-6), a * PI + b * (PI / 2 - 2.0 / 3 - cosine), a * PI + b * g);
     }
 };
+using OrenNayar = OrenNayarOf<double>;
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -20,7 +20,7 @@ struct SheenLobe {
     // tint: of all that is scattered. A normal that is turned away from the viewer scatters as one that is seen edge-on.
     SheenLobe(Vec3 tint, Vec3 normal, Vec3 to_viewer, double roughness) : frame(frame_along(normal, to_viewer)) {
         constexpr double LEAST = 1e-5, SMOOTHEST = 1e-3;
-        detail::Place r(max(roughness, SMOOTHEST), 32), c(dot(normal, to_viewer), 32);
+        detail::PlaceOf<double> r(max(roughness, SMOOTHEST), 32), c(dot(normal, to_viewer), 32);
         a = detail::at(sheen_table::A, r, c, 32), b = detail::at(sheen_table::B, r, c, 32);
         double albedo = detail::at(sheen_table::ALBEDO, r, c, 32);
         color = std::fabs(a) < LEAST || albedo < LEAST ? Vec3{} : tint * albedo;

@@ -2,7 +2,7 @@
 //
 // Zeltner, Burley and Chiang, Practical Multiple-Scattering Sheen Using Linearly Transformed Cosines (2022), have fitted them, with five
 // digits. Measured from Cycles 5.0's pixels: albedos by the pass Diffuse Color, A and B by five suns, rounded to the five digits; what
-// is shown by them is what was measured to 1.2e-6 at nine of ten places. Where the albedo is below 1e-5 A and B are a neighbour's.
+// is shown by them is what was measured to 1.2e-6 at nine of ten places. Where the albedo is below 1e-5 A and B are a neighbor's.
 #pragma once
 
 namespace viewcam::VIEWCAM_ISA::sheen_table {

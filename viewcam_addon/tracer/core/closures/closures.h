@@ -20,7 +20,7 @@ struct EmissionClosure {
     Vec3 mean_emission(const std::vector<Texture>& textures) const { return color.mean(textures) * strength.mean(textures); }
 };
 
-// Surfaces, or parts of them, that light goes straight through: the path goes on as if they were not there, but for a colour.
+// Surfaces, or parts of them, that light goes straight through: the path goes on as if they were not there, but for a color.
 struct TransparentClosure {
     static constexpr const char* NAME = "transparent";
     static constexpr uint32_t KINDS = 0;
@@ -31,7 +31,7 @@ struct TransparentClosure {
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const { bsdf.let_through(weight * at.color(color)); }
 };
 
-// Reflection of one colour by facets without a Fresnel term: a mirror where it is not rough.
+// Reflection of one color by facets without a Fresnel term: a mirror where it is not rough.
 struct GlossyClosure {
     static constexpr const char* NAME = "glossy";
     static constexpr uint32_t KINDS = GLOSSY;
@@ -43,12 +43,14 @@ struct GlossyClosure {
         : color(in["color"]), roughness(in["roughness"]), normal(in["normal"]), anisotropy{in["anisotropy"], in["rotation"], in["tangent"]},
           distribution(in.choice("distribution")) {}
     bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
-    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
-        Vec3 rgb = at.color(color), normal = at.specular_normal(this->normal);
-        Facets facets = anisotropy.of_glossy(at, normal, distribution.facets(at.number(roughness)));
+    bool is_wide() const { return anisotropy.is_none() && !distribution.beckmann; }
+    template <class At> void add_to(BSDFAt<At>& bsdf, const At& at, Vec3Of<NumberOf<At>> weight) const {
+        using T = NumberOf<At>;
+        Vec3Of<T> rgb = at.color(color), normal = at.specular_normal(this->normal);
+        FacetsOf<T> facets = anisotropy.of_glossy(at, normal, distribution.facets(at.number(roughness)));
         weight = weight * rgb;
         if (distribution.multiple) {
-            MultipleScattering more = multiple_reflection(at, normal, facets, unit_range(rgb));
+            MultipleScatteringOf<T> more = multiple_reflection(at, normal, facets, unit_range(rgb));
             weight = weight * more.albedo * more.lobe;
         }
         add_reflection(bsdf, at, weight, normal, facets, NoFresnel{});
@@ -62,26 +64,28 @@ struct MetallicClosure {
     Color color, edge_tint, ior, extinction, roughness, normal;
     Anisotropy anisotropy;
     Distribution distribution;
-    bool physical;  // by index of refraction and extinction instead of two colours
+    bool physical;  // by index of refraction and extinction instead of two colors
 
     explicit MetallicClosure(const Inputs& in)
         : color(in["color"]), edge_tint(in["edge_tint"]), ior(in["ior"]), extinction(in["extinction"]), roughness(in["roughness"]), normal(in["normal"]),
           anisotropy{in["anisotropy"], in["rotation"], in["tangent"]}, distribution(in.choice("distribution")), physical(in.choice("fresnel") == "physical_conductor") {}
     bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
-    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
-        Vec3 shading = at.normal(this->normal), normal = at.specular(shading);
-        Facets facets = anisotropy.of(at, shading, distribution.facets(at.number(roughness)));
+    bool is_wide() const { return anisotropy.is_none() && !distribution.beckmann; }
+    template <class At> void add_to(BSDFAt<At>& bsdf, const At& at, Vec3Of<NumberOf<At>> weight) const {
+        using T = NumberOf<At>;
+        Vec3Of<T> shading = at.normal(this->normal), normal = at.specular(shading);
+        FacetsOf<T> facets = anisotropy.of(at, shading, distribution.facets(at.number(roughness)));
         auto add = [&](const auto& fresnel) {
             if (distribution.multiple) {
-                MultipleScattering more = multiple_reflection(at, normal, facets, fresnel.mean());
+                MultipleScatteringOf<T> more = multiple_reflection(at, normal, facets, fresnel.mean());
                 weight = weight * more.albedo * more.lobe;
             }
             add_reflection(bsdf, at, weight, normal, facets, fresnel);
         };
         if (physical)
-            add(ConductorFresnel{at.color(ior), at.color(extinction), at.version >= CYCLES_5_0});
+            add(ConductorFresnelOf<T>{at.color(ior), at.color(extinction), at.version >= CYCLES_5_0});
         else
-            add(F82::of(unit_range(at.color(color)), unit_range(at.color(edge_tint))));
+            add(F82Of<T>::of(unit_range(at.color(color)), unit_range(at.color(edge_tint))));
     }
 };
 

@@ -6,12 +6,12 @@
 namespace viewcam::VIEWCAM_ISA {
 
 // albedo: as of OrenNayar.
-inline void add_diffuse(BSDF& bsdf, const ShadingPoint& at, Vec3 color, Vec3 normal, double roughness, Vec3 albedo) {
+template <class At, class T> inline void add_diffuse(BSDFOf<T>& bsdf, const At& at, Vec3Of<T> color, Vec3Of<T> normal, T roughness, Vec3Of<T> albedo) {
     constexpr double SMOOTH = 1e-5;
-    if (roughness < SMOOTH)
-        bsdf.add(Lambert{color, normal});
-    else
-        bsdf.add(OrenNayar(color, normal, -at.incoming, unit_range(roughness), albedo, at.version >= CYCLES_4_3));
+    Mask<T> smooth(roughness < SMOOTH);
+    if (any(smooth)) bsdf.add(LambertOf<T>{select(smooth, color, Vec3Of<T>{}), normal});
+    if (all(smooth)) return;
+    bsdf.add(OrenNayarOf<T>(select(smooth, Vec3Of<T>{}, color), normal, -at.incoming, unit_range(roughness), albedo, at.version >= CYCLES_4_3));
 }
 
 struct DiffuseClosure {
@@ -20,8 +20,9 @@ struct DiffuseClosure {
     Color color, roughness, normal;
 
     explicit DiffuseClosure(const Inputs& in) : color(in["color"]), roughness(in["roughness"]), normal(in["normal"]) {}
-    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
-        Vec3 rgb = at.color(color);
+    bool is_wide() const { return true; }
+    template <class At> void add_to(BSDFAt<At>& bsdf, const At& at, Vec3Of<NumberOf<At>> weight) const {
+        Vec3Of<NumberOf<At>> rgb = at.color(color);
         add_diffuse(bsdf, at, rgb * weight, at.normal(normal), at.number(roughness), rgb);
     }
 };

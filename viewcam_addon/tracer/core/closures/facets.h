@@ -6,12 +6,13 @@
 namespace viewcam::VIEWCAM_ISA {
 
 // Facets, and along what they are stretched: 0 where they are alike all round.
-struct Facets : Microfacets {
-    Vec3 tangent;
+template <class T> struct FacetsOf : MicrofacetsOf<T> {
+    Vec3Of<T> tangent;
 };
+using Facets = FacetsOf<double>;
 
-inline Facets facets_of(double roughness, bool beckmann = false) {
-    double alpha = unit_range(roughness) * unit_range(roughness);
+template <class T> inline FacetsOf<T> facets_of(T roughness, bool beckmann = false) {
+    T alpha = unit_range(roughness) * unit_range(roughness);
     return {{alpha, alpha, beckmann}, {}};
 }
 
@@ -19,16 +20,21 @@ inline Facets facets_of(double roughness, bool beckmann = false) {
 struct Anisotropy {
     Color amount, rotation, tangent;
 
+    bool is_none() const { return amount.is_black(); }
     // As a Glossy BSDF has it: below 0 across the tangent.
-    Facets of_glossy(const ShadingPoint& at, Vec3 normal, const Facets& round) const {
+    template <class At> FacetsOf<NumberOf<At>> of_glossy(const At& at, Vec3Of<NumberOf<At>> normal, const FacetsOf<NumberOf<At>>& round) const {
         constexpr double MOST = 0.99, NEGLIGIBLE = 1e-4;
-        double a = min(max(at.number(amount), -MOST), MOST);
-        return std::fabs(a) <= NEGLIGIBLE ? round : stretched(at, normal, round, a < 0 ? 1 / (1 + a) : 1 - a);
+        if constexpr (IS_ONE<At>) {
+            double a = min(max(at.number(amount), -MOST), MOST);
+            if (std::fabs(a) > NEGLIGIBLE) return stretched(at, normal, round, a < 0 ? 1 / (1 + a) : 1 - a);
+        }
+        return round;
     }
     // As Metallic and Principled have it.
-    Facets of(const ShadingPoint& at, Vec3 normal, const Facets& round) const {
-        double a = unit_range(at.number(amount));
-        return a > 0 ? stretched(at, normal, round, 1 / std::sqrt(1 - 0.9 * a)) : round;
+    template <class At> FacetsOf<NumberOf<At>> of(const At& at, Vec3Of<NumberOf<At>> normal, const FacetsOf<NumberOf<At>>& round) const {
+        if constexpr (IS_ONE<At>)
+            if (double a = unit_range(at.number(amount)); a > 0) return stretched(at, normal, round, 1 / std::sqrt(1 - 0.9 * a));
+        return round;
     }
 
    private:
@@ -45,25 +51,31 @@ struct Distribution {
     bool beckmann, multiple;
 
     explicit Distribution(const std::string& choice) : beckmann(choice == "beckmann"), multiple(choice == "multiscatter_ggx") {}
-    Facets facets(double roughness) const { return facets_of(roughness, beckmann); }
+    template <class T> FacetsOf<T> facets(T roughness) const { return facets_of(roughness, beckmann); }
 };
 
-inline double roughness_of(const Microfacets& facets) { return std::sqrt(std::sqrt(facets.alpha_x * facets.alpha_y)); }
+template <class T> inline T roughness_of(const MicrofacetsOf<T>& facets) { return sqrt(sqrt(facets.alpha_x * facets.alpha_y)); }
 
-inline void add_reflection(BSDF& bsdf, const ShadingPoint& at, Vec3 color, Vec3 normal, const Facets& facets, const Fresnel& fresnel) {
-    if (at.is_smooth(facets)) {
-        bsdf.add(SpecularReflection{color * reflectance(fresnel, -dot(normal, at.incoming)), normal, at.incoming});
-        return;
+template <class At, class T>
+inline void add_reflection(BSDFOf<T>& bsdf, const At& at, Vec3Of<T> color, Vec3Of<T> normal, const FacetsOf<T>& facets, const FresnelOf<Scalar<T>>& fresnel) {
+    Mask<T> smooth = at.is_smooth(facets);
+    if (any(smooth)) {
+        T cosine = -dot(normal, at.incoming);
+        bsdf.add(SpecularReflectionOf<T>{select(smooth, color * reflectance<T>(fresnel, cosine), Vec3Of<T>{}), normal, at.incoming});
+        if (all(smooth)) return;
+        color = select(smooth, Vec3Of<T>{}, color);
     }
-    Frame frame = is_black(facets.tangent) ? Frame(normal) : frame_along(normal, facets.tangent);
-    bsdf.add(MicrofacetReflection{{color, frame, frame.to_local(-at.incoming), facets, fresnel}});
+    FrameOf<T> frame(normal);
+    if constexpr (IS_ONE<At>)
+        if (!is_black(facets.tangent)) frame = frame_along(normal, facets.tangent);
+    bsdf.add(MicrofacetReflectionOf<T>{{color, frame, frame.to_local(-at.incoming), facets, fresnel}});
 }
 // What `fresnel` lets through. ratio: as of `refracted`.
 inline void add_refraction(BSDF& bsdf, const ShadingPoint& at, Vec3 color, Vec3 normal, const Facets& facets, const Fresnel& fresnel,
                            double ratio) {
     constexpr double UNBENT = 1e-4;
     if (at.is_smooth(facets) || std::fabs(ratio - 1) < UNBENT) {
-        Vec3 let_through = grey(1) - reflectance(fresnel, -dot(normal, at.incoming));
+        Vec3 let_through = gray(1) - reflectance<double>(fresnel, -dot(normal, at.incoming));
         bsdf.add(SpecularTransmission{color * let_through, normal, at.incoming, ratio});
         return;
     }
@@ -72,8 +84,9 @@ inline void add_refraction(BSDF& bsdf, const ShadingPoint& at, Vec3 color, Vec3 
 }
 
 // What facets that reflect by a Fresnel term of this mean make of light that they scatter more than once.
-inline MultipleScattering multiple_reflection(const ShadingPoint& at, Vec3 normal, const Microfacets& facets, Vec3 mean) {
-    return MultipleScattering::of(ggx_albedo(roughness_of(facets), -dot(normal, at.incoming)), mean);
+template <class At, class T>
+inline MultipleScatteringOf<T> multiple_reflection(const At& at, Vec3Of<T> normal, const MicrofacetsOf<T>& facets, Vec3Of<T> mean) {
+    return MultipleScatteringOf<T>::of(ggx_albedo<T>(roughness_of(facets), -dot(normal, at.incoming)), mean);
 }
 
 }  // namespace viewcam::VIEWCAM_ISA

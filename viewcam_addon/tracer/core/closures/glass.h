@@ -9,7 +9,7 @@ namespace viewcam::VIEWCAM_ISA {
 inline void add_glass(BSDF& bsdf, const ShadingPoint& at, Vec3 weight, Vec3 normal, const Facets& facets, double ratio, const Fresnel& fresnel,
                       Vec3 reflected, Vec3 transmitted, bool multiple) {
     if (multiple && !at.is_smooth(facets)) {
-        Albedo single = glass_albedo(roughness_of(facets), -dot(normal, at.incoming), ratio);
+        AlbedoOf<double> single = glass_albedo(roughness_of(facets), -dot(normal, at.incoming), ratio);
         MultipleScattering more = MultipleScattering::of(single, unit_range(transmitted));
         weight = weight * more.albedo * more.lobe;
     }

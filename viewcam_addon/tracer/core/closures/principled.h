@@ -34,41 +34,51 @@ struct PrincipledClosure {
         return emission_color.mean(textures) * emission_strength.mean(textures) * share;
     }
 
-    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
-        Vec3 base = max(at.color(base_color), 0), tint = max(at.color(specular_tint), 0), clamped = unit_range(base);
-        Vec3 shading = at.normal(this->normal), normal = at.specular(shading);
-        double cosine = -dot(normal, at.incoming), index = max(at.number(ior), LEAST_IOR);
-        Facets round = distribution.facets(at.number(roughness)), facets = anisotropy.of(at, shading, round);
+    // Four points of it at once have none of what stands above the metal, nor glass.
+    bool is_wide() const {
+        bool layered = !(sheen_weight.is_black() && coat_weight.is_black() && emits_nothing() && transmission.is_black());
+        return !layered && !lets_through() && anisotropy.is_none() && !distribution.beckmann;
+    }
+    template <class At> void add_to(BSDFAt<At>& bsdf, const At& at, Vec3Of<NumberOf<At>> weight) const {
+        using T = NumberOf<At>;
+        Vec3Of<T> base = max(at.color(base_color), 0), tint = max(at.color(specular_tint), 0), clamped = unit_range(base), none;
+        Vec3Of<T> shading = at.normal(this->normal), normal = at.specular(shading), white = gray(splat<T>(1));
+        T cosine = -dot(normal, at.incoming), index = max(at.number(ior), splat<T>(LEAST_IOR));
+        FacetsOf<T> round = distribution.facets(at.number(roughness)), facets = anisotropy.of(at, shading, round);
 
-        if (double share = unit_range(at.number(alpha)); share < 1) {
-            bsdf.let_through(weight * (1 - share));
-            weight *= share;
+        if constexpr (IS_ONE<At>) {
+            if (double share = unit_range(at.number(alpha)); share < 1) {
+                bsdf.let_through(weight * (1 - share));
+                weight *= share;
+            }
+            weight = below_coat(bsdf, at, below_sheen(bsdf, at, weight, shading));
+            bsdf.emit(weight * at.color(emission_color) * at.number(emission_strength));
         }
-        weight = below_coat(bsdf, at, below_sheen(bsdf, at, weight, shading));
-        bsdf.emit(weight * at.color(emission_color) * at.number(emission_strength));
-        if (double share = unit_range(at.number(metallic)); share > NEGLIGIBLE) {
-            F82 fresnel = F82::of(clamped, unit_range(tint));
-            add_reflection(bsdf, at, weight * share * more(at, normal, facets, fresnel.mean()).lobe, normal, facets, fresnel);
-            weight *= 1 - share;
+        if (T share = unit_range(at.number(metallic)); any(share > NEGLIGIBLE)) {
+            Mask<T> metal(share > NEGLIGIBLE);
+            auto fresnel = F82Of<T>::of(clamped, unit_range(tint));
+            add_reflection(bsdf, at, select(metal, weight * share * more(at, normal, facets, fresnel.mean()).lobe, none), normal, facets, fresnel);
+            weight = select(metal, weight * (1.0 - share), weight);
         }
-        if (double share = unit_range(at.number(transmission)); share > NEGLIGIBLE) {
-            Vec3 through{std::sqrt(clamped.x), std::sqrt(clamped.y), std::sqrt(clamped.z)};  // it is gone through twice
-            double ratio = at.ratio(index);
-            ScaledDielectric fresnel{ratio, unit_range(tint * f0_of(index))};
-            add_glass(bsdf, at, weight * share, normal, round, ratio, fresnel, grey(1), through, distribution.multiple);
-            weight *= 1 - share;
+        if constexpr (IS_ONE<At>)
+            if (double share = unit_range(at.number(transmission)); share > NEGLIGIBLE) {
+                Vec3 through{std::sqrt(clamped.x), std::sqrt(clamped.y), std::sqrt(clamped.z)};  // it is gone through twice
+                double ratio = at.ratio(index);
+                ScaledDielectric fresnel{ratio, unit_range(tint * f0_of(index))};
+                add_glass(bsdf, at, weight * share, normal, round, ratio, fresnel, gray(1), through, distribution.multiple);
+                weight *= 1 - share;
+            }
+        T level = max(at.number(specular_level), T{}), f0 = f0_of(index), eta = index;
+        if (Mask<T> leveled(level != 0.5); any(leveled)) {
+            f0 = select(leveled, f0 * (2.0 * level), f0);
+            eta = select(leveled, select(Mask<T>(index < 1.0), 1.0 / ior_of_f0(f0), ior_of_f0(f0)), eta);
         }
-        double level = max(at.number(specular_level), 0.0), f0 = f0_of(index), eta = index;
-        if (level != 0.5) {
-            f0 *= 2 * level;
-            eta = index < 1 ? 1 / ior_of_f0(f0) : ior_of_f0(f0);
-        }
-        if (eta != 1 && !is_negligible(weight)) {
-            ScaledDielectric fresnel{eta, unit_range(tint * f0)};
-            Scattering scattered = more(at, normal, facets, mix(fresnel.f0, grey(1), fresnel_progress(mean_fresnel(eta), eta)));
-            add_reflection(bsdf, at, weight * scattered.lobe, normal, facets, fresnel);
-            Vec3 albedo = mix(fresnel.f0, grey(1), fresnel_progress_seen(eta, roughness_of(facets), cosine));
-            weight = below(weight, weight * scattered.albedo * albedo);
+        if (Mask<T> reflects = Mask<T>(eta != 1.0) & Mask<T>(weight.x + weight.y + weight.z >= 3 * NEGLIGIBLE); any(reflects)) {
+            ScaledDielectricOf<T> fresnel{eta, unit_range(tint * f0)};
+            Scattering<T> scattered = more(at, normal, facets, mix(fresnel.f0, white, fresnel_progress(mean_fresnel(eta), eta)));
+            add_reflection(bsdf, at, select(reflects, weight * scattered.lobe, none), normal, facets, fresnel);
+            Vec3Of<T> albedo = mix(fresnel.f0, white, fresnel_progress_seen<T>(eta, roughness_of(facets), cosine));
+            weight = select(reflects, below(weight, weight * scattered.albedo * albedo), weight);
         }
         add_diffuse(bsdf, at, weight * base, shading, at.number(diffuse_roughness), base);
     }
@@ -76,16 +86,16 @@ struct PrincipledClosure {
    private:
     static constexpr double NEGLIGIBLE = 1e-5, LEAST_IOR = 1e-5, MOST_TINT = 1e40;
 
+    bool emits_nothing() const { return emission_color.is_black() || emission_strength.is_black(); }
     // What scattering more than once multiplies an albedo and a lobe by.
-    struct Scattering {
-        Vec3 albedo = grey(1), lobe = grey(1);
-    };
-    static Scattering of(const MultipleScattering& more) { return {more.albedo, more.albedo * more.lobe}; }
-    Scattering more(const ShadingPoint& at, Vec3 normal, const Microfacets& facets, Vec3 mean) const {
-        return distribution.multiple ? of(multiple_reflection(at, normal, facets, mean)) : Scattering{};
-    }
+    template <class T> struct Scattering {
+        Vec3Of<T> albedo = gray(splat<T>(1)), lobe = gray(splat<T>(1));
 
-    static bool is_negligible(Vec3 weight) { return weight.x + weight.y + weight.z < 3 * NEGLIGIBLE; }
+        static Scattering of(const MultipleScatteringOf<T>& more) { return {more.albedo, more.albedo * more.lobe}; }
+    };
+    template <class At, class T> Scattering<T> more(const At& at, Vec3Of<T> normal, const MicrofacetsOf<T>& facets, Vec3Of<T> mean) const {
+        return distribution.multiple ? Scattering<T>::of(multiple_reflection(at, normal, facets, mean)) : Scattering<T>{};
+    }
 
     // Adds the sheen, which stands on the coat where there is one; what it leaves to the layers below. shading: the base's normal.
     Vec3 below_sheen(BSDF& bsdf, const ShadingPoint& at, Vec3 weight, Vec3 shading) const {
@@ -105,10 +115,10 @@ struct PrincipledClosure {
         Vec3 normal = at.specular_normal(coat_normal);  // not the base's where it has none
         double cosine = -dot(normal, at.incoming), eta = max(at.number(coat_ior), 1.0);
         Facets facets = facets_of(at.number(coat_roughness));
-        Scattering scattered;
+        Scattering<double> scattered;
         double reflected = fresnel(cosine, eta);
         if (at.version >= CYCLES_4_3) {
-            scattered = of(multiple_reflection(at, normal, facets, grey(mean_fresnel(eta))));
+            scattered = Scattering<double>::of(multiple_reflection(at, normal, facets, gray(mean_fresnel(eta))));
             if (eta > 1) reflected = mix(f0_of(eta), 1, fresnel_progress_seen(eta, roughness_of(facets), cosine));
         }
         add_reflection(bsdf, at, weight * share * scattered.lobe, normal, facets, DielectricFresnel{eta});
@@ -121,10 +131,10 @@ struct PrincipledClosure {
     }
 
     // What a layer leaves of a weight, for all channels alike.
-    static Vec3 below(Vec3 weight, Vec3 albedo) {
-        auto part = [](double taken, double of) { return of != 0 ? taken / of : 0; };
-        double most = max(part(albedo.x, weight.x), max(part(albedo.y, weight.y), part(albedo.z, weight.z)));
-        return weight * unit_range(1 - most);
+    template <class T> static Vec3Of<T> below(Vec3Of<T> weight, Vec3Of<T> albedo) {
+        auto part = [](T taken, T of) { return select(Mask<T>(of != 0.0), taken / of, T{}); };
+        T most = max(part(albedo.x, weight.x), max(part(albedo.y, weight.y), part(albedo.z, weight.z)));
+        return weight * unit_range(1.0 - most);
     }
 };
 

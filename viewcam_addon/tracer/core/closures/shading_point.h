@@ -15,11 +15,18 @@ namespace viewcam::VIEWCAM_ISA {
 // The versions of Blender whose Cycles computes materials in ways of its own: what is meant is the newest that is not newer.
 enum CyclesVersion { CYCLES_4_2 = 402, CYCLES_4_3 = 403, CYCLES_5_0 = 500, CYCLES_5_1 = 501, CYCLES_5_2 = 502 };
 
-// What values are: as a number, a colour counts by its luminance and a vector by its mean.
+// What values are: as a number, a color counts by its luminance and a vector by its mean.
 enum class Gives { NUMBER, COLOR, VECTOR };
 
 // Of Rec. 709's primaries.
 inline double luminance(Vec3 rgb) { return 0.2126390 * rgb.x + 0.7151687 * rgb.y + 0.0721923 * rgb.z; }
+
+inline double number_of(Vec3 rgb) { return rgb.x == rgb.y && rgb.y == rgb.z ? rgb.x : luminance(rgb); }
+
+// Whether facets are so small that they are a mirror.
+template <class T> inline Mask<T> is_mirror(const MicrofacetsOf<T>& facets, int version) {
+    return Mask<T>(facets.alpha_x * facets.alpha_y <= (version < CYCLES_4_3 ? 5e-7 : 2e-10));
+}
 
 struct Object;
 struct ValueNodes;
@@ -38,7 +45,7 @@ struct ShadingPoint {
     const Scene* scene = nullptr;
     RayState ray;
 
-    // What an input is given here; as light, and of a colour the luminance.
+    // What an input is given here; as light, and of a color the luminance.
     Vec3 value(const Color& color) const { return color.node == NONE ? color.at(textures, point) : value_of_node(color.node); }
     Vec3 color(const Color& color) const {
         if (color.node == NONE) return color.at(textures, point);
@@ -46,7 +53,7 @@ struct ShadingPoint {
         return {max(rgb.x, 0), max(rgb.y, 0), max(rgb.z, 0)};
     }
     double number(const Color& color) const {
-        if (!color.varies()) return color.rgb.x == color.rgb.y && color.rgb.y == color.rgb.z ? color.rgb.x : luminance(color.rgb);
+        if (!color.varies()) return number_of(color.rgb);
         return color.node == NONE ? luminance(color.at(textures, point)) : number_of_node(color.node);
     }
     // The index of refraction beyond the surface over that before it. ior: inside over outside.
@@ -60,10 +67,7 @@ struct ShadingPoint {
     // A normal, bent so that a mirror's ray rises above the surface; and that which an input asks for.
     Vec3 specular(Vec3 normal) const { return VIEWCAM_ISA::specular_normal(incoming, point.normal, normal); }
     Vec3 specular_normal(const Color& given) const { return specular(normal(given)); }
-    // Whether facets are so small that they are a mirror.
-    bool is_smooth(const Microfacets& facets) const {
-        return facets.alpha_x * facets.alpha_y <= (version < CYCLES_4_3 ? 5e-7 : 2e-10);
-    }
+    bool is_smooth(const Microfacets& facets) const { return is_mirror(facets, version); }
 
     // What the mesh has here under a name, up to four numbers; {0, 0, 0, 1} where it has nothing. Defined in scene.h.
     struct Values {
@@ -111,6 +115,32 @@ struct ShadingPoint {
     Vec3 value_of_node(uint32_t node) const;
     double number_of_node(uint32_t node) const;
 };
+
+// Four points of one material. each: all that is known of a point, or null where all inputs are the same everywhere and ask for no normal.
+struct ShadingPoints {
+    const SurfacePoint<double4>& point;
+    Vec3x4 incoming;
+    int version;
+    const ShadingPoint* each;
+
+    Vec3x4 color(const Color& color) const {
+        return color.varies() ? gather4([&](int i) { return each[i].color(color); }) : splat4(color.rgb);
+    }
+    double4 number(const Color& color) const {
+        return color.varies() ? gather4([&](int i) { return each[i].number(color); }) : splat4(number_of(color.rgb));
+    }
+    Vec3x4 normal(const Color& given) const {
+        return each ? gather4([&](int i) { return each[i].normal(given); }) : point.shading;
+    }
+    Vec3x4 specular(const Vec3x4& normal) const { return VIEWCAM_ISA::specular_normal(incoming, point.normal, normal); }
+    Vec3x4 specular_normal(const Color& given) const { return specular(normal(given)); }
+    long4 is_smooth(const MicrofacetsOf<double4>& facets) const { return is_mirror(facets, version); }
+};
+
+// The number type that one point, or four, are computed in, and the BSDF there.
+template <class At> constexpr bool IS_ONE = std::is_same_v<At, ShadingPoint>;
+template <class At> using NumberOf = std::conditional_t<IS_ONE<At>, double, double4>;
+template <class At> using BSDFAt = BSDFOf<NumberOf<At>>;
 
 // A unit vector in the plane at a right angle to a normal, the one that Cycles takes.
 inline Vec3 along_plane(Vec3 n) {

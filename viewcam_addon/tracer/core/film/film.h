@@ -1,6 +1,6 @@
 // What paths bring to the eye, sorted by the pass that shows it, and the passes that become of all samples of a pixel.
 //
-// A pixel's samples are added one after the other, in order, so that a sum is the same, bit for bit, whatever the tile. Colours
+// A pixel's samples are added one after the other, in order, so that a sum is the same, bit for bit, whatever the tile. Colors
 // are summed as differences from the pixel's first sample: where all are equal the variance is 0, and not a rounding.
 //
 // Variance of a mean is that of the means of batches, some 16 of as many samples that follow one another, over their number.
@@ -19,7 +19,7 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-// The colour of diffuse surfaces that the eye sees, and what it sees of lights; of the world behind all; after one diffuse
+// The color of diffuse surfaces that the eye sees, and what it sees of lights; of the world behind all; after one diffuse
 // scattering; after more, the first of them diffuse; and what mirrors and glass show. All light is the picture.
 enum Category : uint8_t { COLOR, EMISSION, ENVIRONMENT, DIRECT, INDIRECT, OTHER, CATEGORIES };
 
@@ -142,7 +142,7 @@ class Pixel {
 
     Vec3 mean(Category category, const FilmSettings& film) const { return rgb(totals_[category]) / count_ * film.exposure; }
 
-    // Light divided by the colour that it fell on; where a channel is black, the mean of the others, as in Cycles.
+    // Light divided by the color that it fell on; where a channel is black, the mean of the others, as in Cycles.
     static Vec3 without_color(Vec3 light, Vec3 color) {
         double divided[3], sum = 0;
         int colored = 0;

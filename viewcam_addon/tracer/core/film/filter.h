@@ -5,9 +5,9 @@
 // that are spread evenly over the mass.
 //
 // BOX is one pixel wide, whatever its width, as in Cycles. BLACKMAN_HARRIS of width f reaches f pixels to either side of the
-// centre: 0.35875 − 0.48829 cos θ + 0.14128 cos 2θ − 0.01168 cos 3θ, θ = π (x/f + 1) (Harris, Proceedings of the IEEE 66, 1978).
+// center: 0.35875 − 0.48829 cos θ + 0.14128 cos 2θ − 0.01168 cos 3θ, θ = π (x/f + 1) (Harris, Proceedings of the IEEE 66, 1978).
 //
-// GAUSSIAN of width f is exp(−8 (v/f)²) at v pixels from the centre, up to 1.5 f to either side: six standard deviations of f/4
+// GAUSSIAN of width f is exp(−8 (v/f)²) at v pixels from the center, up to 1.5 f to either side: six standard deviations of f/4
 // each (filter_func_gaussian and filter_table there).
 //
 // A distribution is inverted at 64 numbers to each halving of the mass that is left to the filter's nearer end, and by a cubic
@@ -17,13 +17,13 @@
 // in the processor's nearest cache.
 //
 // Cycles' table (intern/cycles/scene/film.cpp, 1,024 entries, of which the middle is the 511th of 0 … 1,023) has three faults.
-// u = ½, its first sample, misses the centre by half a step: 0.25/511 px for BOX, 3.5e-4 f for BLACKMAN_HARRIS. The last entry
+// u = ½, its first sample, misses the center by half a step: 0.25/511 px for BOX, 3.5e-4 f for BLACKMAN_HARRIS. The last entry
 // is left at 0, so that one sample of 1,023 is spread evenly from the pixel's lower left corner to the filter's end: that makes
 // BOX exact, and moves the mean of BLACKMAN_HARRIS by (f/2 − ¼)/1,023 px, 4.9e-4 px at f = 1.5. And its outer steps are long.
 // An edge's pixel is off by no more than 5.8e-4 of the contrast for it (f = 1.5, edges at any angle), one of a smooth surface by
 // 4.9e-4 px times the slope. GAUSSIAN reaches farther: 9.7e-4 and 8.6e-4 px. The tracer's own noise of such a pixel, 0.35 N^−3/4 of the contrast, is larger up to 5,000 samples.
 //
-// Rejected: weighting samples of several pixels (splatting), which makes neighbours' errors depend on one another and their
+// Rejected: weighting samples of several pixels (splatting), which makes neighbors' errors depend on one another and their
 // variance unknown; Newton's method on each number, whose sines cost ten times as much; lines between 2¹⁶ even steps, half a
 // megabyte that other data push out of the cache, and 3.7e-5 of the mass off; and Cycles' table.
 #pragma once
@@ -74,7 +74,7 @@ class Filter {
         : reach_(width * (shape == GAUSSIAN ? Gaussian::REACH : BlackmanHarris::REACH)),
           places_(shape == BOX ? nullptr : shape == GAUSSIAN ? &inverse<Gaussian>() : &inverse<BlackmanHarris>()) {}
 
-    // Pixels from a pixel's lower left corner, ½ being its centre, of four samples. u: in [0, 1).
+    // Pixels from a pixel's lower left corner, ½ being its center, of four samples. u: in [0, 1).
     Vec2x4 offset(const Vec2x4& u) const { return places_ ? Vec2x4{offset(u.x), offset(u.y)} : u; }
 
    private:
@@ -96,7 +96,7 @@ class Filter {
         ulong4 rest = bits & ((uint64_t(1) << DROPPED) - 1);
         double4 t = ((double4)(rest | std::bit_cast<uint64_t>(1.0)) - 1.0) * double(1 << DIGITS);
         double4 place = a + t * (b + t * (c + t * d));
-        ulong4 turn = (ulong4)(0.5 - u) & uint64_t(1) << 63;  // its sign, beyond the centre
+        ulong4 turn = (ulong4)(0.5 - u) & uint64_t(1) << 63;  // its sign, beyond the center
         return (double4)((ulong4)place ^ turn) * reach_ + 0.5;
     }
 
@@ -115,7 +115,7 @@ class Filter {
             steps[step] = {x, first, 3 * rise - 2 * first - last, first + last - 2 * rise};
             x = next, slope = next_slope, begin = end;
         }
-        steps.back() = {x, -x * (0.5 / LEAST / (1 << DIGITS)), 0, 0};  // at the centre, soon after it began, just 0
+        steps.back() = {x, -x * (0.5 / LEAST / (1 << DIGITS)), 0, 0};  // at the center, soon after it began, just 0
         return steps;
     }
 

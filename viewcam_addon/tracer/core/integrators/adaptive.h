@@ -8,11 +8,11 @@
 // as many with every round. Nothing is shared but the decision: a pixel's mean is that of its own samples, all of equal weight.
 //
 // A pixel's own samples have no say in how many it gets. What has missed a bright thing looks both darker and quieter than it is,
-// and would stop for that very reason, while its neighbour, which met it, would go on and average it away: light would be lost.
+// and would stop for that very reason, while its neighbor, which met it, would go on and average it away: light would be lost.
 // So the variance of a sample, s², is the mean over the pixels around it, without the pixel itself. Measured at a Cornell box with
 // a mirror and a light that it shows (level `path`, E = 0.05): pixels that stop by themselves make the picture's tiles too dark by
-// 16 of their standard errors, those that stop by the larger of themselves and their neighbours by 1.4, these by 0.5. The price is
-// a thing that one pixel alone meets: it keeps the noise that its neighbours have not.
+// 16 of their standard errors, those that stop by the larger of themselves and their neighbors by 1.4, these by 0.5. The price is
+// a thing that one pixel alone meets: it keeps the noise that its neighbors have not.
 //
 // The samples of a pixel share its space out among them, so that s²/N is 3 to 11 times the variance of their mean. The means of
 // the two halves of the samples, apart by D, tell more: E[D²]/4 is the variance of the mean where samples are independent, and
@@ -20,7 +20,7 @@
 // as often far too small as too large. So s²/N is multiplied by what D²/4 is in the mean over 8 × 8 pixels, over what s²/N is
 // there: again without the pixel itself.
 //
-// Rejected: means over neighbours (a denoiser is no reference), and weighing rounds by their variance, which is bias.
+// Rejected: means over neighbors (a denoiser is no reference), and weighing rounds by their variance, which is bias.
 #pragma once
 #include <stdexcept>
 #include <utility>

@@ -106,7 +106,7 @@ inline void slopes_at(const Scene& scene, double column, double row, const Hit& 
     }
 }
 
-// trace(rays, pixels, count) for the pixel centres of some rows, from the bottom, in blocks of 16 × 4, as many columns as fill the
+// trace(rays, pixels, count) for the pixel centers of some rows, from the bottom, in blocks of 16 × 4, as many columns as fill the
 // cache lines of the passes; `*stop`, if there is one, ends it early.
 template <class Trace> void for_pixel_centers(const Camera& camera, uint32_t begin, uint32_t end, const volatile int* stop, const Trace& trace) {
     constexpr uint32_t WIDTH = 16, HEIGHT = 4;
@@ -143,7 +143,7 @@ inline void render_geometry(
     });
 }
 
-// Of each pixel of a camera whether its centre shows anything at all.
+// Of each pixel of a camera whether its center shows anything at all.
 inline void silhouette(const Scene& scene, const Camera& camera, uint8_t* covered) {
     for_pixel_centers(camera, 0, camera.height, nullptr, [&](const Rays& rays, const size_t* pixels, int count) {
         bool found[PACKET];

@@ -26,11 +26,9 @@
 // material that asks which kind has come, a lamp without shadows): how much of it a picture has is its renderer's own weights of multiple
 // importance sampling, which elsewhere make no difference.
 //
-// Where paths come to matte surfaces of meshes, four go on at a time, at every depth: surface, light, lobe and the next ray are computed
-// in vectors, with nothing in memory between them, whatever the other paths of the block have met (MattePaths). Formulas that both
-// ways share are templates over one number or four, so that a path has the same bits either way. 378,000 triangles under a sun of half
-// a degree take 1.4 times as many samples a second so, under an area light at level `path` 1.2 times, whose single rays are most of the
-// work; numbers, film points and sums alone in vectors, with structures of a path each between them, 1.0 to 1.06 times.
+// Where paths come to surfaces of meshes whose materials are wide (Material::is_wide), four of one material go on at a time, at every
+// depth: surface, light, lobes and the next ray are computed in vectors, whatever the other paths of the block have met (WidePaths).
+// Formulas that both ways share are templates over one number or four, so that a path has the same bits either way.
 //
 // Rejected: splitting a path at glass, which makes work where light is faint.
 #pragma once
@@ -90,7 +88,7 @@ class PathIntegrator {
             meets_[kind] = shines || lights_.environment().lights(kind) || lights_.meets_lamps(kind);
             only_sky_[kind] = !shines && !transparent_ && !lights_.meets_lamps(kind) && !scene.hides_anything();
         }
-        for (const Material& material : scene.illumination.materials) matte_.push_back(material.matte_color());
+        for (const Material& material : scene.illumination.materials) wide_.push_back(material.is_wide());
         shadow_linked_ = shines && scene.is_shadow_linked();
         for (const ValueNode& node : scene.illumination.nodes.all) has_pixels_ |= std::holds_alternative<BumpNode>(node);
         dark_ = !shines && !transparent_;
@@ -127,7 +125,7 @@ class PathIntegrator {
         block.live = 0;
         for (int i = 0; i < count; i++) light[i].clear();
         start(count, block);
-        for (int depth = 1; block.live > 0 || block.matte > 0; depth++) {
+        for (int depth = 1; block.live > 0 || block.wide; depth++) {
             scatter(depth, block);
             gather(depth, block);
             arrive(depth, block);
@@ -135,7 +133,7 @@ class PathIntegrator {
     }
 
    private:
-    // Light may grow with every scattering by colours beyond 1; with no more than this, no square of it is infinite.
+    // Light may grow with every scattering by colors beyond 1; with no more than this, no square of it is infinite.
     static constexpr double MOST_WEIGHT = 1e40;
     // Scatterings before a path may be ended by chance. Sooner, it costs more noise than it saves time.
     static constexpr int CERTAIN = 3;
@@ -166,30 +164,30 @@ class PathIntegrator {
         RayKind shadow_rays;
         RayState ray;  // where anything lets light through
     };
-    // Where a path has come to a matte surface: on a triangle, of which nothing has been computed yet.
-    struct MattePoint {
+    // Where a path has come to a wide material: on a triangle, of which nothing has been computed yet.
+    struct WidePoint {
         TriangleHit hit;
-        double4 color;
+        uint32_t material;
     };
-    // Some of four paths at such points, where a light, or the path's next ray, is found.
-    struct MattePaths {
-        unsigned lanes;
+    // Up to four paths at such points, of one material. A lane that has none goes along with one that has.
+    struct WidePaths {
+        unsigned lanes = 0;
         int slots[4], samples[4];
         const Path* paths[4];
         SurfacePoint<double4> at;
-        Vec3x4 color, weight;
+        Vec3x4 incoming, weight;
+        double4 footprint;  // where materials ask for that
     };
     struct Block {
         const CameraSamples* samples;
         PathLight *light, ignored;
         int live = 0, lit[LightSampler::ASKED] = {};
         Path paths[MOST], onwards[MOST];
-        // Paths at matte surfaces by slot, which is the sample's number for rays from the eye; `matte_lanes`: which of each four are there.
-        int matte = 0;
-        uint8_t matte_lanes[MOST / 4] = {};
-        Path matte_paths[MOST];
-        MattePoint matte_points[MOST];
-        Interaction tables[2][2 * MOST], *points = tables[0], *next_points = tables[1];  // those of matte surfaces behind the others
+        // Paths at wide materials by slot, which is the sample's number for rays from the eye; `wide`: a bit for each slot that has one.
+        uint64_t wide = 0;
+        Path wide_paths[MOST];
+        WidePoint wide_points[MOST];
+        Interaction tables[2][2 * MOST], *points = tables[0], *next_points = tables[1];  // those of wide materials behind the others
         Shadowed shadowed[LightSampler::ASKED][MOST];  // by the light that was asked
         Rays shadow_rays[LightSampler::ASKED];
         Hits hits;
@@ -313,20 +311,16 @@ class PathIntegrator {
         if (VIEWCAM_ISA::is_bumped(normal)) point.shading = at.normal(normal);
         return at;
     }
-    // Whether what a path has met is matte, and no more must be known of it; `point` receives what scattering needs.
-    bool meets_matte(const Hit& hit, MattePoint& point) const {
-        if (coincident_ > 0 || has_pixels_) return false;
+    // Whether what a path has met has a wide material; `point` receives what scattering needs.
+    bool meets_wide(const Hit& hit, WidePoint& point) const {
+        if (coincident_ > 0) return false;
         const Object& object = scene_.objects[hit.object];
         auto mesh = std::get_if<TriangleMesh>(&scene_.geometries[object.geometry]);
         if (!mesh) return false;
-        Vec3 color = matte_[scene_.slots[object.first_slot + uint32_t(mesh->materials[hit.primitive])].material];
-        if (VIEWCAM_ISA::is_black(color)) return false;
-        point = {{mesh, &object, nullptr, hit.primitive}, double4{color.x, color.y, color.z, 0}};
+        uint32_t material = scene_.slots[object.first_slot + uint32_t(mesh->materials[hit.primitive])].material;
+        if (!wide_[material]) return false;
+        point = {{mesh, &object, nullptr, hit.primitive}, material};
         return true;
-    }
-    static void add_matte(int slot, Block& block) {
-        block.matte++;
-        block.matte_lanes[slot / 4] |= uint8_t(1 << slot % 4);
     }
     // What a path brings of the light of a surface where its ray arrives, less what samples of that light find. distance: from
     // where it was scattered.
@@ -470,9 +464,9 @@ class PathIntegrator {
         for (int i = 0; i < count; i++) {
             Hit& hit = block.met[met] = block.hits.hit(i);
             block.light[i].covered = 1;
-            bool is_matte = hit && meets_matte(hit, block.matte_points[i]);
-            if (is_matte) add_matte(i, block);
-            if (is_matte && !lights_.meets_lamps(CAMERA)) continue;
+            bool is_wide = hit && meets_wide(hit, block.wide_points[i]);
+            block.wide |= uint64_t(is_wide) << i;
+            if (is_wide && !lights_.meets_lamps(CAMERA)) continue;
             Ray& ray = block.met_rays[met] = block.samples->rays.ray(i);
             Path& path = block.paths[met];  // the rest is known when it is scattered
             path.sample = i, path.from = met;
@@ -484,7 +478,7 @@ class PathIntegrator {
                 leave(path, ray, 0, block);
                 continue;
             }
-            if (!is_matte) block.met_by[met++] = &ray;
+            if (!is_wide) block.met_by[met++] = &ray;
         }
         scene_.interactions(block.met_by, block.met, met, block.points);
         for (int k = 0; k < met; k++) {
@@ -543,9 +537,9 @@ class PathIntegrator {
             Path& next = block.onwards[onwards];
             next = path;
             next.from = path.from;
-            next.kind = sampled.kind, next.diffuse = sampled.is_diffuse;
+            next.kind = RayKind(sampled.kind), next.diffuse = sampled.is_diffuse;
             next.last = last & sampled.kind;
-            next.scattered[row(sampled.kind)]++;
+            next.scattered[row(next.kind)]++;
             next.through = through;
             next.category = after(path.category, sampled.is_diffuse, depth);
             next.weight = min(path.weight * sampled.weight, MOST_WEIGHT);
@@ -566,93 +560,133 @@ class PathIntegrator {
             next.may_touch = passed ? point.backside : path.touches;
             onwards++;
         }
-        if (block.matte > 0) scatter_matte(depth, onwards, block);
+        scatter_wide(depth, onwards, block);
         block.live = onwards;
     }
 
-    // The same of paths at matte surfaces, four at a time.
-    void scatter_matte(int depth, int& onwards, Block& block) const {
-        block.matte = 0;
-        for (int first = 0; first < MOST; first += 4) {
-            unsigned lanes = std::exchange(block.matte_lanes[first / 4], 0);
-            if (!lanes) continue;
-            MattePaths four = matte_paths(first, lanes, depth, block);
-            if (!lit_) continue;
-            light_matte(four, depth, block, onwards);
+    // The same of paths at wide materials, four of one at a time.
+    void scatter_wide(int depth, int& onwards, Block& block) const {
+        for (uint64_t left = std::exchange(block.wide, 0); left;) {
+            WidePaths four;
+            uint32_t material = block.wide_points[std::countr_zero(left)].material;
+            int count = 0;
+            for (uint64_t others = left; others && count < 4; others &= others - 1) {
+                int slot = std::countr_zero(others);
+                if (block.wide_points[slot].material != material) continue;
+                four.slots[count++] = slot;
+                left &= ~(uint64_t(1) << slot);
+            }
+            four.lanes = (1u << count) - 1;
+            for (; count < 4; count++) four.slots[count] = four.slots[0];
+            scatter_wide(four, scene_.illumination.materials[material], depth, onwards, block);
         }
     }
-    // What is known of four paths where they are; of the eye's, adds the colour. A lane that has none goes along with one that has.
-    [[gnu::always_inline]] MattePaths matte_paths(int first, unsigned lanes, int depth, Block& block) const {
+    void scatter_wide(WidePaths& four, const Material& made_of, int depth, int& onwards, Block& block) const {
         static constexpr Path eye{};
-        MattePaths four;
-        four.lanes = lanes;
         TriangleHit hits[4];
         Vec3x4 origin, direction;
-        for (int i = 0, some = std::countr_zero(lanes); i < 4; i++) {
-            int slot = four.slots[i] = first + (lanes >> i & 1 ? i : some);
-            hits[i] = block.matte_points[slot].hit;
-            four.paths[i] = depth == 1 ? &eye : &block.matte_paths[slot];
+        for (int i = 0; i < 4; i++) {
+            int slot = four.slots[i];
+            hits[i] = block.wide_points[slot].hit;
+            four.paths[i] = depth == 1 ? &eye : &block.wide_paths[slot];
             four.samples[i] = depth == 1 ? slot : four.paths[i]->sample;
         }
-        auto color = [&](int i) { return block.matte_points[four.slots[i]].color; };
-        double4 red = color(0), green = color(1), blue = color(2), none = color(3);
-        transpose(red, green, blue, none);
-        four.color = {red, green, blue};
         if (depth == 1) {
-            const Rays& rays = block.samples->rays;
-            origin = {load<double4>(rays.origin[0] + first), load<double4>(rays.origin[1] + first), load<double4>(rays.origin[2] + first)};
-            direction = {load<double4>(rays.direction[0] + first), load<double4>(rays.direction[1] + first), load<double4>(rays.direction[2] + first)};
+            auto rays = [&](const double (&values)[3][PACKET]) {
+                auto of_slots = [&](const double* value) { return gather4([&](int i) { return value[four.slots[i]]; }); };
+                return Vec3x4{of_slots(values[0]), of_slots(values[1]), of_slots(values[2])};
+            };
+            origin = rays(block.samples->rays.origin), direction = rays(block.samples->rays.direction);
             four.weight = splat4(Vec3{1, 1, 1});
-            for (unsigned left = lanes; left;) {
-                int i = take_bit(left);
-                block.light[four.samples[i]].add(COLOR, color(i));
-            }
         } else {
             origin = gather4([&](int i) { return four.paths[i]->ray.origin; });
             direction = gather4([&](int i) { return four.paths[i]->ray.direction; });
             four.weight = gather4([&](int i) { return four.paths[i]->weight; });
         }
-        four.at = TriangleSurfaces(hits, 4, origin, direction).points();
-        return four;
+        TriangleSurfaces surfaces(hits, 4, origin, direction);
+        four.at = surfaces.points();
+        four.incoming = depth == 1 ? normalize(direction) : direction;
+        if (has_pixels_) four.footprint = gather4([&](int i) {
+            Interaction point;
+            point.position = lane(four.at.position, i), point.t = surfaces.t()[i], point.object = uint32_t(hits[i].object - scene_.objects.data());
+            return shading(point, *four.paths[i], {}, depth - 1).footprint();
+        });
+        if (!made_of.varies()) {
+            BSDFOf<double4> bsdf = made_of.bsdf(ShadingPoints{four.at, four.incoming, scene_.illumination.version, nullptr});
+            return scatter_wide(four, bsdf, depth, onwards, block);
+        }
+        Interaction points[4];
+        scene_.interactions(surfaces, hits, points);
+        auto point = [&](int i) { return shading(points[i], *four.paths[i], lane(four.incoming, i), depth - 1); };
+        const ShadingPoint each[] = {point(0), point(1), point(2), point(3)};
+        BSDFOf<double4> bsdf = made_of.bsdf(ShadingPoints{four.at, four.incoming, scene_.illumination.version, each});
+        scatter_wide(four, bsdf, depth, onwards, block);
     }
-    void light_matte(const MattePaths& four, int depth, Block& block, int& onwards) const {
+    void scatter_wide(const WidePaths& four, BSDFOf<double4>& bsdf, int depth, int& onwards, Block& block) const {
+        if (depth == 1) {
+            Vec3x4 color = bsdf.diffuse_color();
+            for (unsigned left = four.lanes; left;) {
+                int i = take_bit(left);
+                block.light[four.samples[i]].add(COLOR, lane(color, i));
+            }
+        }
+        if (bsdf.is_black() || !lit_) return;
         auto of_samples = [&](const uint32_t* values) { return uint4{values[four.samples[0]], values[four.samples[1]], values[four.samples[2]], values[four.samples[3]]}; };
         uint4 keys = of_samples(block.samples->key), numbers = of_samples(block.samples->number);
         auto number = [&](SobolSampler::Purpose purpose) { return sampler_.number(keys, numbers, SobolSampler::dimension(depth, purpose)); };
         auto pair = [&](SobolSampler::Purpose purpose) { return sampler_.pair(keys, numbers, SobolSampler::dimension(depth, purpose)); };
         auto point_of = [&](int i) {
-            const TriangleHit& hit = block.matte_points[four.slots[i]].hit;
+            const TriangleHit& hit = block.wide_points[four.slots[i]].hit;
             Interaction point;
             static_cast<SurfacePoint<double>&>(point) = lane(four.at, i);
             point.object = uint32_t(hit.object - scene_.objects.data()), point.primitive = hit.triangle;
             return point;
         };
-        unsigned last = 0;
-        for (int i = 0; i < 4; i++)
-            if (depth >= most_ || four.paths[i]->scattered[row(DIFFUSE)] + 1 >= most_of_[DIFFUSE]) last |= 1u << i;
+        // The lanes that have lobes of a kind; of these, where rays can bring anything, and those on which the path ends.
+        unsigned diffuse = bits(has(bsdf.kinds(), DIFFUSE)), glossy = bits(has(bsdf.kinds(), GLOSSY)), last_diffuse = 0, last_glossy = 0;
+        for (int i = 0; i < 4; i++) {
+            auto ends = [&](RayKind kind) { return unsigned(depth >= most_ || four.paths[i]->scattered[row(kind)] + 1 >= most_of_[kind]) << i; };
+            last_diffuse |= ends(DIFFUSE), last_glossy |= ends(GLOSSY);
+        }
+        if (!meets_[DIFFUSE]) diffuse &= ~last_diffuse;
+        if (!meets_[GLOSSY]) glossy &= ~last_glossy;
 
-        LambertOf<double4> lobe{four.color, four.at.shading};
         LightSampler::Choices choices[LightSampler::ASKED];
-        double4 brightest, u{};
+        double4 brightest{}, sky = splat4(1.0), u{};
         Vec2x4 u_light;
-        if (lights_.is_random()) u = number(SobolSampler::LIGHT), u_light = pair(SobolSampler::LIGHT_POINT);
-        lights_.choose(point_of, four.lanes, u, depth == 1, choices, brightest);
+        if (unsigned lit = four.lanes & bits(has(bsdf.spread_kinds(), DIFFUSE | GLOSSY)); lit && lights_.count() > 0) {
+            if (lights_.is_random()) u = number(SobolSampler::LIGHT), u_light = pair(SobolSampler::LIGHT_POINT);
+            lights_.choose(point_of, lit, u, depth == 1, choices, brightest);
+        }
+        if (unsigned thinned = bits(long4(brightest > 0.0)) & last_diffuse) {
+            double4 share = splat4(1.0);
+            while (thinned) {
+                int i = take_bit(thinned);
+                if (glossy >> i & 1)  // lobes that may show lamps take its place
+                    share[i] = min(lights_.sky_share(brightest[i], DIFFUSE), 1.0);
+                else
+                    sky[i] = lights_.sky_chance(brightest[i], DIFFUSE);
+            }
+            bsdf.thin(DIFFUSE, share);
+        }
         for (int slot = 0; slot < LightSampler::ASKED; slot++)
-            if (choices[slot].lanes) ask(choices[slot], slot, four, lobe, point_of, u_light, depth, block);
+            if (choices[slot].lanes) ask(choices[slot], slot, four, bsdf, point_of, u_light, depth, block);
 
-        unsigned going = meets_[DIFFUSE] ? four.lanes : four.lanes & ~last;
-        if (!going) return;
-        LobeSampleOf<double4> sampled = lobe.sample(pair(SobolSampler::DIRECTION));
-        going &= bits(long4(dot(sampled.direction, four.at.normal) > splat4(0.0)));
-        Vec3x4 weight = four.weight * sampled.weight, origin = four.at.ray_origin(sampled.direction);
+        if (!(four.lanes & (diffuse | glossy))) return;
+        BSDFSampleOf<double4> sampled = bsdf.sample(bsdf.needs_choice() ? number(SobolSampler::LOBE) : double4{}, [&] { return pair(SobolSampler::DIRECTION); });
+        unsigned is_diffuse = bits(sampled.is_diffuse), goes_diffuse = bits(has(sampled.kind, DIFFUSE));
+        unsigned going = four.lanes & ((goes_diffuse & diffuse) | (bits(has(sampled.kind, GLOSSY)) & glossy));
+        going &= bits(long4(dot(sampled.direction, four.at.normal) > 0.0));
+        Vec3x4 weight = min(four.weight * sampled.weight, MOST_WEIGHT), origin = four.at.ray_origin(sampled.direction);
         while (going) {
             int i = take_bit(going);
             const Path& path = *four.paths[i];
-            bool ends = last >> i & 1;
-            Vec3 left = min(lane(weight, i), MOST_WEIGHT);
+            RayKind kind = goes_diffuse >> i & 1 ? DIFFUSE : GLOSSY;
+            bool ends = (kind == DIFFUSE ? last_diffuse : last_glossy) >> i & 1;
+            Vec3 left = lane(weight, i);
             double survival = 1;
-            if (ends && brightest[i] > 0)
-                survival = lights_.sky_chance(brightest[i], DIFFUSE);
+            if (kind == DIFFUSE && ends)
+                survival = sky[i];
             else if (!ends && depth > CERTAIN)
                 survival = min(std::sqrt(max_component(left)), 1.0);
             if (survival < 1) {
@@ -663,49 +697,63 @@ class PathIntegrator {
             Path& next = block.onwards[onwards++];
             next = path;
             next.sample = four.samples[i], next.from = MOST + four.slots[i];
-            next.kind = DIFFUSE, next.diffuse = true, next.last = ends, next.through = false;
-            next.scattered[row(DIFFUSE)]++;
-            next.category = after(path.category, true, depth);
+            next.kind = kind, next.diffuse = is_diffuse >> i & 1, next.last = ends, next.through = false;
+            next.scattered[row(kind)]++;
+            next.category = after(path.category, next.diffuse, depth);
             next.weight = left, next.pdf = sampled.pdf[i];
             next.ray = {lane(origin, i), lane(sampled.direction, i), 0, INFINITE};
+            if (has_pixels_) next.width = four.footprint[i], next.spread = depth == 1 ? scene_.camera.spread(lane(four.incoming, i)) : path.spread;
             next.may_touch = path.touches;
         }
     }
 
-    // Notes what lights bring to matte points if nothing hides them.
+    // Notes what lights bring to four points if nothing hides them.
     template <class PointOf>
-    void ask(const LightSampler::Choices& choice, int slot, const MattePaths& four, const LambertOf<double4>& lobe, const PointOf& point_of, const Vec2x4& u, int depth, Block& block) const {
+    void ask(const LightSampler::Choices& choice, int slot, const WidePaths& four, const BSDFOf<double4>& bsdf, const PointOf& point_of, const Vec2x4& u, int depth, Block& block) const {
         LightSampleOf<double4> sample = choice.sample_li(four.at, point_of, u);
-        long4 lossy{}, found{};
-        unsigned lanes = 0, traced = 0;
+        uint4 kinds{};
+        long4 lossy{}, found_by_diffuse{}, found_by_glossy{};
+        unsigned traced = 0;
         for (unsigned left = choice.lanes; left;) {
             int i = take_bit(left);
             const Light& light = *choice.light[i];
-            lossy[i] = -int64_t(light.multiple_importance), found[i] = -int64_t(light.is_found_by(DIFFUSE));
-            if (!(light.hidden_from & DIFFUSE) && (!lights_.is_linked() || lights_.reaches(light, point_of(i)))) lanes |= 1u << i;
+            if (lights_.is_linked() && !lights_.reaches(light, point_of(i))) continue;
+            kinds[i] = ~light.hidden_from;
+            lossy[i] = -int64_t(light.multiple_importance);
+            found_by_diffuse[i] = -int64_t(light.is_found_by(DIFFUSE)), found_by_glossy[i] = -int64_t(light.is_found_by(GLOSSY));
             traced |= unsigned(light.casts_shadow) << i;
         }
         // See the other one.
-        double4 zero = splat4(0.0), pdf = lobe.pdf(sample.direction);
-        Vec3x4 light = four.color * pdf;
-        long4 behind = ~long4(dot(four.at.normal, sample.direction) > zero);
-        if (long4 shared = found | (lossy & behind); any(shared))
-            light = light * select(shared, power_heuristic(sample.pdf * choice.chance, pdf), splat4(1.0));
-        light = light * sample.weight;
-        lanes &= ~bits(long4(light.x == zero) & long4(light.y == zero) & long4(light.z == zero));
+        double4 zero{};
+        lossy &= ~long4(dot(four.at.normal, sample.direction) > zero);
+        auto weight = [&](RayKind kind, auto&& pdf) {
+            long4 shared = lossy | (kind == DIFFUSE ? found_by_diffuse : found_by_glossy);
+            return any(shared) ? select(shared, power_heuristic(sample.pdf * choice.chance, pdf()), splat4(1.0)) : splat4(1.0);
+        };
+        ScatteredLightOf<double4> light = bsdf.eval(sample.direction, kinds, weight);
+        if (depth > 1) light.diffuse = light.diffuse + light.other, light.other = {};
+        light.diffuse = light.diffuse * sample.weight, light.other = light.other * sample.weight;
+        long4 black = is_black(light.diffuse), has_other = ~is_black(light.other);
+        unsigned lanes = choice.lanes & bits(~black | has_other), others = bits(has_other);
         if (!lanes) return;
-        light = light * four.weight / choice.chance;
-        double4 brought[4] = {light.x, light.y, light.z, zero};
-        transpose(brought[0], brought[1], brought[2], brought[3]);
+        light.diffuse = light.diffuse * four.weight / choice.chance;
+        double4 diffuse[4] = {light.diffuse.x, light.diffuse.y, light.diffuse.z, zero}, other[4] = {};
+        transpose(diffuse[0], diffuse[1], diffuse[2], diffuse[3]);
+        if (others) {
+            light.other = light.other * four.weight / choice.chance;
+            other[0] = light.other.x, other[1] = light.other.y, other[2] = light.other.z;
+            transpose(other[0], other[1], other[2], other[3]);
+        }
         Vec3x4 origin = four.at.ray_origin(sample.direction);
         double4 end = shadow_ray_end(four.at, origin, sample);
         while (lanes) {
             int i = take_bit(lanes), place = block.lit[slot]++;
             const Path& path = *four.paths[i];
             Shadowed& shadowed = block.shadowed[slot][place];
-            shadowed.light = brought[i], shadowed.has_other = false, shadowed.sample = four.samples[i], shadowed.category = after(path.category, true, depth);
+            shadowed.light = diffuse[i], shadowed.other = other[i], shadowed.has_other = others >> i & 1;
+            shadowed.sample = four.samples[i], shadowed.category = after(path.category, true, depth);
             shadowed.traced = traced >> i & 1, shadowed.shadow_rays = choice.light[i]->shadow_rays;
-            if (transparent_) shadowed.ray = {SHADOW, false, false, depth, path.passed, path.scattered};
+            if (transparent_) shadowed.ray = {SHADOW, false, false, depth, path.passed, path.scattered, 0, has_pixels_ ? four.footprint[i] : 0};
             if (shadowed.traced) block.shadow_rays[slot].set(place, {lane(origin, i), lane(sample.direction, i), 0, end[i]});
         }
     }
@@ -830,7 +878,7 @@ class PathIntegrator {
 
     // Where rays come to; adds what shines there.
     void arrive(int depth, Block& block) const {
-        int arrived[MOST], met = 0;
+        int arrived[MOST], met = 0, wide = 0;
         for (int i = 0; i < block.live; i++) {
             Path& path = block.onwards[i];
             if (shadow_linked_ || lights_.is_shadow_linked()) meet_shadow_linked(path, depth, block);
@@ -843,10 +891,10 @@ class PathIntegrator {
             if (!hit) hit = scene_.closest(path.ray, path.kind);
             meet_lamps(path, path.ray, hit, depth, block);
             if (hit && path.last && dark_) continue;
-            if (hit && path.inside == NONE && meets_matte(hit, block.matte_points[block.matte])) {
+            if (hit && path.inside == NONE && meets_wide(hit, block.wide_points[wide])) {
                 if (path.last || has_ended(path)) continue;
-                block.matte_paths[block.matte] = path;
-                add_matte(block.matte, block);
+                block.wide_paths[wide] = path;
+                block.wide |= uint64_t(1) << wide++;
             } else if (hit)
                 arrived[met] = i, block.met_by[met] = &path.ray, block.met[met++] = hit;
             else
@@ -867,7 +915,7 @@ class PathIntegrator {
     }
 
     const Scene& scene_;
-    std::vector<Vec3> matte_;  // of each material, Material::matte_color
+    std::vector<char> wide_;  // of each material, Material::is_wide
     LightSampler lights_;
     SobolSampler sampler_;
     int most_, most_of_[TRANSMISSION + 1] = {};

@@ -29,13 +29,15 @@ class Environment {
         mean_ = radiance;
         if (!texture_) return;
         columns_ = std::min(texture_->width, MOST_COLUMNS), rows_ = std::min(texture_->height, MOST_COLUMNS / 2);
+        heights_.resize(size_t(rows_) + 1);
+        for (int row = 0; row <= rows_; row++) heights_[row] = row == 0 ? -1 : row == rows_ ? 1 : sin(PI * (double(row) / rows_ - 0.5));
         reached_.assign(size_t(rows_) * columns_, 0), rows_reached_.assign(rows_, 0);
         std::vector<Vec3> of_rows(rows_);
         parallel_for(threads, size_t(rows_), [&](size_t row) { of_rows[row] = cells(int(row), &reached_[row * columns_]); });
         mean_ = {};
         double total = 0;
         for (int row = 0; row < rows_; row++) {
-            double part = (cosine_below(row + 1) - cosine_below(row)) / 2;  // of the sphere
+            double part = (heights_[row + 1] - heights_[row]) / 2;  // of the sphere
             mean_ += of_rows[row] * (part / columns_);
             rows_reached_[row] = total += reached_[size_t(row + 1) * columns_ - 1] * part;
         }
@@ -61,7 +63,7 @@ class Environment {
         };
         int row = pick(rows_reached_.data(), rows_, u.y);
         int column = pick(&reached_[size_t(row) * columns_], columns_, u.x);
-        double low = cosine_below(row), z = mix(low, cosine_below(row + 1), u.y), across = std::sqrt(max(1 - z * z, 0.0));
+        double z = mix(heights_[row], heights_[row + 1], u.y), across = std::sqrt(max(1 - z * z, 0.0));
         SinCos turn = sincos_of_turns(0.5 - (column + u.x) / columns_);
         Vec3 direction = to_image.transposed({across * turn.cos, across * turn.sin, z});
         double pdf = pdf_of(row, column);
@@ -74,8 +76,8 @@ class Environment {
         Vec2 at = place(to_image.vector(direction));
         double z = to_image.vector(direction).z;
         int row = std::clamp(int(at.y * rows_), 0, rows_ - 1);
-        while (row > 0 && z < cosine_below(row)) row--;
-        while (row < rows_ - 1 && z > cosine_below(row + 1)) row++;
+        while (row > 0 && z < heights_[row]) row--;
+        while (row < rows_ - 1 && z > heights_[row + 1]) row++;
         return pdf_of(row, std::clamp(int(at.x * columns_), 0, columns_ - 1));
     }
 
@@ -84,8 +86,6 @@ class Environment {
 
     static double mix(double a, double b, double t) { return a + (b - a) * t; }
     static Vec2 place(Vec3 direction) { return equirectangular(direction); }
-    // The height of the lower edge of a row of cells on the unit sphere.
-    double cosine_below(int row) const { return row == 0 ? -1 : row == rows_ ? 1 : sin(PI * (double(row) / rows_ - 0.5)); }
     // What the cells of a row give in the mean over their pixels, all of them together; reached: receives their light, summed up.
     Vec3 cells(int row, double* reached) const {
         Vec3 sum;
@@ -108,6 +108,7 @@ class Environment {
     const Texture* texture_ = nullptr;
     Vec3 mean_{};
     int columns_ = 0, rows_ = 0;
+    std::vector<double> heights_;                 // of the rows' edges on the unit sphere
     std::vector<double> reached_, rows_reached_;  // light summed up along each row, and over the rows
 };
 

@@ -1,7 +1,7 @@
 // Lamps: what gives light and is no surface. One class a kind, and its place in the list at the end.
 //
 // Each has a NAME, by which a scene asks for it, and is made of where it stands (its own space to rendering space, whose z a sun is
-// seen towards), its colour (the irradiance of a sun, the power of all others) and the numbers that its kind has, by their names in
+// seen towards), its color (the irradiance of a sun, the power of all others) and the numbers that its kind has, by their names in
 // scene files. What it answers is in light_sample.h.
 #pragma once
 #include <variant>

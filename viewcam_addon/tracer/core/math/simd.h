@@ -117,6 +117,9 @@ inline Vec3x4 select(long4 mask, const Vec3x4& a, const Vec3x4& b) {
 }
 inline double4 length(const Vec3x4& a) { return sqrt(dot(a, a)); }
 inline double4 max_component(const Vec3x4& a) { return max(a.x, max(a.y, a.z)); }
+inline Vec3x4 min(const Vec3x4& a, double b) { return {min(a.x, splat4(b)), min(a.y, splat4(b)), min(a.z, splat4(b))}; }
+inline Vec3x4 max(const Vec3x4& a, double b) { return {max(a.x, splat4(b)), max(a.y, splat4(b)), max(a.z, splat4(b))}; }
+inline long4 is_black(const Vec3x4& rgb) { return long4(rgb.x == 0.0) & long4(rgb.y == 0.0) & long4(rgb.z == 0.0); }
 inline Vec3x4 abs(const Vec3x4& a) { return {abs(a.x), abs(a.y), abs(a.z)}; }
 // of(i) → double of four lanes, or Vec3.
 template <class Of> inline auto gather4(const Of& of) {
@@ -128,6 +131,8 @@ template <class Of> inline auto gather4(const Of& of) {
     }
 }
 
+// The lanes of a mask of half the width.
+inline unsigned bits(int4 mask) { return bits(__builtin_convertvector(mask, long4)); }
 inline bool any(long4 mask) { return bits(mask); }
 inline bool all(long4 mask) { return bits(mask) == 15; }
 // The bits of numbers, and numbers of bits.
@@ -147,6 +152,12 @@ template <class T> inline Vec3Of<T> splat(Vec3 v) { return {splat<T>(v.x), splat
 // What a comparison of these gives.
 inline Vec3 select(bool mask, Vec3 a, Vec3 b) { return mask ? a : b; }
 template <class T> using Mask = std::conditional_t<std::is_same_v<T, double4>, long4, bool>;
+// A set of flags for a number, or for each of four; those of `flags` where a mask holds.
+template <class T> using Flags = std::conditional_t<std::is_same_v<T, double4>, uint4, uint32_t>;
+inline uint32_t where(bool mask, uint32_t flags) { return mask ? flags : 0; }
+inline uint4 where(long4 mask, uint32_t flags) { return (uint4)__builtin_convertvector(mask, int4) & flags; }
+inline bool has(uint32_t flags, uint32_t flag) { return flags & flag; }
+inline long4 has(uint4 flags, uint32_t flag) { return __builtin_convertvector((int4)((flags & flag) != 0u), long4); }
 
 // A right-handed orthonormal frame about a unit vector, without a singularity; its error is 4e-16 for any vector.
 // Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6 (2017).

@@ -75,10 +75,10 @@ template <class T> inline T asin(T x) {
     T angle = detail::asin_of_small(select(is_small, size, sqrt(max((1.0 - size) / 2.0, T{}))));
     return copysign(select(is_small, angle, PI / 2 - 2.0 * angle), x);
 }
-inline double acos(double x) {
-    if (std::fabs(x) <= 0.5) return PI / 2 - asin(x);
-    double half = detail::asin_of_small(std::sqrt(max((1 - std::fabs(x)) / 2, 0.0)));
-    return x > 0 ? 2 * half : PI - 2 * half;
+template <class T> inline T acos(T x) {
+    T size = abs(x), half = detail::asin_of_small(sqrt(max((1.0 - size) / 2.0, T{})));
+    T far = select(Mask<T>(x > 0.0), 2.0 * half, PI - 2.0 * half);
+    return select(Mask<T>(size <= 0.5), PI / 2 - asin(x), far);
 }
 // 0 of (0, 0).
 inline double atan2(double y, double x) {

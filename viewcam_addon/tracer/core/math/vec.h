@@ -48,7 +48,7 @@ template <class T> inline Vec3Of<T> cross(Vec3Of<T> a, Vec3Of<T> b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 inline double length(Vec3 a) { return std::sqrt(dot(a, a)); }
-inline Vec3 normalize(Vec3 a) { return a / length(a); }
+template <class T> inline Vec3Of<T> normalize(Vec3Of<T> a) { return a / length(a); }
 inline double max_component(Vec3 a) { return max(a.x, max(a.y, a.z)); }
 inline Vec3 min(Vec3 a, double b) { return {min(a.x, b), min(a.y, b), min(a.z, b)}; }
 inline Vec3 max(Vec3 a, double b) { return {max(a.x, b), max(a.y, b), max(a.z, b)}; }

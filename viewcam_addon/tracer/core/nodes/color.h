@@ -1,4 +1,4 @@
-// Colours computed from others, as Blender's nodes of these names do it.
+// Colors computed from others, as Blender's nodes of these names do it.
 #pragma once
 #include "math.h"
 
@@ -12,7 +12,7 @@ inline Vec3 hsv_of(Vec3 rgb) {
     return {hue < 0 ? hue / 6 + 1 : hue / 6, range / most, most};
 }
 inline Vec3 rgb_of_hsv(Vec3 hsv) {
-    if (hsv.y == 0) return grey(hsv.z);
+    if (hsv.y == 0) return gray(hsv.z);
     double hue = hsv.x == 1 ? 0 : hsv.x * 6;
     auto channel = [&](double from) {  // 0 where the channel is full, and where it is empty 1
         double apart = std::fabs(hue - from);
@@ -30,10 +30,10 @@ inline Vec3 hsl_of(Vec3 rgb) {
 inline Vec3 rgb_of_hsl(Vec3 hsl) {
     double turns = 6 * hsl.x, range = (1 - std::fabs(2 * hsl.z - 1)) * hsl.y;
     Vec3 pure = unit_range(Vec3{std::fabs(turns - 3) - 1, 2 - std::fabs(turns - 2), 2 - std::fabs(turns - 4)});
-    return (pure - grey(0.5)) * range + grey(hsl.z);
+    return (pure - gray(0.5)) * range + gray(hsl.z);
 }
 
-// A colour's red, green and blue, or what another way of writing colours has in their place; and the other way round.
+// A color's red, green and blue, or what another way of writing colors has in their place; and the other way round.
 enum class ColorMode { RGB, HSV, HSL };
 inline ColorMode color_mode_of(const std::string& name) { return name == "hsv" ? ColorMode::HSV : name == "hsl" ? ColorMode::HSL : ColorMode::RGB; }
 
@@ -44,7 +44,7 @@ struct SeparateColorNode : SeparateNode {
     explicit SeparateColorNode(const Inputs& in) : SeparateNode(in), mode(color_mode_of(in.choice("mode"))) {}
     Vec3 eval(const ShadingPoint& at) const {
         Vec3 rgb = at.value(given);
-        return grey((mode == ColorMode::HSV ? hsv_of(rgb) : mode == ColorMode::HSL ? hsl_of(rgb) : rgb)[axis]);
+        return gray((mode == ColorMode::HSV ? hsv_of(rgb) : mode == ColorMode::HSL ? hsl_of(rgb) : rgb)[axis]);
     }
 };
 struct CombineColorNode : CombineNode {
@@ -143,7 +143,7 @@ struct MixColorNode {
         };
         for (const Named& each : BLENDS)
             if (name == each.name) return each.blend;
-        throw std::invalid_argument("colours are not mixed by " + name);
+        throw std::invalid_argument("colors are not mixed by " + name);
     }
 };
 
@@ -156,7 +156,7 @@ struct MixNumberNode {
     explicit MixNumberNode(const Inputs& in) : factor(in["factor"]), a(in["a"]), b(in["b"]), clamp_factor(in.flag("clamp_factor")) {}
     Vec3 eval(const ShadingPoint& at) const {
         double t = at.number(factor);
-        return grey(mix(at.number(a), at.number(b), clamp_factor ? unit_range(t) : t));
+        return gray(mix(at.number(a), at.number(b), clamp_factor ? unit_range(t) : t));
     }
 };
 
@@ -167,7 +167,7 @@ struct MixVectorNode {
     bool clamp_factor;
 
     explicit MixVectorNode(const Inputs& in) : factor(in["factor"]), a(in["a"]), b(in["b"]), clamp_factor(in.flag("clamp_factor")) {}
-    Vec3 eval(const ShadingPoint& at) const { return mixed(at, grey(at.number(factor))); }
+    Vec3 eval(const ShadingPoint& at) const { return mixed(at, gray(at.number(factor))); }
 
    protected:
     Vec3 mixed(const ShadingPoint& at, Vec3 t) const {
@@ -229,7 +229,7 @@ struct InvertNode {
     explicit InvertNode(const Inputs& in) : factor(in["factor"]), color(in["color"]) {}
     Vec3 eval(const ShadingPoint& at) const {
         Vec3 rgb = at.value(color);
-        return mix(rgb, grey(1) - rgb, at.number(factor));
+        return mix(rgb, gray(1) - rgb, at.number(factor));
     }
 };
 
@@ -239,7 +239,7 @@ struct LuminanceNode {
     Color color;
 
     explicit LuminanceNode(const Inputs& in) : color(in["color"]) {}
-    Vec3 eval(const ShadingPoint& at) const { return grey(luminance(at.value(color))); }
+    Vec3 eval(const ShadingPoint& at) const { return gray(luminance(at.value(color))); }
 };
 
 using ColorNodes = std::variant<SeparateColorNode, CombineColorNode, MixColorNode, MixNumberNode, MixVectorNode,

@@ -1,4 +1,4 @@
-// Curves that change colours, vectors and numbers: tables, as Cycles has them, straight between their entries.
+// Curves that change colors, vectors and numbers: tables, as Cycles has them, straight between their entries.
 #pragma once
 #include "math.h"
 
@@ -53,7 +53,7 @@ struct FloatCurveNode : Curves {
     static constexpr Gives GIVES = Gives::NUMBER;
     Color given;
     explicit FloatCurveNode(const Inputs& in) : Curves(in), given(in["value"]) {}
-    Vec3 eval(const ShadingPoint& at) const { return changed(at, grey(at.number(given))); }
+    Vec3 eval(const ShadingPoint& at) const { return changed(at, gray(at.number(given))); }
 };
 
 using CurveNodes = std::variant<RGBCurvesNode, VectorCurvesNode, FloatCurveNode>;

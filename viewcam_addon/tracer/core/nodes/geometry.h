@@ -32,7 +32,7 @@ struct TextureCoordinateNode {
     }
 };
 
-// What a mesh has under a name: a colour, a vector, their mean, or the fourth number, which is 1 where there is none.
+// What a mesh has under a name: a color, a vector, their mean, or the fourth number, which is 1 where there is none.
 struct AttributeNode {
     static constexpr const char* NAME = "attribute";
     static constexpr Gives GIVES = Gives::COLOR;
@@ -46,10 +46,10 @@ struct AttributeNode {
     Gives gives() const { return output == VECTOR ? Gives::VECTOR : GIVES; }
     Vec3 eval(const ShadingPoint& at) const {
         ShadingPoint::Values found = at.attribute(name);
-        if (output == ALPHA) return grey(found.fourth);
-        Vec3 value = found.width == 1 ? grey(found.first.x) : found.first;
-        if (output == NUMBER && found.width == 2) return grey(value.x);  // as in Cycles
-        return output == NUMBER ? grey((value.x + value.y + value.z) / 3) : value;
+        if (output == ALPHA) return gray(found.fourth);
+        Vec3 value = found.width == 1 ? gray(found.first.x) : found.first;
+        if (output == NUMBER && found.width == 2) return gray(value.x);  // as in Cycles
+        return output == NUMBER ? gray((value.x + value.y + value.z) / 3) : value;
     }
 };
 
@@ -165,7 +165,7 @@ struct GeometryNode {
             case INCOMING: return -at.incoming;
             case TANGENT: return at.tangent_round(2);
             case PARAMETRIC: return {1 - at.point.barycentric.x - at.point.barycentric.y, at.point.barycentric.x, 0};
-            default: return grey(at.point.backside);
+            default: return gray(at.point.backside);
         }
     }
 
@@ -211,7 +211,7 @@ struct WireframeNode {
             auto across = [&](Vec3 v) { return length(v - at.incoming * dot(v, at.incoming)); };
             width *= at.footprint() * (across(x) + across(y)) / 2;
         }
-        return grey(at.edge_distance() < width / 2);
+        return gray(at.edge_distance() < width / 2);
     }
 };
 
@@ -230,10 +230,10 @@ struct ObjectInfoNode {
         switch (output) {
             case LOCATION: return at.object->to_world.translation() + at.origin;
             case COLOR: return {info[0], info[1], info[2]};
-            case ALPHA: return grey(info[3]);
-            case OBJECT_INDEX: return grey(at.object->index);
-            case MATERIAL_INDEX: return grey(at.material_index());
-            default: return grey(info[4]);
+            case ALPHA: return gray(info[3]);
+            case OBJECT_INDEX: return gray(at.object->index);
+            case MATERIAL_INDEX: return gray(at.material_index());
+            default: return gray(info[4]);
         }
     }
 
@@ -256,7 +256,7 @@ struct FresnelNode {
 
     explicit FresnelNode(const Inputs& in) : ior(in["ior"]), normal(in["normal"]) {}
     Vec3 eval(const ShadingPoint& at) const {
-        return grey(fresnel(std::fabs(dot(at.incoming, at.normal(normal))), at.ratio(max(at.number(ior), 1e-5))));
+        return gray(fresnel(std::fabs(dot(at.incoming, at.normal(normal))), at.ratio(max(at.number(ior), 1e-5))));
     }
 };
 
@@ -272,13 +272,13 @@ struct LayerWeightNode {
         double cosine = std::fabs(dot(at.incoming, at.normal(normal))), blended = at.number(blend);
         if (!facing) {
             double left = max(1 - blended, 1e-5);
-            return grey(fresnel(cosine, at.point.backside ? left : 1 / left));
+            return gray(fresnel(cosine, at.point.backside ? left : 1 / left));
         }
         if (blended != 0.5) {
             blended = min(max(blended, 0.0), 1 - 1e-5);
             cosine = safe::power(cosine, blended < 0.5 ? 2 * blended : 0.5 / (1 - blended));
         }
-        return grey(1 - cosine);
+        return gray(1 - cosine);
     }
 };
 

@@ -52,7 +52,7 @@ struct IESNode {
         double b = in_row(row), c = in_row(row + 1);
         double beyond = goes_on ? b : 0;  // at either end
         double a = row > 0 ? in_row(row - 1) : beyond, d = row + 2 < across.size() ? in_row(row + 2) : beyond;
-        return grey(max(cubic(a, b, c, d, along_row), 0.0) * at.number(strength));
+        return gray(max(cubic(a, b, c, d, along_row), 0.0) * at.number(strength));
     }
 
    private:

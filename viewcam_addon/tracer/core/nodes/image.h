@@ -26,9 +26,9 @@ struct ImageNode {
         if (image.image == NONE) return {};
         Vec3 place = at.value(vector);
         const Texture& texture = at.textures[image.image];
-        auto color = [&](double x, double y) { return alpha ? grey(texture.alpha({x, y}, lookup)) : texture.at({x, y}, lookup); };
+        auto color = [&](double x, double y) { return alpha ? gray(texture.alpha({x, y}, lookup)) : texture.at({x, y}, lookup); };
         if (projection == BOX) return from_sides(at, place, color);
-        Vec2 flat = projection == FLAT ? Vec2{place.x, place.y} : rolled(place * 2 - grey(1));
+        Vec2 flat = projection == FLAT ? Vec2{place.x, place.y} : rolled(place * 2 - gray(1));
         return color(flat.x, flat.y);
     }
 
@@ -73,7 +73,7 @@ struct ImageNode {
             else if (n.y < rest * (n.x + n.z))
                 weight.x = share(n.x, n.z), weight.z = 1 - weight.x;
             else
-                weight = (n * (2 - most) + grey(most - 1)) / (2 * most - 1);
+                weight = (n * (2 - most) + gray(most - 1)) / (2 * most - 1);
         }
         Vec3 sum;
         if (weight.x > 0) sum += color(normal.x < 0 ? 1 - place.y : place.y, place.z) * weight.x;

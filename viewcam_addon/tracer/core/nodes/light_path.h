@@ -13,7 +13,7 @@ struct LightPathNode {
     Answer answer;
 
     explicit LightPathNode(const Inputs& in) : answer(answer_of(in.choice("output"))) {}
-    Vec3 eval(const ShadingPoint& at) const { return grey(answer(at)); }
+    Vec3 eval(const ShadingPoint& at) const { return gray(answer(at)); }
 
    private:
     static constexpr uint32_t SCATTERED = DIFFUSE | GLOSSY | TRANSMISSION;

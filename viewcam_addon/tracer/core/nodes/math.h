@@ -125,7 +125,7 @@ struct MathNode {
     }
     Vec3 eval(const ShadingPoint& at) const {
         double value = operation(at.number(a), at.number(b), at.number(c));
-        return grey(clamp ? unit_range(value) : value);
+        return gray(clamp ? unit_range(value) : value);
     }
 };
 
@@ -146,13 +146,13 @@ struct VectorMathNode {
     }
     Vec3 eval(const ShadingPoint& at) const {
         Vec3 a = at.value(this->a);
-        if (name == "length") return grey(length(a));
+        if (name == "length") return gray(length(a));
         if (name == "normalize") return safe::normalized(a);
         if (name == "scale") return a * at.number(scale);
         Vec3 b = at.value(this->b);
         if (name == "cross_product") return cross(a, b);
-        if (name == "dot_product") return grey(dot(a, b));
-        if (name == "distance") return grey(length(a - b));
+        if (name == "dot_product") return gray(dot(a, b));
+        if (name == "distance") return gray(length(a - b));
         if (name == "project") return b * safe::divide(dot(a, b), dot(b, b));
         if (name == "reflect") {
             Vec3 normal = safe::normalized(b);
@@ -198,7 +198,7 @@ struct MapRangeNode : MapRange {
     using MapRange::MapRange;
     Vec3 eval(const ShadingPoint& at) const {
         double first = at.number(from_min), last = at.number(from_max);
-        return grey(first == last ? 0 : mapped(at.number(given), first, last, at.number(to_min), at.number(to_max), at.number(steps)));
+        return gray(first == last ? 0 : mapped(at.number(given), first, last, at.number(to_min), at.number(to_max), at.number(steps)));
     }
 };
 struct MapRangeVectorNode : MapRange {
@@ -223,7 +223,7 @@ struct ClampNode {
     Vec3 eval(const ShadingPoint& at) const {
         double low = at.number(least), high = at.number(most);
         if (either_way && low > high) std::swap(low, high);
-        return grey(min(max(at.number(given), low), high));
+        return gray(min(max(at.number(given), low), high));
     }
 };
 
@@ -235,7 +235,7 @@ struct SeparateNode {
     int axis;
 
     explicit SeparateNode(const Inputs& in) : given(in["color"]), axis(in.choice("output") == "x" ? 0 : in.choice("output") == "y" ? 1 : 2) {}
-    Vec3 eval(const ShadingPoint& at) const { return grey(at.value(given)[axis]); }
+    Vec3 eval(const ShadingPoint& at) const { return gray(at.value(given)[axis]); }
 };
 struct CombineNode {
     Color x, y, z;

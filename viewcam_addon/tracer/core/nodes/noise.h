@@ -77,7 +77,7 @@ template <size_t N> inline double signed_noise(Place<N> p) {
     std::array<uint32_t, N> cell;
     Place<N> within, faded;
     for (size_t i = 0; i < N; i++) {
-        double x = std::fmod(p[i], PERIOD) + (std::fabs(p[i]) >= FAR ? 0.5 : 0), low = std::floor(x), t = x - low;
+        double size = std::fabs(p[i]), x = (size < PERIOD ? p[i] : std::fmod(p[i], PERIOD)) + (size >= FAR ? 0.5 : 0), low = std::floor(x), t = x - low;
         cell[i] = uint32_t(int32_t(low)), within[i] = t;
         faded[i] = t * t * t * (t * (t * 6 - 15) + 10);
     }

@@ -17,7 +17,7 @@ struct NormalMapNode {
         : color(in["color"]), strength(in["strength"]), uv(in.choice("uv")), space(space_of(in.choice("space"))),
           blender(in.choice("space").starts_with("blender")), downwards(in.choice("convention") == "directx") {}
     Vec3 eval(const ShadingPoint& at) const {
-        Vec3 v = at.value(color) * 2 - grey(1), smooth = at.point.shading;
+        Vec3 v = at.value(color) * 2 - gray(1), smooth = at.point.shading;
         double much = at.number(strength), side = at.point.backside ? -1 : 1;
         if (downwards) v.y = -v.y;
         if (blender) v.y = -v.y, v.z = -v.z;

@@ -5,7 +5,7 @@
 namespace viewcam::VIEWCAM_ISA {
 
 // So that whole coordinates do not lie on the border of two cells.
-inline Vec3 off_the_border(Vec3 p) { return (p + grey(0.000001)) * 0.999999; }
+inline Vec3 off_the_border(Vec3 p) { return (p + gray(0.000001)) * 0.999999; }
 // As a whole number; 0 where it is too large for one.
 inline int32_t whole_number(double x) { return std::fabs(x) < 2e9 ? int32_t(std::floor(x)) : 0; }
 
@@ -46,7 +46,7 @@ struct NoiseNode {
                 p = moved;
             }
             double value = octaves.at(p);
-            return color ? Vec3{value, octaves.at(shifted(p, N)), octaves.at(shifted(p, N + 1))} : grey(value);
+            return color ? Vec3{value, octaves.at(shifted(p, N)), octaves.at(shifted(p, N + 1))} : gray(value);
         });
     }
 
@@ -69,7 +69,7 @@ struct WhiteNoiseNode {
         : vector(in["vector"]), w(in["w"]), dimensions(in.choice("dimensions")), color(in.choice("output") == "color") {}
     Vec3 eval(const ShadingPoint& at) const {
         Vec3 three = in_dimensions(dimensions, at.value(vector), at.number(w), [](const auto& p) { return hashed_color(p); });
-        return color ? three : grey(three.x);
+        return color ? three : gray(three.x);
     }
 };
 
@@ -84,7 +84,7 @@ struct CheckerNode {
     Vec3 eval(const ShadingPoint& at) const {
         Vec3 p = off_the_border(at.value(vector) * at.number(scale));
         bool first = (whole_number(p.x) ^ whole_number(p.y) ^ whole_number(p.z)) & 1;
-        return factor ? grey(first) : at.value(first ? color1 : color2);
+        return factor ? gray(first) : at.value(first ? color1 : color2);
     }
 };
 
@@ -95,7 +95,7 @@ struct GradientNode {
     std::string kind;
 
     explicit GradientNode(const Inputs& in) : vector(in["vector"]), kind(in.choice("kind")) {}
-    Vec3 eval(const ShadingPoint& at) const { return grey(unit_range(value(at.value(vector)))); }
+    Vec3 eval(const ShadingPoint& at) const { return gray(unit_range(value(at.value(vector)))); }
 
    private:
     double value(Vec3 p) const {
@@ -131,9 +131,9 @@ struct WaveNode {
             double finer = at.number(detail_scale);
             n += distorted * (2 * octaves.at(Place<3>{p.x * finer, p.y * finer, p.z * finer}) - 1);
         }
-        if (profile == "sin") return grey(0.5 + 0.5 * safe::sine(n - PI / 2));
+        if (profile == "sin") return gray(0.5 + 0.5 * safe::sine(n - PI / 2));
         double turns = n / (2 * PI);
-        return grey(profile == "saw" ? turns - std::floor(turns) : 2 * std::fabs(turns - std::floor(turns + 0.5)));
+        return gray(profile == "saw" ? turns - std::floor(turns) : 2 * std::fabs(turns - std::floor(turns + 0.5)));
     }
 
    private:
@@ -174,7 +174,7 @@ struct MagicNode {
             }
         if (by != 0) x /= 2 * by, y /= 2 * by, z /= 2 * by;
         Vec3 color{0.5 - x, 0.5 - y, 0.5 - z};
-        return factor ? grey((color.x + color.y + color.z) / 3) : color;
+        return factor ? gray((color.x + color.y + color.z) / 3) : color;
     }
 };
 
@@ -205,7 +205,7 @@ struct BrickNode {
             double smooth = at.number(mortar_smooth), t = smooth == 0 ? 1 : unit_range((1 - nearest / size) / smooth);
             share = t * t * (3 - 2 * t);
         }
-        if (factor) return grey(share);
+        if (factor) return gray(share);
         double tint = unit_range(shade((uint32_t(row) << 16) + (uint32_t(brick) & 0xffff)) + at.number(bias));
         return mix(mix(at.value(color1), at.value(color2), tint), at.value(mortar), share);
     }

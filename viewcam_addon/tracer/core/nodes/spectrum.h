@@ -1,4 +1,4 @@
-// Colours of what glows and of the rainbow, linear, of Rec. 709's primaries.
+// Colors of what glows and of the rainbow, linear, of Rec. 709's primaries.
 #pragma once
 #include <algorithm>
 
@@ -44,7 +44,7 @@ struct BlackbodyNode {
     }
 };
 
-// Of a wavelength in nanometres: the CIE's observer of 1931 (2°), every 5 nm from 380 on; straight between, black beyond.
+// Of a wavelength in nanometers: the CIE's observer of 1931 (2°), every 5 nm from 380 on; straight between, black beyond.
 struct WavelengthNode {
     static constexpr const char* NAME = "wavelength";
     static constexpr Gives GIVES = Gives::COLOR;
@@ -53,7 +53,7 @@ struct WavelengthNode {
     explicit WavelengthNode(const Inputs& in) : wavelength(in["wavelength"]) {}
     Vec3 eval(const ShadingPoint& at) const {
         constexpr double FROM_XYZ[3][3] = {{3.2409699419, -1.53738317757, -0.498610760293}, {-0.969243636281, 1.87596750151, 0.0415550574072}, {0.055630079697, -0.203976958889, 1.05697151424}};
-        constexpr double SCALE = 2.52;  // so that no colour is brighter than 1
+        constexpr double SCALE = 2.52;  // so that no color is brighter than 1
         double place = (at.number(wavelength) - 380) / 5;
         if (!(place > -1 && place < 80)) return {};
         auto i = int(place);

@@ -1,5 +1,5 @@
 // What closures' inputs are computed from where they are neither constants nor a plain image: nodes, each of which makes a number,
-// a colour or a vector of what other nodes make. A scene has one list of them; a node names only nodes before it.
+// a color or a vector of what other nodes make. A scene has one list of them; a node names only nodes before it.
 //
 // Evaluated at each hit, from the input back: what no input needs is never computed. A node whose inputs are all constant becomes
 // its value when it is made, so that constants cost nothing. Rejected: a stack machine (Cycles' SVM), whose order must be compiled.
@@ -49,7 +49,7 @@ template <class Kinds> constexpr bool ALL_ARE_VALUE_NODES = false;
 template <class... Kinds> constexpr bool ALL_ARE_VALUE_NODES<std::variant<Kinds...>> = (IsValueNode<Kinds> && ...);
 static_assert(ALL_ARE_VALUE_NODES<ValueNode>);
 
-// A number of a value that is of some sort: a colour's luminance, a vector's mean.
+// A number of a value that is of some sort: a color's luminance, a vector's mean.
 inline double number_of(Vec3 value, Gives sort) {
     return sort == Gives::NUMBER ? value.x : sort == Gives::VECTOR ? (value.x + value.y + value.z) / 3 : luminance(value);
 }

@@ -80,7 +80,7 @@ template <size_t N> struct VoronoiPoints {
             double less = smoothness * h * (1 - h);
             sum.distance = mix(sum.distance, distance, h) - less;
             less /= 1 + 3 * smoothness;
-            sum.color = mix(sum.color, color(offset), h) - grey(less);
+            sum.color = mix(sum.color, color(offset), h) - gray(less);
             Place<N> there = point(offset);
             for (size_t i = 0; i < N; i++) sum.position[i] = mix(sum.position[i], there[i], h) - less;
         });
@@ -221,20 +221,20 @@ struct VoronoiNode {
         points.by_pcg = at.version >= CYCLES_5_0;
         if (feature == N_SPHERE_RADIUS) {
             points.stand_at(p);
-            return output == RADIUS ? grey(points.radius()) : Vec3{};
+            return output == RADIUS ? gray(points.radius()) : Vec3{};
         }
         if (output == RADIUS) return {};
         double octaves = min(max(at.number(detail), 0), 15), finer = at.number(lacunarity), weaker = unit_range(at.number(roughness));
-        if (feature == DISTANCE_TO_EDGE) return output == DISTANCE ? grey(edges(points, p, octaves, weaker, finer)) : Vec3{};
+        if (feature == DISTANCE_TO_EDGE) return output == DISTANCE ? gray(edges(points, p, octaves, weaker, finer)) : Vec3{};
         typename Points::Found found = sum(points, p, octaves, weaker, finer);
-        if (output == DISTANCE) return grey(found.distance);
+        if (output == DISTANCE) return gray(found.distance);
         if (output == COLOR) return found.color;
         std::array<double, 4> place = {};
         for (size_t i = 0; i < N; i++) place[N == 1 ? 3 : i] = safe::divide(found.position[i], by);
-        return output == W ? grey(place[3]) : Vec3{place[0], place[1], place[2]};
+        return output == W ? gray(place[3]) : Vec3{place[0], place[1], place[2]};
     }
 
-    // Octaves' sums of distances and colours, and mixtures of positions.
+    // Octaves' sums of distances and colors, and mixtures of positions.
     template <size_t N>
     typename VoronoiPoints<N>::Found sum(VoronoiPoints<N>& points, const Place<N>& p, double octaves, double weaker, double finer) const {
         using Found = typename VoronoiPoints<N>::Found;

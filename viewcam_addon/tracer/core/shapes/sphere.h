@@ -3,7 +3,7 @@
 // A sphere under an affine map is the set of points P with |A⁻¹P − f| = 1, A its linear part times the radius. The ray is taken
 // into that space, where the near root is (|f|² − 1)/q with q = f·d + √…, which never cancels. Two things would:
 //
-// - The discriminant. Far away it is that of the perpendicular from the centre to the ray, which loses |f| where the textbook's
+// - The discriminant. Far away it is that of the perpendicular from the center to the ray, which loses |f| where the textbook's
 //   loses |f|² (Haines et al., Precision improvements for ray/sphere intersection, Ray Tracing Gems, 2019). Near the surface the
 //   textbook's is the better one, given an exact |f|² − 1: it keeps the digits of a ray that runs along the surface.
 // - |f|² − 1, for an origin close to the surface, and f itself, where the object's space has its origin far away. Then the ray's
@@ -103,8 +103,8 @@ struct UnitSphere {
     }
 };
 
-// Whether a ray in object space runs past a sphere, or away from it, by more than all that is rounded there: the way to the centre by
-// the origin's error and the centre's own rounding, the direction, relatively, by four roundings times the matrix's condition. So
+// Whether a ray in object space runs past a sphere, or away from it, by more than all that is rounded there: the way to the center by
+// the origin's error and the center's own rounding, the direction, relatively, by four roundings times the matrix's condition. So
 // most spheres whose boxes are met are left without a division, and those that a ray has just left without the pairs of `take_care`.
 inline bool passes(const LocalRay& local, Vec3 center, double radius, double condition) {
     Vec3 way = center - local.origin, d = local.direction, beside = cross(way, d);
@@ -127,7 +127,7 @@ template <bool ANY, class Found> bool intersect_spheres(const Spheres& spheres, 
     });
 }
 
-// The surface of a sphere where a ray hits it. As in Cycles, the normal of an ellipsoid too is the direction from its centre;
+// The surface of a sphere where a ray hits it. As in Cycles, the normal of an ellipsoid too is the direction from its center;
 // `cosine` is that of the true one. The point lies inside by what its rounding may be, from where nothing of the sphere is seen.
 inline Interaction sphere_interaction(const Spheres& spheres, const Object& object, const Ray& ray, size_t i) {
     UnitSphere sphere(spheres, object, i, ray, object.to_object(ray));

@@ -216,7 +216,8 @@ class TriangleSurfaces {
         b2_ = max(min(b2_, splat4(1.0) - b1_), splat4(0.0));
     }
 
-    // Where the rays meet them.
+    // Where the rays meet them: along the rays, and the points.
+    double4 t() const { return t_; }
     [[gnu::always_inline]] SurfacePoint<double4> points() const {
         long4 solid = is_solid();
         double4 side = this->side();
@@ -310,7 +311,7 @@ class TriangleSurfaces {
 
     // The vertices' normals in the world, interpolated, of any length; 0 without any.
     Vec3x4 smooth_normal() const {
-        // Cycles turns those of a mesh that only one object uses into the world before it interpolates, and normalises them
+        // Cycles turns those of a mesh that only one object uses into the world before it interpolates, and normalizes them
         // there; those of a shared mesh it interpolates in object space.
         double4 inverse[3][3];
         for (int row = 0; row < 3; row++)
