@@ -373,8 +373,9 @@ def key_the_pose(camera_object):
         camera_object.keyframe_insert("rotation_euler", frame=frame)
 
 
-# Calibrated: 11 to 13 were found with Blender 5.0 on a busy machine, and 40 where each camera is placed by itself.
-LARGEST_MULTIPLE_OF_KEYED = 25
+# Calibrated: twice the 6.5 of Blender 4.2 (5 with 5.0), and 40 where each camera is placed by itself. Below 2.5 it can't be: a
+# camera that is set as a frame changes is copied and evaluated by Blender a second time.
+LARGEST_MULTIPLE_OF_KEYED = 13
 
 
 def multiple_of_keyed(keyed_cameras, scene):

@@ -245,9 +245,13 @@ def test_a_hair_is_beyond_tolerance_and_a_hundredth_of_it_within(tracer, referen
     assert HAIR / 100 < np.median(allowed) < HAIR / 2
 
 
-@pytest.mark.parametrize(("turned", "passes"), [(0.95, True), (2.0, False)])
-def test_stored_normals_are_off_by_more_between_corners_that_diverge(turned, passes):
-    """Corners lean outwards by 75°: amid them their sum is cos 75° = 0.26 long, and what each is off is divided by it."""
+@pytest.mark.parametrize(
+    ("turned", "stretched", "passes"), [(0.95, 1.0, True), (2.0, 1.0, False), (0.95, 9.0, True), (2.0, 9.0, False)]
+)
+def test_stored_normals_are_off_by_more_between_corners_that_diverge_and_under_a_scale(turned, stretched, passes):
+    """Corners lean outwards by 75°: amid them their sum is cos 75° = 0.26 long, and what each is off is divided by it. Under a
+    scale along that sum it is a ninth as long beside them.
+    """
 
     def of_a_square(off):
         mesh = square(2.0)
@@ -256,8 +260,9 @@ def test_stored_normals_are_off_by_more_between_corners_that_diverge(turned, pas
         across = np.array([1.0, -1.0, 0.0]) - normals * (normals[..., :1] - normals[..., 1:2])
         normals += off * across / np.linalg.norm(across, axis=-1, keepdims=True)
         mesh = replace(mesh, corner_normals=normals.astype(np.float32))
-        return Tracer(Scene(CAMERA, {"square": mesh}, (Object("Square", "square", tilted(np.eye(4)), 1),)), 1)
+        return Tracer(Scene(CAMERA, {"square": mesh}, (Object("Square", "square", placed, 1),)), 1)
 
+    placed = tilted(np.diag([1.0, 1.0, stretched, 1.0]))
     tracer, test = of_a_square(0.0), Image(of_a_square(turned * tolerances.NORMAL_STORAGE).render())
     comparison = compared(Image(tracer.render()), test, tracer)
     assert comparison.passed == passes, "\n".join(comparison.lines())

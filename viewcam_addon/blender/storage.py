@@ -94,7 +94,7 @@ def animated(camera_object: bpy.types.Object, before: CameraValues) -> CameraVal
     """
     stored = versions.stored_properties(camera_object.virtual_pinhole)  # in a third of the time that the properties take
     try:
-        rounded = (*stored["eye"], *stored["look_at"], *stored["up"], stored["distance"])
+        rounded = (*stored["eye"][:], *stored["look_at"][:], *stored["up"][:], stored["distance"])
         exact = stored["exact"]
     except KeyError:
         return None

@@ -70,7 +70,8 @@ GRAZING = 0.2
 
 # Blender 5.2 stores smooth normals as two 16-bit octahedral coordinates. Half a step of both is at most 2.11 / 32767 on the
 # sphere (found by encoding and decoding 2 million directions; 0.0037°). Between corners the normal is their sum over its
-# length, which is below 1 where they diverge and divides their errors: mismatches.py multiplies by 1 over it.
+# length, which is below 1 where they diverge and divides their errors; a scale along the sum does so, too.
+# By how much errors grow there, the tracer tells (Normal Enlargement).
 NORMAL_STORAGE = 2.11 / 32767
 
 # Of a radiance, where a surface's albedo is looked up in a table: Cycles made its tables by random numbers, the tracer by

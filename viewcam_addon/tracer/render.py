@@ -256,7 +256,9 @@ class Tracer:
         return np.repeat(np.arange(len(counts)), counts), self._names[objects], passes
 
     def _enlargements(self, columns: NDArray, rows: NDArray) -> NDArray[np.float64]:
-        """(n,): 1 over the length of the sum of weighted corner normals, by which it is divided, and with it their errors."""
+        """(n,): the factor by which errors of corner normals grow: their sum is turned and stretched by the cofactors of the
+        object's matrix, which no direction is by more than their norm, and then divided by its length.
+        """
         result = np.ones(len(columns))
         if not self._smooth:
             return result
@@ -270,8 +272,11 @@ class Tracer:
             matrix, triangle = matrices[instances[here] - first], primitives[here]
             corners = mesh.vertices[mesh.triangles[triangle]] @ matrix[:, :3, :3].transpose(0, 2, 1) + matrix[:, None, :3, 3]
             weights = barycentric(eye + depth[here, None] * directions[here], corners)
-            between = np.linalg.norm((weights[..., None] * mesh.corner_normals[triangle]).sum(axis=1), axis=-1)
-            result[here] = 1.0 / np.clip(between, np.finfo(np.float32).eps, 1.0)
+            turned = np.stack([np.cross(matrix[:, :3, (i + 1) % 3], matrix[:, :3, (i + 2) % 3]) for i in range(3)], axis=-1)
+            between = (weights[..., None] * mesh.corner_normals[triangle]).sum(axis=1)
+            length = np.linalg.norm((turned @ between[..., None])[..., 0], axis=-1)
+            most = np.linalg.norm(turned, ord=2, axis=(1, 2))
+            result[here] = np.divide(most, length, out=np.ones(len(here)), where=length > 0.0)
         return result
 
     @functools.cached_property
