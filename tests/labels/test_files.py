@@ -61,7 +61,7 @@ def test_no_json_of_an_older_frame_stands_beside_files_of_a_newer(written, tmp_p
     labels, _ = written
     files.write(tmp_path / "shot.exr", labels)
 
-    def fail(*_):
+    def fail(*_, **__):
         raise InputError("the disk is full")
 
     monkeypatch.setattr(image, "write", fail)
