@@ -152,7 +152,7 @@ def lit_from_the_ceiling(scene, camera, add, add_lamp, mesh_from):
         add(mesh_from("plane", size=4), "Floor", (0, 0, -1))
         add(mesh_from("plane", size=4), "Ceiling", (0, 0, 2), rotation_euler=turned)
         add_lamp("AREA", (0, 0, 2), turned, energy=100.0)
-        scene.render.resolution_x, scene.render.resolution_y = 48, 32
+        scene.render.resolution_x, scene.render.resolution_y = 96, 64
 
     return make
 
