@@ -373,7 +373,7 @@ def key_the_pose(camera_object):
         camera_object.keyframe_insert("rotation_euler", frame=frame)
 
 
-# Calibrated: twice the 6.5 of Blender 4.2 (5 with 5.0), and 40 where each camera is placed by itself. Below 2.5 it can't be: a
+# Calibrated: twice the 6.5 of Blender 4.2 (5 with 5.0), and 40 while each camera was placed by itself. Below 2.5 it can't be: a
 # camera that is set as a frame changes is copied and evaluated by Blender a second time.
 LARGEST_MULTIPLE_OF_KEYED = 13
 

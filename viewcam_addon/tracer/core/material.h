@@ -72,7 +72,7 @@ struct Material {
         BSDFAt<At> bsdf;
         // What is no plain diffuse surface has its smooth normals bent, too (specular_normal).
         Mask<NumberOf<At>> bent = VIEWCAM_ISA::is_black(at.point.shading - at.point.normal) == Mask<NumberOf<At>>{};
-        if (bumped_) bent = bent == bent;
+        if (bumped_) bent = bent == bent;  // everywhere
         if (bumped_ || (kinds_ != DIFFUSE && any(bent))) bsdf.bump(bent, {at.point.shading, at.version >= CYCLES_4_3, at.version >= CYCLES_5_0});
         for (const WeightedClosure& one : closures) add(one, at, bsdf);
         return bsdf;
