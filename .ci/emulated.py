@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / ".ci")]
 from environment import install_packages  # noqa: E402 - only now is it known where these are
 
-from hatch_build import core_wheel  # noqa: E402
+from hatch_build import build_core, core_wheel  # noqa: E402
 
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "virtual-pinhole", "emulated")
 DEBIAN = {
@@ -102,7 +102,8 @@ def made_once(folder: Path, contents: str = "") -> Iterator[Path | None]:
             yield None
             return
         print(f"Making {folder}", file=sys.stderr, flush=True)
-        part = Path(tempfile.mkdtemp(dir=CACHE))
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(dir=folder.parent))
         try:
             yield part
             if contents:
@@ -166,19 +167,20 @@ def _run(command: list[str], wine_prefix: Path) -> None:
 
 
 def of_this_checkout(platform: str) -> Path:
-    """A folder with the core of this checkout and what pip would say of it."""
+    """A folder with the core of this checkout and what pip would say of it; made anew for another core alone."""
     folder = ROOT / "build" / "emulated" / platform
-    wheel = core_wheel(platform, ROOT / "build" / "emulated")
-    shutil.rmtree(folder, ignore_errors=True)
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(folder)
     version = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))["version"]
-    information = folder / f"virtual_pinhole-{version}.dist-info"
-    information.mkdir()
     metadata = f"Metadata-Version: 2.1\nName: {PROJECT['name']}\nVersion: {version}\n"
-    (information / "METADATA").write_text(metadata, encoding="utf-8")
     plugins = "".join(f"{name} = {module}\n" for name, module in PROJECT["entry-points"]["pytest11"].items())
-    (information / "entry_points.txt").write_text(f"[pytest11]\n{plugins}", encoding="utf-8")
+    # Not with every command: others may be at work in it.
+    with made_once(folder, f"{build_core(platform, travels=True).parent.name}\n{metadata}{plugins}") as part:
+        if part:
+            with zipfile.ZipFile(core_wheel(platform, part)) as archive:
+                archive.extractall(part)
+            information = part / f"virtual_pinhole-{version}.dist-info"
+            information.mkdir()
+            (information / "METADATA").write_text(metadata, encoding="utf-8")
+            (information / "entry_points.txt").write_text(f"[pytest11]\n{plugins}", encoding="utf-8")
     return folder
 
 
@@ -203,8 +205,9 @@ def windows(blender: str, bare: bool = False) -> tuple[list[str], dict[str, str]
     site_packages = user / "Python311" / "site-packages"
     site_packages.mkdir(parents=True, exist_ok=True)
     lines = "".join(f"{of_windows(folder)}\n" for folder in folders)
-    (site_packages / "folders.pth").write_text(lines, encoding="utf-8")
-    (site_packages / "usercustomize.py").write_text(WINE_AS_WINDOWS, encoding="utf-8")
+    for name, text in (("folders.pth", lines), ("usercustomize.py", WINE_AS_WINDOWS)):
+        if not (site_packages / name).exists() or (site_packages / name).read_text(encoding="utf-8") != text:
+            (site_packages / name).write_text(text, encoding="utf-8")
     variables = {
         "WINEPREFIX": str(prefix()),
         "WINEDEBUG": "-all",
