@@ -80,7 +80,9 @@ def test_disparities_and_what_both_see_are_those_of_the_tracers_rays(folder, flo
     mask = cv2.imread(str(own / "mask0nocc.png"), cv2.IMREAD_UNCHANGED)
     known = np.isfinite(disparity)
     off = np.abs(read - disparity)[known].max()
-    assert off < 1e-4, f"a disparity is {off:.2g} pixels from the flow"  # float32 depth: 6e-8 of 70 px · 0.35 / 5, and flow's own
+    assert off < 1e-4, (
+        f"a disparity is {off:.2g} pixels from the flow"
+    )  # float32 depth: 6e-8 of 70 px · 0.35 / 5, and flow's own
     assert ((mask > 0) == np.isfinite(read)).all()
     wrong = ((mask == 255) & hidden & known) | ((mask == 128) & ~hidden & known & (np.arange(64) - read >= 0))
     # Beside an outline the other picture's nearest pixel, up to half a pixel away, may show the other side of it.

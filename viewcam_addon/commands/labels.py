@@ -17,8 +17,8 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     added.add_argument("folder", metavar="FOLDER", type=types.path, help="where viewcam render --labels has written")
     added.add_argument("output", metavar="OUT", type=types.path, help="a file of COCO's; of another format a new folder")
     words = (
-        "COCO's instances (default) or panoptic; YOLO's boxes; BOP's scene; COLMAP's points and tracks; KITTI's depth, flow and "
-        "stereo; Middlebury's stereo"
+        "COCO's instances (default) or panoptic; YOLO's boxes; BOP's scene; COLMAP's points and tracks; KITTI's depth, flow "
+        "and stereo; Middlebury's stereo"
     )
     forms = ["coco", "panoptic", "yolo", "colmap", "bop", "kitti", "middlebury"]
     added.add_argument("--to", choices=forms, default="coco", help=words)

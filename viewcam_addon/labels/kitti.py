@@ -4,8 +4,8 @@ depth/ is in steps of 1/256 m, 0 where nothing is, beyond 255.99 m, or nearer th
 64 v + 2¹⁵ and 1 in red, green and blue, pixels to the right and down to the next frame; where nothing is known, or it is beyond
 ±512 pixels, all three are 0. flow_noc/ has the same without what is hidden in the next frame. A scene unit is a meter.
 
-Of a stereo pair, which is called as its left picture, disp_occ_0/ has the left picture's disparity in steps of 1/256 of a pixel,
-0 where none is known, and disp_noc_0/ the same without what the right picture does not see; image_2/ and image_3/ have the
+Of a stereo pair, which is called as its left picture, disp_occ_0/ has that picture's disparity in steps of 1/256 pixel, 0 where
+none is known, and disp_noc_0/ the same without what the right picture does not see; image_2/ and image_3/ have the
 pictures, calib_cam_to_cam/ the projection matrices, in the left camera's axes.
 
 Source: the devkits' readme.txt of KITTI's stereo, flow and depth benchmarks. Rejected: their numbers as names (000000_10.png),

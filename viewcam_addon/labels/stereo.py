@@ -4,8 +4,8 @@
 
 A disparity is how much farther left the right picture shows the point that a pixel's center shows: positive for all points
 where the principal points are alike, and exact, since it is projected and not searched. A pair is rectified: all points lie in
-the same row of both pictures. A pixel is seen by both where the other picture's nearest pixel has the same disparity to a pixel,
-which is the cross-check of Middlebury's authors.
+the same row of both pictures. A pixel is seen by both where the other picture's nearest pixel has the same disparity, to a
+pixel, which is the cross-check of Middlebury's authors.
 
     NAME/calib.txt im0.png im1.png disp0.pfm disp1.pfm mask0nocc.png mask1nocc.png
 
@@ -171,7 +171,8 @@ def write(folder: Path, output: Path, overwrite: bool = False, words: Words = WO
         return overwrite and all((each / "calib.txt").is_file() for each in there.iterdir())
 
     with folder_written_whole(output, may_replace) as temporary:
-        for count, pair in enumerate(pairs(folder, words), start=1):
+        for pair in pairs(folder, words):
+            count += 1
             own = temporary / pair.name
             own.mkdir()
             (own / "calib.txt").write_text(_calibration(pair), encoding="ascii", newline="\n")
