@@ -72,7 +72,7 @@ class Pair:
     def calibrations(self) -> list[list[list[float]]]:
         """K of each camera, counting from the first pixel's center, as the programs that calibrate such cameras do."""
         of_corner = (axes.intrinsics(camera) for camera in self.cameras)
-        return [[[f_x, zero, c_x - 0.5], [zero, f_y, c_y - 0.5], one] for (f_x, zero, c_x), (_, f_y, c_y), one in of_corner]
+        return [[[f_x, zero, c_x - 0.5], [zero, f_y, c_y - 0.5], last] for (f_x, zero, c_x), (_, f_y, c_y), last in of_corner]
 
 
 def pairs(folder: Path, words: Words = WORDS) -> Iterator[Pair]:
