@@ -25,7 +25,7 @@ from . import files, surface_points
 from .coco import Document, read_pictures
 
 POINTS = 2048
-"""Of all pictures together, unless another number is chosen."""
+"""Sampled in all pictures together, unless another number is chosen."""
 
 
 def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
@@ -94,7 +94,7 @@ def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
 
 
 def _state(instance: Document) -> str:
-    """What an instance keeps while it moves without a change of its form."""
+    """The text of what stays while an instance moves and keeps its form."""
     return f"{instance['id']} {instance['box']}"
 
 
