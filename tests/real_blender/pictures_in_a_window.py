@@ -89,7 +89,7 @@ def export():
         subprocess.run(["convert", *pictures, "-append", FOLDER / "artists" / "export.png"], check=True)
         with bpy.context.temp_override(window=window(), area=area, region=files):
             bpy.ops.file.cancel()
-        yield from settle()
+        yield from until(lambda: all(each.type != "FILE_BROWSER" for each in window().screen.areas), "the end of the browser")
 
 
 def preferences():

@@ -75,7 +75,7 @@ class Render(Step):
     """F12 shows what is in the middle of the view."""
 
     picture = "render.png"
-    shows = (0.0, 0.3, 1.0, 0.72)
+    shows = (0.24, 0.38, 0.76, 0.605)
     edits = 0
 
     def prepare(self):

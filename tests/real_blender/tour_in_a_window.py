@@ -73,9 +73,11 @@ def show(step):
     if step.needs_a_window:
         yield from step.by_hand()
     else:
+        push_undo("before")
         area, part = region(*VIEWPORT)
         with bpy.context.temp_override(window=window(), area=area, region=part):
             step.by_script()
+        push_undo("after")
     yield
     if is_wanted:
         step.check()
