@@ -1,10 +1,12 @@
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks import light
 from benchmarks.charts import Curve
-from benchmarks.light import convergence
+from benchmarks.light import convergence, pictures
 from benchmarks.light.convergence import OURS, slope
 
 
@@ -75,3 +77,40 @@ def test_a_lamp_that_fills_the_sky_shines_on_a_floor_with_its_radiance():
     """¼ of the hemisphere for each of its four corners; and the textbook's square, as wide as high above the floor, 0.2395."""
     assert 4 * convergence._corner_share(np.array(1e9), np.array(1e9)) == pytest.approx(1)
     assert 4 * convergence._corner_share(np.array(0.5), np.array(0.5)) == pytest.approx(0.2394564705, abs=1e-9)
+
+
+pytest.importorskip("bpy")
+
+
+@pytest.fixture(scope="module")
+def picture_charts():
+    return {chart.name.removeprefix("pictures-"): chart for chart in pictures.charts(quick=True)}
+
+
+def slopes(chart):
+    return {curve.name: slope(curve.x, curve.y) for curve in chart.curves}
+
+
+def test_every_sweep_is_a_module_and_every_module_a_sweep():
+    modules = {path.stem for path in Path(light.__file__).parent.glob("*.py")} - {"__init__"}
+    assert modules == set(light.SWEEPS)
+
+
+def test_our_pictures_are_noisier_than_no_others(picture_charts):
+    """Beside Cycles': at most by the tenth that the two pictures' own chance is good for, over some hundred noisy pixels."""
+    for chart in picture_charts.values():
+        errors = {curve.name: curve.y for curve in chart.curves}
+        assert all(ours <= 1.1 * expected for ours, expected in zip(errors["ours"], errors["Cycles"], strict=True)), errors
+
+
+def test_the_noise_of_pictures_falls_as_that_of_integrals(picture_charts):
+    result = {name: slopes(chart)["ours"] for name, chart in picture_charts.items()}
+    assert result["edge"] <= -0.72, result  # −¾, measured in a picture in which two hundred pixels are noisy
+    assert result["shadow"] <= -0.6, result  # an edge in four dimensions
+    assert result["corner"] <= -0.5, result
+
+
+def test_random_numbers_in_the_same_integrator_are_noisier(picture_charts):
+    for chart in picture_charts.values():
+        errors = {curve.name: curve.y for curve in chart.curves}
+        assert errors["random numbers"][-1] > 1.4 * errors["ours"][-1], errors

@@ -1,15 +1,27 @@
-"""Cycles' settings are overridden: restored whatever happens, and right while they last."""
+"""Cycles' settings are overridden: restored whatever happens, and right while they last.
+
+EEVEE and Workbench beside the tracer: what they draw is judged, nothing is left behind, and who can't draw says so.
+
+A file that Blender wrote is whole or is seen not to be; attributes can be taken out of it, and nothing else.
+"""
 
 import ctypes
+import os
+import subprocess
+import sys
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+
+from viewcam_addon.blender.rendering.exr import is_whole, strip
+from viewcam_addon.image import Image, read, write
 
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import temporary_settings, versions
 from viewcam_addon.blender.jobs import renderer as jobs
-from viewcam_addon.blender.rendering import cycles
+from viewcam_addon.blender.rendering import cycles, displayed, graphics
 from viewcam_addon.blender.scenes import depsgraph
 from viewcam_addon.blender.temporary_settings import numbered_indices, overridden
 from viewcam_addon.errors import InputError
@@ -381,3 +393,197 @@ def test_a_device_that_is_not_there_is_one_sentence_and_nothing_is_rendered(fres
     with pytest.raises(InputError, match="there is no METAL device that Cycles could render on"):
         cycles.render(scene, scene.view_layers[0], camera, tmp_path / "a.exr", device="METAL")
     assert not (tmp_path / "a.exr").exists()
+
+
+@pytest.fixture
+def ball(fresh_blender, scene):
+    """A ball on a floor, 64 × 48 pixels."""
+    scene.render.resolution_x, scene.render.resolution_y = 64, 48
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=24, ring_count=12, location=(0, 0, 1))
+    bpy.ops.mesh.primitive_plane_add(size=20)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0, -8, 3), (1.3, 0, 0)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    return bpy.data.objects["Sphere"]
+
+
+def settings(scene):
+    """The settings that a raster render overrides, as they stand."""
+    shading, layer = scene.display.shading, scene.view_layers[0]
+    return [
+        scene.render.engine,
+        scene.render.film_transparent,
+        scene.render.filter_size,
+        scene.render.use_stamp_note,
+        scene.render.stamp_note_text,
+        scene.eevee.taa_render_samples,
+        shading.light,
+        shading.color_type,
+        layer.material_override,
+        layer.use_pass_z,
+        [output.name for output in layer.aovs],
+        [material.name for material in bpy.data.materials],
+        [tuple(each.color) for each in bpy.data.objects],
+    ]
+
+
+def verdict(folder, engine, scene):
+    """The sentence of a comparison with the tracer, made in a process without Blender's OpenEXR; and the exit status."""
+    from viewcam_addon.tracer.scene import scene_file
+
+    before = settings(scene)
+    scene.view_layers[0].aovs.add().name = "Artist's"
+    before[-3] = ["Artist's"]
+    exported = jobs.both_sides(Job(engine=engine, threads=2), [folder / "test.exr"])
+    assert settings(scene) == before
+    scene_file.write(exported, folder / "scene.json")
+    program = """
+import sys
+from viewcam_addon.cli import main
+scene, traced, test = sys.argv[1:]
+main(["render", scene, traced]) and sys.exit(9)
+sys.exit(main(["compare", traced, test, "--scene", scene]))
+"""
+    words = [str(folder / name) for name in ("scene.json", "traced.exr", "test.exr")]
+    done = subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True)
+    return done.returncode, done.stdout.splitlines()[-1] + done.stderr
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("engine", ["EEVEE", "WORKBENCH"])
+def test_what_an_engine_draws_is_what_the_tracer_sees_or_it_is_refused(engine, ball, scene, tmp_path):
+    """EEVEE compiles its shaders for ten seconds where there is no graphics card."""
+    is_old = engine == "EEVEE" and bpy.app.version < (5, 0)
+    if is_old or not graphics.are_there():
+        with pytest.raises(InputError, match="5.0 or newer" if is_old else "graphics driver"):
+            jobs.both_sides(Job(engine=engine), [tmp_path / "test.exr"])
+        return
+    status, sentence = verdict(tmp_path, engine, scene)
+    assert status == 0 and sentence.startswith("The same picture"), sentence
+
+
+def test_without_a_driver_there_is_one_sentence_and_no_file(ball, scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(graphics, "are_there", lambda: False)
+    with pytest.raises(InputError, match="WORKBENCH needs a graphics driver, and there is none: install one"):
+        jobs.both_sides(Job(engine="WORKBENCH"), [tmp_path / "test.exr"])
+    assert not list(tmp_path.iterdir())
+
+
+# --- Pictures of light are shown through the scene's view transform, and the scene stays as it is
+
+
+def displayed_bytes(scene, folder, light):
+    np.save(folder / "light.npy", light)
+    displayed.write_png(scene, folder / "light.npy")
+    assert [path.name for path in folder.iterdir()] == ["light.png"]
+    image = bpy.data.images.load(str(folder / "light.png"))
+    pixels = np.empty(light.shape[0] * light.shape[1] * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    return np.round(255 * pixels.reshape(*light.shape[:2], 4)[..., :3])
+
+
+def srgb(linear):
+    return np.round(255 * (1.055 * np.asarray(linear) ** (1 / 2.4) - 0.055))
+
+
+def test_light_is_shown_as_f12_shows_it(fresh_blender, scene, tmp_path):
+    """Middle gray by sRGB's formula, twice as bright with an exposure of 1; and AgX makes another of it."""
+    light = np.full((3, 5, 3), 0.18, np.float32)
+    light[0, :, 1], light[2] = 0.05, 1.0  # from the lowest row on
+    scene.view_settings.view_transform = "Standard"
+    plain = displayed_bytes(scene, tmp_path, light)
+    np.testing.assert_allclose(plain[1], srgb(0.18), atol=1)
+    np.testing.assert_allclose(plain[0, :, 1], srgb(0.05), atol=1)
+    scene.view_settings.exposure = 1.0
+    np.testing.assert_allclose(displayed_bytes(scene, tmp_path, light)[1], srgb(0.36), atol=1)
+    scene.view_settings.exposure, scene.view_settings.view_transform = 0.0, "AgX"
+    assert plain[2].min() == 255 and displayed_bytes(scene, tmp_path, light)[2].max() < 250
+
+
+def test_the_scenes_own_file_settings_are_given_back(fresh_blender, scene, tmp_path):
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format = "OPEN_EXR_MULTILAYER"
+    images = len(bpy.data.images)
+    displayed_bytes(scene, tmp_path, np.zeros((2, 2, 3), np.float32))
+    assert settings.file_format == "OPEN_EXR_MULTILAYER" and len(bpy.data.images) == images
+
+
+@pytest.fixture(params=[1, 15, 16, 17, 100])
+def picture(request, tmp_path):
+    """An EXR of one part, with as many rows."""
+    noise = np.random.default_rng(1).random((request.param, 50, 1), np.float32)
+    write(tmp_path / "picture.exr", Image({"Depth": noise}))
+    return tmp_path / "picture.exr"
+
+
+def test_a_whole_file_is_whole(picture):
+    assert is_whole(picture)
+
+
+def test_a_file_cut_short_is_not(picture):
+    content = picture.read_bytes()
+    for share in (0.0, 0.01, 0.1, 0.3, 0.9, 0.999):
+        picture.write_bytes(content[: int(len(content) * share)])
+        assert not is_whole(picture), f"{share} of the file"
+
+
+def test_a_chunk_that_was_never_written_is_missed(picture):
+    """OpenEXR leaves such a chunk behind on a full disk: its offset in the table is 0."""
+    content = bytearray(picture.read_bytes())
+    chunks = read(picture).size[1]  # of one row each, as RLE has them
+    # The table ends where the first chunk begins, and its first entry says so.
+    table = next(at for at in range(len(content)) if int.from_bytes(content[at : at + 8], "little") == at + 8 * chunks)
+    content[table : table + 8] = bytes(8)
+    picture.write_bytes(content)
+    assert not is_whole(picture)
+
+
+def test_what_is_no_exr_is_not_whole(tmp_path):
+    (tmp_path / "text").write_text("nothing of the kind, but long enough for a header and more")
+    assert not is_whole(tmp_path / "text") and not is_whole(tmp_path / "missing")
+
+
+PARTS = """
+import sys, numpy as np, OpenEXR
+noise = np.random.default_rng(2).random((40, 30), np.float32)
+parts = [
+    OpenEXR.Part({"Date": "yesterday", "Note": name, "type": OpenEXR.scanlineimage}, {f"{name}.Z": noise + i}, name)
+    for i, name in enumerate(sys.argv[2:])
+]
+OpenEXR.File(parts).write(sys.argv[1])
+"""
+TOLD = """
+import sys, hashlib, OpenEXR
+for part in OpenEXR.File(sys.argv[1], separate_channels=True).parts:
+    print(sorted(set(part.header) & {"Date", "Note"}), *(hashlib.md5(c.pixels).hexdigest() for c in part.channels.values()))
+"""
+
+
+def outside(program, *arguments):
+    """The text that a program prints that uses OpenEXR, in a process without Blender."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    return subprocess.run(
+        [sys.executable, "-c", program, *map(str, arguments)], env=environment, check=True, text=True, capture_output=True
+    ).stdout
+
+
+@pytest.mark.parametrize("names", [["one"], ["one", "two", "three"]])
+def test_an_attribute_is_taken_out_of_each_part_and_no_pixel_changes(tmp_path, names):
+    path = tmp_path / "parts.exr"
+    outside(PARTS, path, *names)
+    before, size = outside(TOLD, path), path.stat().st_size
+    strip(path, lambda name: name == "Date")
+    assert outside(TOLD, path) == before.replace("'Date', ", "")
+    # Name, type, size and value, the first two with a zero at their ends.
+    assert size - path.stat().st_size == len(names) * len(b"Date\0string\0....yesterday")
+    assert is_whole(path)
+
+
+def test_what_is_unwanted_by_nobody_stays_byte_for_byte(picture):
+    before = picture.read_bytes()
+    strip(picture, lambda name: name == "Nothing")
+    assert picture.read_bytes() == before
