@@ -348,6 +348,7 @@ def labels() -> Feed:
         ("colmap",),
         ("colmap", "--points", 5),
         ("kitti",),
+        ("middlebury", "--pair", "a", "b"),
         ("yolo",),
     )
 

@@ -22,7 +22,7 @@ _PATIENCE = 4  # looks
 _STEPS = 200  # that something may take to happen
 _ROW = 18  # pixels between two looks, less than a button's height
 # Where in a row its buttons are looked for, as shares of the panel's width; of operators there are many in a row.
-_LEFT, _MIDDLE, _CHECKBOX, _OPERATORS = 0.2, 0.5, 0.13, (0.31, 0.38, 0.46, 0.53, 0.6, 0.72, 0.85)
+LEFT, _MIDDLE, _CHECKBOX, _OPERATORS = 0.2, 0.5, 0.13, (0.31, 0.38, 0.46, 0.53, 0.6, 0.72, 0.85)
 _KEYS = {"-": "MINUS", ".": "PERIOD", " ": "SPACE", "/": "SLASH", "=": "EQUAL", ",": "COMMA"}
 _DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
 
@@ -112,7 +112,7 @@ def survey(top, where, wanted=None):
             if there and there not in _map(where):
                 _map(where)[there] = (x, y)
             if share == _MIDDLE and there.endswith("]"):  # a number of a point, beside which stands what that follows
-                columns.append(_LEFT)
+                columns.append(LEFT)
             elif share == _MIDDLE and not there:
                 columns += [_OPERATORS[0], _CHECKBOX] if y > _top(where) - _HEADER else [_OPERATORS[0]]
             elif len(columns) < len(_OPERATORS) and there.startswith("viewcam."):

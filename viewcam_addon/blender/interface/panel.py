@@ -133,10 +133,9 @@ def _draw_why(column: bpy.types.UILayout, word: str | None) -> None:
 
 
 def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
-    """One field and its unit, no wider than its words."""
+    """One field, and what it is."""
     field = {unit: look for look, unit in datablocks.LENSES.items()}.get(group.lens_unit, "distance")
-    width = {"MILLIMETERS": 2.4, "PIXELS": 2.1}.get(group.lens_unit, 3.6)
-    panel_rows.value(column, group, field, ("lens_unit", width))
+    panel_rows.value(column, group, field, choice="lens_unit")
 
 
 def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:
