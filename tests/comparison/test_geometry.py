@@ -359,6 +359,7 @@ def test_an_error_that_no_other_origin_mends_is_not_blamed_on_this_one(compared,
     assert comparison.far_from_origin is None
 
 
+@pytest.mark.slow
 def test_an_error_beyond_the_tolerance_has_another_cause(compared):
     comparison = compared(1e6, roundings=10)
     assert not comparison.rows[0].ok and comparison.far_from_origin is None

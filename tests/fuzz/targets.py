@@ -349,6 +349,7 @@ def labels() -> Feed:
         ("colmap", "--points", 5),
         ("kitti",),
         ("middlebury", "--pair", "a", "b"),
+        ("tracks",),
         ("yolo",),
     )
 

@@ -111,6 +111,11 @@ class Render(Step):
             f"the middle of the picture is ({red:.2f}, {green:.2f}, {blue:.2f}), not the ball"
         )
 
+    def pose_for_the_picture(self):
+        call(bpy.ops.render.view_show)
+        for _ in range(8):
+            yield
+
     def tidy(self):
         for area in window().screen.areas:
             if area.type == "IMAGE_EDITOR":

@@ -25,7 +25,6 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender.rendering import live_view
 from viewcam_addon.blender.scenes import export
-from viewcam_addon.blender.scenes.ledger import Ledger
 from viewcam_addon.tracer.render import render
 
 CLIP = (0.1, 100.0)
@@ -47,7 +46,7 @@ def lit(posed_camera, scene, monkey):
     scene.render.resolution_x, scene.render.resolution_y = 48, 32
     bpy.context.view_layer.update()
     camera = cameras.read(posed_camera, scene)
-    return export.scene_through(bpy.context.evaluated_depsgraph_get(), camera, CLIP, Ledger(), True)
+    return export.scene_through(bpy.context.evaluated_depsgraph_get(), camera, CLIP, True)
 
 
 def until(condition):

@@ -192,8 +192,9 @@ def _name(context: bpy.types.Context) -> str:
     shading, settings = context.space_data.shading, context.scene.render
     if shading.type != "RENDERED":
         return shading.bl_rna.properties["type"].enum_items[shading.type].name
-    item = settings.bl_rna.properties["engine"].enum_items.get(settings.engine)
-    return item.name if item else settings.engine
+    blenders = {each.identifier: each.name for each in settings.bl_rna.properties["engine"].enum_items}
+    of_add_ons = {each.bl_idname: each.bl_label for each in bpy.types.RenderEngine.__subclasses__()}
+    return (of_add_ons | blenders).get(settings.engine, settings.engine)
 
 
 _running: _Swipe | None = None
