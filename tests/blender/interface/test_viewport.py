@@ -501,3 +501,11 @@ def test_without_a_window_the_button_says_that_there_is_no_viewport(fresh_blende
     assert not bpy.ops.viewcam.swipe_reference.poll()
     with pytest.raises(RuntimeError, match="no 3D viewport"):
         bpy.ops.viewcam.swipe_reference("INVOKE_DEFAULT")
+
+
+def test_beside_the_line_stands_what_blender_calls_the_engine_of_the_viewport():
+    shading = SimpleNamespace(type="RENDERED")
+    for engine, name in (("BLENDER_WORKBENCH", "Workbench"), ("CYCLES", "Cycles")):
+        settings = SimpleNamespace(engine=engine, bl_rna=bpy.types.RenderSettings.bl_rna)
+        context = SimpleNamespace(space_data=SimpleNamespace(shading=shading), scene=SimpleNamespace(render=settings))
+        assert swipe._name(context) == name
