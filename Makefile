@@ -49,8 +49,11 @@ quick: .venv/test
 	.venv/bin/python -m ruff format --check .
 	$(call PARALLEL,.venv) --hypothesis-profile=quick $(QUICK)
 
-test: lint
-	$(call PARALLEL,.venv)
+# mypy is one process: beside the tests it takes no time of its own.
+test: .venv/test
+	.venv/bin/python -m ruff check .
+	.venv/bin/python -m ruff format --check .
+	.venv/bin/python -m mypy & types=$$!; $(call PARALLEL,.venv); tests=$$?; wait $$types && exit $$tests
 
 test-fresh:
 	.ci/fresh-machine "make demo" "make test"

@@ -24,7 +24,7 @@ from .commands import Result
 from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
 
-_FOLDERS = ("bop", "colmap", "kitti")
+_FOLDERS = ("yolo", "bop", "colmap", "kitti", "middlebury")
 """Datasets of labels that are folders, not files."""
 
 

@@ -11,6 +11,8 @@ from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import datablocks, findings, pose, versions
 from viewcam_addon.blender.interface import panel
 
+pytestmark = pytest.mark.slow
+
 FRAMES = range(1, 251)
 
 

@@ -17,6 +17,8 @@ from viewcam_addon.tracer.scene.lamps import Sun
 from viewcam_addon.tracer.scene.materials import Material
 from viewcam_addon.tracer.scene.shader_nodes import node
 
+pytestmark = pytest.mark.slow
+
 CAMERA = Pinhole((0.5, -6.0, 3.0), (0.0, 0.0, 0.4), (0.0, 0.0, 1.0), 70.0, 64, 48)
 SAMPLES_OF_A_PICTURE = 64
 COLORS = {"Floor": (0.6, 0.6, 0.6), "Carpet": (0.8, 0.2, 0.1), "Wall": (0.3, 0.5, 0.7), "Side": (0.5, 0.5, 0.5)}

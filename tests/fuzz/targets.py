@@ -348,6 +348,8 @@ def labels() -> Feed:
         ("colmap",),
         ("colmap", "--points", 5),
         ("kitti",),
+        ("middlebury", "--pair", "a", "b"),
+        ("tracks",),
         ("yolo",),
     )
 

@@ -11,7 +11,7 @@ import viewcam_addon as vp
 from viewcam_addon.cameras import Camera
 from viewcam_addon.cli import main
 from viewcam_addon.errors import InputError
-from viewcam_addon.labels import colmap, files
+from viewcam_addon.labels import colmap, files, surface_points
 from viewcam_addon.labels.surfaces import Surfaces
 from viewcam_addon.png import encoded
 
@@ -81,7 +81,7 @@ def test_what_a_track_names_rays_see_and_few_pictures_that_see_a_point_are_not_n
 
 
 def test_that_test_finds_a_test_of_depth_that_lets_all_pass(written, symlink, tmp_path, monkeypatch):
-    monkeypatch.setattr(colmap, "_ROUNDING", 1.0)
+    monkeypatch.setattr(surface_points, "_ROUNDING", 1.0)
     colmap.write(written.shots, tmp_path / "model", 600)
     symlink(tmp_path / "shots", written.shots)
     positions, _, visible = points_of(tmp_path / "model")
@@ -133,7 +133,9 @@ def test_what_moves_from_picture_to_picture_has_no_track_from_one_to_the_other(t
 
 def test_points_lie_evenly_over_what_is_shown():
     state = np.zeros((48, 64), int)
-    actual = colmap._sampled(0, Camera("shot", CAMERA), np.full((48, 64), 5.0), state, np.zeros((48, 64, 3), np.uint8), 192)
+    actual = surface_points.sampled(
+        0, Camera("shot", CAMERA), np.full((48, 64), 5.0), state, np.zeros((48, 64, 3), np.uint8), 192
+    )
     column, row, _ = CAMERA.project(actual.positions)
     counts = np.histogram2d(row, column, bins=(6, 8), range=((0, 48), (0, 64)))[0]
     assert counts.sum() == 192 and counts.min() > 0

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from artist_hands import PULL, in_properties, picture, pulled, room, show
 from hands_in_a_window import camera, click, is_at_its_values, press, region, values, window
-from tour_hands import PROPERTIES, SIDEBAR, find, look, push, type_into, write
+from tour_hands import LEFT, PROPERTIES, SIDEBAR, find, look, push, type_into, write
 
 EMPTY_SCENE_LENS = 50.0
 UNITS = ("MILLIMETERS", "HORIZONTAL", "VERTICAL", "DIAGONAL", "PIXELS")
@@ -18,7 +18,7 @@ def tick_the_box():
 
 
 def choose_the_unit():
-    """Beside the lens, by the wheel over it: each unit has its field, which takes keyframes. A unit changes no lens."""
+    """The wheel over the unit: each has its field, which takes keyframes. A unit changes no lens."""
     lens = camera().data.lens
     place = yield from find("virtual_pinhole.focal_length")
     for unit in UNITS:
@@ -36,8 +36,9 @@ def choose_the_unit():
         yield from picture(f"lens_{unit.lower()}_keyed", SIDEBAR)
         camera().animation_data_clear()
         if unit != UNITS[-1]:
-            x = yield from _unit_in_row(place[1])
-            window().event_simulate(type="WHEELDOWNMOUSE", value="PRESS", x=int(x), y=int(place[1]), ctrl=True)
+            unit_at = region(*SIDEBAR)[1].x + LEFT * region(*SIDEBAR)[1].width
+            assert (yield from look(unit_at, place[1], SIDEBAR)) == "virtual_pinhole.lens_unit"
+            window().event_simulate(type="WHEELDOWNMOUSE", value="PRESS", x=int(unit_at), y=int(place[1]), ctrl=True)
             yield
             yield
     values().lens_unit = "HORIZONTAL"
@@ -51,16 +52,6 @@ def choose_the_unit():
     values().lens_unit = "MILLIMETERS"
     yield from type_into("virtual_pinhole.focal_length", "50")
     is_at_its_values()
-
-
-def _unit_in_row(y):
-    """Steps that end with where the unit stands beside its field: as far right as its words are short."""
-    _, part = region(*SIDEBAR)
-    for share in (0.9, 0.85, 0.8, 0.75):
-        x = part.x + part.width * share
-        if (yield from look(x, y, SIDEBAR)) == "virtual_pinhole.lens_unit":
-            return x
-    raise AssertionError("there is no unit beside the lens")
 
 
 def drag_the_fields():

@@ -88,13 +88,13 @@ class ShowTheDiagramElsewhere(_WithoutTheSidebar):
     shows, with_before = (0.0, 0.42, 0.78, 0.935), True
 
     def by_hand(self):
-        values().plane_at = 0.8
+        values().plane_at = 0.65
         with bpy.context.temp_override(window=window()):
             bpy.ops.ed.undo_push(message="View Plane At")
         yield
 
     def by_script(self):
-        values().plane_at = 0.8
+        values().plane_at = 0.65
 
     def check(self):
         is_at_its_values()

@@ -291,11 +291,11 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         name="Lens Unit",
         description="In which unit the lens is shown and typed",
         items=(
-            ("MILLIMETERS", "mm", "The focal length on the camera's sensor"),
+            ("MILLIMETERS", "Lens mm", "The focal length on the camera's sensor"),
             ("HORIZONTAL", "H FOV", "The horizontal field of view"),
             ("VERTICAL", "V FOV", "The vertical field of view"),
             ("DIAGONAL", "D FOV", "The diagonal field of view"),
-            ("PIXELS", "px", "The view-plane distance d, in pixels of the picture at 100 %"),
+            ("PIXELS", "Lens px", "The view-plane distance d, in pixels of the picture at 100 %"),
         ),
         update=_on_shown,
         options=set(),

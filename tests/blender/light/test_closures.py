@@ -293,7 +293,7 @@ def test_no_verdict_tells_the_tables_apart_by_which_a_principled_floor_is_a_litt
     assert not radiance.compare(unaware, [test], sides.exported.camera, 1).passed
 
 
-@pytest.mark.parametrize("kind", ["SUN", "POINT", "SPOT", "AREA"])
+@pytest.mark.parametrize("kind", ["AREA", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("SUN", "POINT", "SPOT"))])
 def test_a_lamp_without_multiple_importance_is_met_by_no_ray_and_lights_what_is_rough_all_the_same(
     pictures, painted, add_lamp, kind
 ):

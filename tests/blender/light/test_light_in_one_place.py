@@ -13,6 +13,8 @@ from viewcam_addon.image import Image
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def room(scene, camera, add, add_lamp, mesh_from):
@@ -121,9 +123,9 @@ def lit_past_a_sheet(scene, camera, add, add_lamp, mesh_from):
     [
         ("surface", hidden_from_scattered_rays, "Sheet"),
         ("lamp", hidden_from_scattered_rays, "Sheet"),
-        pytest.param("surface", without_a_shadow, "Sheet", marks=pytest.mark.slow),
-        pytest.param("lamp", without_a_shadow, "Sheet", marks=pytest.mark.slow),
-        pytest.param("lamp", transparent_to_shadow_rays, "Sheet", marks=pytest.mark.slow),
+        ("surface", without_a_shadow, "Sheet"),
+        ("lamp", without_a_shadow, "Sheet"),
+        ("lamp", transparent_to_shadow_rays, "Sheet"),
         ("shadowless", lambda sheet: None, "Lamp"),
     ],
 )
@@ -157,9 +159,7 @@ def lit_from_the_ceiling(scene, camera, add, add_lamp, mesh_from):
     return make
 
 
-TURNED = pytest.mark.parametrize(
-    "turned", [(0, 0, 0), *(pytest.param(turned, marks=pytest.mark.slow) for turned in ((0.2, 0.13, 0.4), (-0.31, 0.05, 0)))]
-)
+TURNED = pytest.mark.parametrize("turned", [(0, 0, 0), (0.2, 0.13, 0.4), (-0.31, 0.05, 0)])
 
 
 @TURNED

@@ -73,6 +73,7 @@ def _draw_standing(layout: bpy.types.UILayout, camera_object: bpy.types.Object, 
         # One text: a long number takes the room that a short one beside it leaves.
         panel_rows.described(column, context, label, ("   ".join(texts),), share=0.25)
     row = layout.row()
+    row.use_property_split = row.use_property_decorate = False
     row.enabled = camera_object.data.type == "PERSP"
     row.prop(camera_object.virtual_pinhole, "enabled", text="Use", toggle=True)
 
@@ -133,10 +134,9 @@ def _draw_why(column: bpy.types.UILayout, word: str | None) -> None:
 
 
 def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
-    """One field and its unit, no wider than its words."""
+    """One field, and what it is."""
     field = {unit: look for look, unit in datablocks.LENSES.items()}.get(group.lens_unit, "distance")
-    width = {"MILLIMETERS": 2.4, "PIXELS": 2.1}.get(group.lens_unit, 3.6)
-    panel_rows.value(column, group, field, ("lens_unit", width))
+    panel_rows.value(column, group, field, choice="lens_unit")
 
 
 def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:

@@ -80,36 +80,35 @@ def point(
     right.column(align=True).prop_decorator(owner, name)
 
 
-def named(column: bpy.types.UILayout, label: str) -> tuple[bpy.types.UILayout, bpy.types.UILayout]:
+def named(column: bpy.types.UILayout, label: str | None) -> tuple[bpy.types.UILayout, bpy.types.UILayout]:
     """A column that begins with a label, and the row beside it, which begins where all of a panel's do. Neither has dots."""
     split = column.split(factor=_LABEL)
     left, right = split.column(align=True), split.row(align=True)
-    heading = left.row()
-    heading.alignment = "RIGHT"
-    heading.label(text=label)
+    if label is not None:
+        heading = left.row()
+        heading.alignment = "RIGHT"
+        heading.label(text=label)
     for each in (left, right):
         each.use_property_split = each.use_property_decorate = False
     return left, right
 
 
-def value(column: bpy.types.UILayout, owner: bpy.types.bpy_struct, name: str, unit: tuple[str, float] | None = None) -> None:
-    """A number beside its name, with its dot, or in a narrow panel below it.
+def value(column: bpy.types.UILayout, owner: bpy.types.bpy_struct, name: str, choice: str | None = None) -> None:
+    """A number with its dot beside its name, or in a narrow panel below it.
 
-    unit : the property that chooses its unit, and the width that this has, in Blender's units.
+    choice : the property that chooses what the number is, in the place of its name.
     """
+    label = owner.bl_rna.properties[name].name
     if not column.use_property_split:
-        if unit:
-            column.label(text=owner.bl_rna.properties[name].name)
-        field(column, owner, name, text="" if unit else None)
-        if unit:
-            field(column, owner, unit[0], text="Unit")
+        if choice:
+            column.label(text=label)
+            column.prop(owner, choice, text="")
+        field(column, owner, name, text="" if choice else None)
         return
-    _, row = named(column, owner.bl_rna.properties[name].name)
+    left, row = named(column, None if choice else label)
+    if choice:
+        left.prop(owner, choice, text="")
     row.prop(owner, name, text="")
-    if unit:
-        chosen = row.row(align=True)
-        chosen.ui_units_x = unit[1]
-        chosen.prop(owner, unit[0], text="")
     row.prop_decorator(owner, name)
 
 
