@@ -15,6 +15,7 @@ import importlib.metadata
 import itertools
 import json
 import math
+import operator
 import os
 import platform
 import textwrap
@@ -26,7 +27,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import LogLocator, MaxNLocator
 
 from viewcam_addon.errors import InputError
@@ -181,10 +182,10 @@ def _processor() -> str:
         return platform.processor() or platform.machine()
 
 
-def draw(chart: Chart, path: Path, command: str, measured_on: str = "") -> None:
-    """Write the chart as SVG, whole or not at all.
+def draw(charts: Sequence[Chart], path: Path, command: str, measured_on: str = "") -> None:
+    """Write charts, one above the other, as one SVG, whole or not at all.
 
-    command : what measures it again, for the caption. measured_on : the machine and versions, those here if it is empty.
+    command : what measures them again, for the captions. measured_on : the machine and versions, those here if it is empty.
 
     Raises
     ------
@@ -192,35 +193,51 @@ def draw(chart: Chart, path: Path, command: str, measured_on: str = "") -> None:
         if the file can't be written.
     """
     # Letters stay text. The font that matplotlib brings along is the widest of the usual ones, so that another fits as well.
-    settings = {"svg.fonttype": "none", "svg.hashsalt": chart.name, "font.family": "DejaVu Sans", "font.size": 9}
+    settings = {"svg.fonttype": "none", "svg.hashsalt": charts[0].name, "font.family": "DejaVu Sans", "font.size": 9}
     settings |= dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), _INK)
     settings |= dict.fromkeys(("figure.facecolor", "axes.facecolor", "savefig.facecolor"), _BACKGROUND)
-    reading = textwrap.wrap(chart.reading, 132)
-    caption = 1.05 + 0.17 * max(len(reading), 3)  # inches
     with matplotlib.rc_context(settings), written_whole(path) as temporary:
-        tall, above = (
-            (0.5 + 0.4 * len(chart.curves), 0.96) if chart.rows else (4.2, 0.46)
-        )  # rows have heads above their columns
-        figure = Figure(figsize=(9, above + tall + 0.14 + caption))
-        up = 1 / figure.get_figheight()
-        axes = figure.add_axes((0.085, (caption + 0.14) * up, 0.655, tall * up))
-        if chart.rows:
-            axes.set_position((0.27, (caption + 0.14) * up, 0.54, tall * up))
-            figure.text(0.03, 1 - 0.28 * up, chart.title, fontsize=12, fontweight="bold")
-            _draw_rows(chart, axes)
-        else:
-            _draw_axes(chart, axes)
-            for curve, *style in _styles(chart):
-                _draw_curve(curve, axes, *style)
-            order = {_label(curve): place for place, curve in enumerate(chart.curves)}
-            lines = sorted(axes.get_legend_handles_labels()[0], key=lambda line: order[line.get_label()])
-            look = {"frameon": False, "labelspacing": 0.8, "handlelength": 3, "fontsize": 8.5}
-            axes.legend(handles=lines, loc="upper left", bbox_to_anchor=(1.01, 1), **look)
-        figure.text(0.03, (caption - 0.5) * up, "\n".join(reading), va="top", linespacing=1.35)
-        figure.text(0.03, 0.16 * up, f"{command}\n{measured_on or machine()}", color=_FAINT, fontsize=7.5, linespacing=1.4)
-        figure.savefig(temporary, format="svg", metadata={"Date": None, "Title": chart.title, "Description": chart.reading})
+        heights = [sum(_heights(chart)) for chart in charts]
+        figure = Figure(figsize=(9, sum(heights)))
+        panels = figure.subfigures(len(charts), squeeze=False, hspace=0, height_ratios=heights)[:, 0]
+        for chart, panel in zip(charts, panels, strict=True):
+            _draw_panel(chart, panel, f"{command}\n{measured_on or machine()}")
+        described = {
+            "Title": "; ".join(chart.title for chart in charts),
+            "Description": " ".join(chart.reading for chart in charts),
+        }
+        figure.savefig(temporary, format="svg", metadata={"Date": None, **described})
         text = temporary.read_text(encoding="utf-8")
         temporary.write_text(text.replace("</style>", f"{_dark_rules()}</style>", 1), encoding="utf-8")
+
+
+def _reading(chart: Chart) -> list[str]:
+    return textwrap.wrap(chart.reading, 132)
+
+
+def _heights(chart: Chart) -> tuple[float, float, float]:
+    """The inches above a chart's axes, of the axes, and below them. Rows have heads above their columns."""
+    above, tall = (0.96, 0.5 + 0.4 * len(chart.curves)) if chart.rows else (0.46, 4.2)
+    return above, tall, 1.19 + 0.17 * max(len(_reading(chart)), 3)
+
+
+def _draw_panel(chart: Chart, panel: SubFigure, origin: str) -> None:
+    above, tall, below = _heights(chart)
+    up = 1 / (above + tall + below)
+    if chart.rows:
+        panel.text(0.03, 1 - 0.28 * up, chart.title, fontsize=12, fontweight="bold")
+        _draw_rows(chart, panel.add_axes((0.27, below * up, 0.54, tall * up)))
+    else:
+        axes = panel.add_axes((0.085, below * up, 0.655, tall * up))
+        _draw_axes(chart, axes)
+        for curve, *style in _styles(chart):
+            _draw_curve(curve, axes, *style)
+        order = {_label(curve): place for place, curve in enumerate(chart.curves)}
+        lines = sorted(axes.get_legend_handles_labels()[0], key=lambda line: order[line.get_label()])
+        look = {"frameon": False, "labelspacing": 0.8, "handlelength": 3, "fontsize": 8.5}
+        axes.legend(handles=lines, loc="upper left", bbox_to_anchor=(1.01, 1), **look)
+    panel.text(0.03, (below - 0.64) * up, "\n".join(_reading(chart)), va="top", linespacing=1.35)
+    panel.text(0.03, 0.16 * up, origin, color=_FAINT, fontsize=7.5, linespacing=1.4)
 
 
 def _dark_rules() -> str:
@@ -373,13 +390,15 @@ def run_all(
     measured: dict[str, Any] = {}
     behind: list[str] = []
     for sweep in only or sweeps:
+        command = f"python -m benchmarks {subject} --only {sweep}{' --quick' if quick else ''}"
+        drawing, drawn = f"{subject}-{sweep.replace('_', '-')}", []
         for chart in sweeps[sweep](quick):
+            drawn.append(chart)
             name = f"{subject}-{chart.name}"
-            command = f"python -m benchmarks {subject} --only {sweep}{' --quick' if quick else ''}"
-            draw(chart, folder / f"{name}.svg", command)
             print(f"{name}: {chart.reading}", *chart.lines(), sep="\n", flush=True)
-            measured[name] = {"command": command, "machine": machine(), **chart.figures()}
+            measured[name] = {"drawing": drawing, "command": command, "machine": machine(), **chart.figures()}
             behind += chart.behind()
+        draw(drawn, folder / f"{drawing}.svg", command)
     for sentence in behind:
         print(sentence)
     return (1 if behind else 0), {"behind": behind, "charts": measured}
@@ -396,7 +415,7 @@ def read(figures: Path) -> dict[str, Any]:
     try:
         record = json.loads(figures.read_text(encoding="utf-8"))
         for each in record["charts"].values():
-            Chart.of_figures(each), each["command"], each["machine"]
+            Chart.of_figures(each), each["drawing"], each["command"], each["machine"]
         return {"behind": [*record["behind"]], "charts": record["charts"]}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(
@@ -412,8 +431,10 @@ def redraw(earlier: dict[str, Any], folder: Path) -> tuple[int, dict[str, Any]]:
     InputError
         if the folder can't be written to.
     """
-    for name, each in earlier["charts"].items():
-        draw(Chart.of_figures(each), folder / f"{name}.svg", each["command"], each["machine"])
+    for drawing, group in itertools.groupby(earlier["charts"].values(), operator.itemgetter("drawing")):
+        first, *others = group
+        charts = [Chart.of_figures(each) for each in (first, *others)]
+        draw(charts, folder / f"{drawing}.svg", first["command"], first["machine"])
     return 0, earlier
 
 

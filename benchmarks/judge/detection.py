@@ -62,14 +62,14 @@ def judged(number: int, with_faults: bool) -> Judged:
 
 
 def drawn(blocks: Iterable[Judged]) -> tuple[Chart, ...]:
-    """A chart for each family and one for all of them."""
+    """A chart of all faults and one of each family."""
     good, bad = zip(*blocks, strict=True)
     clean = _by_judge(itertools.chain(*good))
     of_faults = (itertools.chain(*record) for record in zip(*filter(None, bad), strict=True))
     actual = dict(zip(FAULTS, map(_by_judge, of_faults), strict=True))
     return tuple(
         _chart(family, {fault: of for fault, of in actual.items() if family in ("all", fault.family)}, clean)
-        for family in (*FAMILIES, "all")
+        for family in ("all", *FAMILIES)
     )
 
 

@@ -1,6 +1,11 @@
+"""The pages that show charts: all of them, and no others, with the figures that they were drawn from."""
+
+import html
 import json
 import math
+import re
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,7 +58,7 @@ def test_what_is_above_a_limit_is_told_with_both_figures_and_what_is_below_it_is
 
 def test_a_chart_is_drawn_with_its_caption_the_machine_and_the_command(tmp_path):
     ours, other = Curve("ours", X, (0.0, 1e-16, 2e-16), ours=True), Curve("no answer", X, (1e-3, math.nan, math.inf))
-    charts.draw(chart_of(ours, other), tmp_path / "chart.svg", "python -m benchmarks something")
+    charts.draw([chart_of(ours, other)], tmp_path / "chart.svg", "python -m benchmarks something")
     text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
     assert ElementTree.fromstring(text).tag.endswith("svg")
     for record in ("A title", "Read this.", "ours", "no answer", "python -m benchmarks something", f"numpy {np.__version__}"):
@@ -73,7 +78,7 @@ def test_a_chart_is_drawn_from_its_figures_as_it_was_drawn_when_it_was_measured(
     status, sentence = charts.run_all("subject", {"sweep": lambda quick: [chart]}, tmp_path)
     (tmp_path / "figures.json").write_text(json.dumps({"exit_status": status, **sentence}, allow_nan=False), encoding="utf-8")
     assert charts.redraw(charts.read(tmp_path / "figures.json"), tmp_path / "again") == (0, sentence)
-    assert (tmp_path / "again" / "subject-name.svg").read_bytes() == (tmp_path / "subject-name.svg").read_bytes()
+    assert (tmp_path / "again" / "subject-sweep.svg").read_bytes() == (tmp_path / "subject-sweep.svg").read_bytes()
 
 
 def test_what_is_measured_anew_stands_beside_the_figures_of_all_others():
@@ -101,6 +106,35 @@ def test_what_is_in_the_background_is_drawn_thin_and_without_its_spread(tmp_path
     spread = [(0.9, 1.2), (0.09, 0.12), (0.009, 0.012)]
     sizes = []
     for minor in (False, True):
-        charts.draw(chart_of(Curve("other", X, X, spread=spread, minor=minor)), tmp_path / "chart.svg", "python -m benchmarks")
+        charts.draw(
+            [chart_of(Curve("other", X, X, spread=spread, minor=minor))], tmp_path / "chart.svg", "python -m benchmarks"
+        )
         sizes.append((tmp_path / "chart.svg").read_text(encoding="utf-8").count("<path"))
     assert sizes[0] >= sizes[1] + len(spread)
+
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+@pytest.mark.parametrize("subject", ["stability", "light", "speed", "judge"])
+def test_the_page_shows_every_chart_and_the_figures_that_it_was_drawn_from(subject):
+    figures = json.loads((DOCS / "charts" / f"{subject}.json").read_text(encoding="utf-8"))
+    page = (DOCS / f"{subject}.md").read_text(encoding="utf-8")
+    present = set(re.findall(rf"\(charts/({subject}-[a-z-]+)\.svg\)", page))
+    drawings = {each["drawing"] for each in figures["charts"].values()}
+    assert present == drawings == {path.stem for path in (DOCS / "charts").glob(f"{subject}-*.svg")}
+    # What is missed is told in so many words; of races, by the page's table (tests/test_project.py).
+    assert subject == "speed" or all(sentence in page.replace("\n", " ") for sentence in figures["behind"])
+
+
+@pytest.mark.parametrize("subject", ["stability", "light", "speed", "judge"])
+def test_every_chart_follows_a_dark_page_and_is_of_its_figures(subject):
+    figures = json.loads((DOCS / "charts" / f"{subject}.json").read_text(encoding="utf-8"))
+    for name, each in figures["charts"].items():
+        drawn = html.unescape((DOCS / "charts" / f"{each['drawing']}.svg").read_text(encoding="utf-8"))
+        chart = charts.Chart.of_figures(each)
+        assert "prefers-color-scheme: dark" in drawn, f"{name} stays light on a dark page"
+        for record in (chart.title, chart.reading, each["command"], each["machine"]):
+            assert record in drawn, (
+                f"{name} does not say {record!r}: python -m benchmarks {subject} --figures docs/charts/{subject}.json"
+            )

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.cameras import test_hostile as documents
-from tests.cameras import test_mixed_files as mixed
+from tests.cameras import test_of_strangers as mixed
 from tests.cameras import test_paths as paths
 from tests.cameras import test_read_only_formats as published
 from tests.cameras.conftest import CAMERAS

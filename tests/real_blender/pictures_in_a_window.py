@@ -89,7 +89,7 @@ def export():
         subprocess.run(["convert", *pictures, "-append", FOLDER / "artists" / "export.png"], check=True)
         with bpy.context.temp_override(window=window(), area=area, region=files):
             bpy.ops.file.cancel()
-        yield from settle()
+        yield from until(lambda: all(each.type != "FILE_BROWSER" for each in window().screen.areas), "the end of the browser")
 
 
 def preferences():
@@ -175,7 +175,8 @@ def proof():
     assert background.latest.answer == "same", background.latest.verdict
     view, sidebar = region(*SIDEBAR)
     with bpy.context.temp_override(window=window(), area=view, region=view.regions[-1]):
-        bpy.ops.screen.area_split(direction="VERTICAL", factor=1 - sidebar.width / view.width)
+        share = 1.4 * sidebar.width / view.width  # Blender narrows a sidebar that is all of its viewport
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=1 - share)
     yield from settle()
     left, right = sorted((area for area in window().screen.areas if area.type == "VIEW_3D"), key=lambda area: area.x)
     left.type = "IMAGE_EDITOR"

@@ -75,7 +75,7 @@ class Render(Step):
     """F12 shows what is in the middle of the view."""
 
     picture = "render.png"
-    shows = (0.0, 0.3, 1.0, 0.72)
+    shows = (0.24, 0.38, 0.76, 0.605)
     edits = 0
 
     def prepare(self):
@@ -110,6 +110,11 @@ class Render(Step):
         assert red > 1.2 * green > 1.2 * blue, (
             f"the middle of the picture is ({red:.2f}, {green:.2f}, {blue:.2f}), not the ball"
         )
+
+    def pose_for_the_picture(self):
+        call(bpy.ops.render.view_show)
+        for _ in range(8):
+            yield
 
     def tidy(self):
         for area in window().screen.areas:

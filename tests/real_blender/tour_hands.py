@@ -21,6 +21,7 @@ _HEADER = 60  # pixels from the panel's top within which its checkbox stands
 _PATIENCE = 4  # looks
 _STEPS = 200  # that something may take to happen
 _ROW = 18  # pixels between two looks, less than a button's height
+_NOTHING = 25  # rows without a button, more than a panel's texts and closed sub-panels are, below which there is none
 # Where in a row its buttons are looked for, as shares of the panel's width; of operators there are many in a row.
 LEFT, _MIDDLE, _CHECKBOX, _OPERATORS = 0.2, 0.5, 0.13, (0.31, 0.38, 0.46, 0.53, 0.6, 0.72, 0.85)
 _KEYS = {"-": "MINUS", ".": "PERIOD", " ": "SPACE", "/": "SLASH", "=": "EQUAL", ",": "COMMA"}
@@ -88,9 +89,14 @@ def seek(button, where):
     if not place and _map(where):
         yield from survey_the_rest(where, button)
     if not _remembered(button, where) or place:
-        _map(where).clear()
-        yield from survey(_top(where), where, button)
+        yield from survey_anew(where, button)
     return _remembered(button, where)
+
+
+def survey_anew(where, wanted=None):
+    """Look at all rows, whatever is remembered of them."""
+    _map(where).clear()
+    return (yield from survey(_top(where), where, wanted))
 
 
 def survey_the_rest(where, wanted=None):
@@ -104,13 +110,17 @@ def survey(top, where, wanted=None):
     before = len(_map(where))
     move(*NOWHERE)
     yield
+    last = top
     for y in range(int(top) - _ROW, part.y, -_ROW):
+        if last - y > _NOTHING * _ROW:
+            break
         columns = [_MIDDLE]
         for share in columns:
             x = part.x + part.width * share
             there = yield from look(x, y, where)
-            if there and there not in _map(where):
-                _map(where)[there] = (x, y)
+            if there:
+                last = y
+                _map(where).setdefault(there, (x, y))
             if share == _MIDDLE and there.endswith("]"):  # a number of a point, beside which stands what that follows
                 columns.append(LEFT)
             elif share == _MIDDLE and not there:

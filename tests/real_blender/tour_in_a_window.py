@@ -2,8 +2,8 @@
 
 blender --enable-event-simulate -p 0 0 1600 2000 --addons … --python tour_in_a_window.py -- [FOLDER [STEP…]]
 
-FOLDER : where the pictures of docs/artists.md go; without it none are taken. STEP : those alone are taken by hand, all others
-by script, for a picture that is wanted soon. Leaves with status 0, or 5 and a traceback.
+FOLDER : where the pictures of docs/artists.md go; every step is taken by script then, for hands take ten times as long. STEP :
+those alone are photographed. Leaves with status 0, or 5 and a traceback.
 """
 
 import sys
@@ -18,13 +18,15 @@ import tour
 import tour_step
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from hands_in_a_window import move, region, start, window
-from tour_hands import SIDEBAR, VIEWPORT, begin, beside, lowest_button, photograph, push_undo, redo, survey_the_rest, undo
+from tour_hands import SIDEBAR, VIEWPORT, begin, beside, lowest_button, photograph, push_undo, redo, survey_anew, undo
 
 FOLDER, *WANTED = sys.argv[sys.argv.index("--") + 1 :] or [None]
 FOLDER = FOLDER and Path(FOLDER)
 BEFORE, AFTER = (Path(tempfile.gettempdir(), f"{name}.png") for name in ("before", "after"))
 MOUSE_AWAY = (200, 700)
 BELOW_BUTTONS = 45  # pixels below the lowest button of a panel that a picture of it shows
+
+_bottoms = {}  # of the pictures of the panel, window coordinates, by whether the camera is in use
 
 
 def draw_finely():
@@ -42,9 +44,6 @@ def take(step):
     """The steps of a step: prepare, by hand, check, undo and redo."""
     step.prepare()
     yield
-    takes_pictures = bool(FOLDER and step.picture)
-    if takes_pictures and step.with_before:
-        yield from take_the_picture(step, BEFORE)
     push_undo("before")
     yield
     before = tour_step.state()
@@ -52,10 +51,6 @@ def take(step):
     yield
     after = tour_step.state()
     step.check()
-    if takes_pictures:
-        yield from take_the_picture(step, AFTER if step.with_before else FOLDER / step.picture)
-        if step.with_before:
-            beside(BEFORE, AFTER, FOLDER / step.picture)
     for _ in range(step.edits):
         yield from undo()
     assert not (lost := tour_step.differing(before, tour_step.state())), f"undo leaves {lost}"
@@ -66,21 +61,38 @@ def take(step):
     yield
 
 
-def pass_over(step):
-    """The steps of a step that is taken by script."""
-    if not step.needs_a_window:
-        step.prepare()
-        yield
-        step.by_script()
-        yield
-        step.tidy()
-        yield
+def show(step):
+    """The steps of a step that is taken by script, where that is possible, and photographed if that is wanted."""
+    is_wanted = step.picture and (not WANTED or type(step).__name__ in WANTED)
+    if step.needs_a_window and not is_wanted:
+        return
+    step.prepare()
+    yield
+    if is_wanted and step.with_before:
+        yield from take_the_picture(step, BEFORE)
+    if step.needs_a_window:
+        yield from step.by_hand()
+    else:
+        push_undo("before")
+        area, part = region(*VIEWPORT)
+        with bpy.context.temp_override(window=window(), area=area, region=part):
+            step.by_script()
+        push_undo("after")
+    yield
+    if is_wanted:
+        step.check()
+        yield from take_the_picture(step, AFTER if step.with_before else FOLDER / step.picture)
+        if step.with_before:
+            beside(BEFORE, AFTER, FOLDER / step.picture)
+    step.tidy()
+    yield
 
 
 def take_the_picture(step, path):
     """Steps that take what a step shows of the window as it is by now."""
-    if step.shows == "sidebar":
-        yield from survey_the_rest(SIDEBAR)
+    if step.shows == "sidebar" and _bottoms.get(tour_step.values().enabled) is None:
+        yield from survey_anew(SIDEBAR)
+        _bottoms[tour_step.values().enabled] = lowest_button() - BELOW_BUTTONS
     yield from step.pose_for_the_picture()
     move(*MOUSE_AWAY)
     yield from draw_finely()
@@ -93,7 +105,7 @@ def _area_and_share(name):
     """(left, bottom, width, height) of what a picture shows, and in how many percent of its size."""
     if name == "sidebar":
         _, sidebar = region("VIEW_3D", "UI")
-        bottom = max(sidebar.y, lowest_button() - BELOW_BUTTONS)
+        bottom = max(sidebar.y, _bottoms[tour_step.values().enabled])
         return (sidebar.x, bottom, sidebar.width, sidebar.y + sidebar.height - bottom), 100
     if name == "camera view":
         area, part = region(*VIEWPORT)
@@ -112,7 +124,7 @@ def steps():
     yield from begin()
     for each in tour.STEPS:
         started = time.perf_counter()
-        yield from (pass_over if WANTED and each.__name__ not in WANTED else take)(each())
+        yield from (show if FOLDER else take)(each())
         print(f"done: {each.__name__} in {time.perf_counter() - started:.1f} s", flush=True)
     print("done: the tour", flush=True)
 

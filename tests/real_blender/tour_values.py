@@ -35,11 +35,13 @@ class TypeTheFourValues(Step):
     edits = 7
     eye, look_at, distance = (4, -7, 3), (0, 0, 1), 800
 
+    def prepare(self):
+        values().lens_unit = "PIXELS"
+
     def by_hand(self):
         for name in ("eye", "look_at"):
             for i, number in enumerate(getattr(self, name)):
                 yield from type_into(f"virtual_pinhole.{name}[{i}]", str(number))
-        values().lens_unit = "PIXELS"
         yield from type_into("virtual_pinhole.distance", str(self.distance))
 
     def by_script(self):

@@ -1,12 +1,20 @@
+"""Camera presets: those that come along, and an artist's own."""
+
 import itertools
 import json
 import math
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
+import numpy as np
 import pytest
+
+from viewcam_addon.blender.interface import readouts
+from viewcam_addon.pinhole import Pinhole
 
 bpy = pytest.importorskip("bpy")
 
@@ -22,7 +30,7 @@ from viewcam_addon.blender.interface import (
     operators,
     panel,
     photo_matching,
-    readouts,
+    presets,
     render_panels,
     scene_cameras,
     swipe,
@@ -919,3 +927,225 @@ def test_the_menu_goes_with_the_add_on(registered_addon):
     finally:
         viewcam_addon.register()
     assert len(functions()) == count
+
+
+LENSES = [24, 35, 50, 85]
+
+# The frames of the canonical axes as DESIGN's text has them, u, v, w; along the third axis as everywhere else.
+FRAMES = {
+    "Y Up, Along -Z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "Y Up, Looking Down": ((0, 0, 1), (1, 0, 0), (0, 1, 0)),
+    "Y Up, Looking Up": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    "Z Up, Along Y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    "Z Up, Looking Down": ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
+    "Z Up, Looking Up": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+}
+
+
+@pytest.fixture
+def own_presets(tmp_path, monkeypatch):
+    """The folder that presets are saved in and looked for."""
+    folder = tmp_path / "presets" / presets.FOLDER
+    folder.mkdir(parents=True)
+    monkeypatch.setattr(bpy.utils, "user_resource", lambda *_arguments, **_options: str(folder))
+    monkeypatch.setattr(bpy.utils, "preset_paths", lambda _subdir: [str(folder)])
+    return folder
+
+
+def execute(name):
+    return bpy.ops.viewcam.execute_preset(shipped=name)
+
+
+def values(camera_object):
+    return camera_object.virtual_pinhole.numbers()
+
+
+def test_those_that_come_along_are_the_texts_views_and_four_lenses():
+    assert presets.SHIPPED.keys() == {f"Lens {lens} mm" for lens in LENSES} | FRAMES.keys()
+
+
+def listed():
+    """The texts that the list shows."""
+
+    class Shown:
+        layout = MagicMock()
+        path_menu = presets.VIEWCAM_PT_presets.path_menu
+
+    presets.VIEWCAM_PT_presets.draw(Shown(), bpy.context)
+    return [call.kwargs["text"] for call in Shown.layout.mock_calls if call.kwargs.get("text")]
+
+
+def test_the_list_shows_those_that_come_along_then_ones_own_and_misses_no_folder(posed_camera, own_presets, monkeypatch):
+    assert listed() == [*presets.SHIPPED]
+    bpy.ops.viewcam.add_preset(name="Mine")
+    assert listed() == [*presets.SHIPPED, "Mine"]
+    monkeypatch.setattr(bpy.utils, "preset_paths", lambda _subdir: [])
+    assert listed() == [*presets.SHIPPED]
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_a_view_is_the_texts_own_to_the_last_bit_and_leaves_the_lens(posed_camera, scene, name):
+    execute(name)
+    stated = cameras.stated(posed_camera, scene)
+    assert np.array_equal(stated.basis(), FRAMES[name]), f"u, v, w are {stated.basis()}"
+    assert np.linalg.norm(stated.eye) == 10 and stated.look_at == (0, 0, 0) and stated.distance[0] == 1500
+    assert np.abs(np.subtract(cameras.read(posed_camera, scene).basis(), FRAMES[name])).max() < 1e-6
+
+
+@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize("size", [(1920, 1080), (1080, 1920), (333, 333)])
+def test_a_lens_has_its_angle_in_any_picture_and_leaves_the_view(posed_camera, scene, lens, size):
+    scene.render.resolution_x, scene.render.resolution_y = size
+    before = values(posed_camera)[:3]
+    execute(f"Lens {lens} mm")
+    assert values(posed_camera)[:3] == before
+    # An angle in degrees, its half in radians and its tangent: each is rounded once, and the tangent takes on their errors.
+    assert values(posed_camera)[3] == pytest.approx(max(size) * lens / 36, rel=8 * 2.0**-53)
+    data = posed_camera.data
+    assert (data.lens, data.sensor_width) == (pytest.approx(lens, rel=2.0**-23), 36)
+
+
+@pytest.mark.parametrize("name", [name for name in FRAMES if "Looking" in name])
+def test_no_preset_warns_of_itself(posed_camera, scene, name):
+    execute(name)
+    assert panel.notices(posed_camera, scene) == []
+
+
+def test_a_preset_enables_a_camera_that_was_set_otherwise(camera_object, scene):
+    camera_object.location = (1, 2, 3)
+    execute("Lens 50 mm")
+    assert camera_object.virtual_pinhole.enabled and values(camera_object)[0] == (1, 2, 3)
+
+
+def test_what_is_saved_comes_back_in_float64(posed_camera, own_presets, scene, add_camera):
+    exact = ((1 / 3, -math.e, 0.1), (0.7, math.pi, 1e-7), (0.1, 0.2, 0.97), 1234.56789012345)
+    cameras.apply(posed_camera, Pinhole(*exact, 1920, 1080), scene)
+    assert bpy.ops.viewcam.add_preset(name="My View: 1/3") == {"FINISHED"}
+    (saved,) = own_presets.glob("*.py")
+    other = add_camera("Other")
+    bpy.context.view_layer.objects.active = other
+    bpy.ops.viewcam.execute_preset(filepath=str(saved))
+    assert values(other) == exact
+
+
+def test_an_own_preset_can_be_removed(posed_camera, own_presets):
+    bpy.ops.viewcam.add_preset(name="Mine")
+    assert bpy.ops.viewcam.add_preset(name="Mine", remove_name=True) == {"FINISHED"}
+    assert list(own_presets.iterdir()) == []
+
+
+def test_errors_are_one_sentence_and_leave_no_file(camera_object, own_presets, scene, tmp_path):
+    camera_object.data.type = "ORTHO"
+    with pytest.raises(RuntimeError, match="is orthographic, no pinhole") as error:
+        bpy.ops.viewcam.add_preset(name="Mine")
+    assert "Traceback" not in str(error.value) and list(own_presets.iterdir()) == []
+    with pytest.raises(RuntimeError, match="is orthographic, no pinhole") as error:
+        execute("Lens 35 mm")
+    assert "Traceback" not in str(error.value)
+    with pytest.raises(RuntimeError, match="The preset can't be read"):
+        bpy.ops.viewcam.execute_preset(filepath=str(tmp_path / "gone.py"))
+    bpy.data.objects.remove(camera_object)
+    with pytest.raises(RuntimeError, match="There is no camera"):
+        bpy.ops.viewcam.add_preset(name="Mine")
+
+
+LEVEL = Pinhole((0, -5, 0), (0, 0, 0), (0, 0, 1), 50.0, 100, 60)
+
+
+def test_readouts_are_the_camera_in_words():
+    readings = readouts.readouts(LEVEL, 18.0, 50.0, ("5 m", 5.0))
+    rows = {row.label: " ".join(row.texts) for row in readings}
+    assert rows["Focal Length"] == "18 mm"
+    assert rows["Horizontal FOV"] == "90.0000°"
+    assert rows["Vertical FOV"] == f"{2 * math.degrees(math.atan(30 / 50)):.4f}°"
+    assert rows["Diagonal FOV"] == f"{2 * math.degrees(math.atan(math.hypot(50, 30) / 50)):.4f}°"
+    assert rows["u"] == "+1.00000 +0.00000 +0.00000"
+    assert rows["v"] == "+0.00000 +0.00000 +1.00000"
+    assert rows["w"] == "+0.00000 -1.00000 +0.00000"
+    assert rows["View Plane"] == "50 px"
+    assert rows["To Look-At"] == "5 m"
+
+
+def test_what_is_copied_has_all_its_digits():
+    camera = replace(LEVEL, eye=(1 / 3, -5, 0.1))
+    for row in readouts.readouts(camera, 18.1, 1 / 3, ("5 m", math.pi)):
+        numbers = eval(row.exact, {})
+        if row.label in "uvw":
+            np.testing.assert_array_equal(numbers, camera.axes()["uvw".index(row.label)])
+        else:
+            names = ("Horizontal FOV", "Vertical FOV", "Diagonal FOV")
+            angles = dict(zip(names, map(math.degrees, camera.field_of_view()), strict=True))
+            lengths = {"Focal Length": 18.1, "View Plane": 1 / 3, "To Look-At": math.pi}
+            assert numbers == (angles | lengths)[row.label]
+
+
+def test_a_camera_without_stated_values_has_no_distance_to_a_look_at_point():
+    assert "To Look-At" not in [row.label for row in readouts.readouts(LEVEL, 18.0, 50.0, None)]
+
+
+def above(angle):
+    """Looks down within `angle` of an up that has no zeros, so that every number of the pose is rounded."""
+    up = np.array((0.48, 0.6, 0.64))
+    across = np.cross(up, (1, 0, 0))
+    eye = tuple(up + math.tan(angle) * across / np.linalg.norm(across))
+    return Pinhole(eye, (0, 0, 0), tuple(up), 1000.0, 1920, 1080)
+
+
+def warnings_of(camera, precision):
+    return [sentence for sentence in (readouts.roll_warning(camera, precision), readouts.distance_warning(camera)) if sentence]
+
+
+def test_a_singular_pose_is_said_to_be_so():
+    (warning,) = warnings_of(Pinhole((0, 0, 5), (0, 0, 0), (0, 0, 1), 50.0, 100, 60), 2.0**-24)
+    assert "parallel to up" in warning
+
+
+def test_the_roll_is_called_uncertain_where_a_corner_moves_a_tenth_of_a_pixel_and_not_before():
+    corner = math.hypot(960, 540)
+    for angle in (3e-2, 1e-2, 3e-3, 1e-3, 3e-4):
+        camera = above(angle)
+        moved = camera.roll_uncertainty() * corner
+        assert bool(warnings_of(camera, 2.0**-24)) == (moved > 0.1), f"{angle:g} rad: {moved:.2g} px"
+    assert warnings_of(above(3e-2), 2.0**-24) == []
+    assert warnings_of(above(3e-4), 2.0**-24)
+
+
+def test_the_roll_warning_tells_the_angle_and_the_roll():
+    angle = math.radians(0.001)
+    (sentence,) = warnings_of(above(angle), 2.0**-24)
+    roll = math.degrees(above(angle).roll_uncertainty())
+    assert sentence == f"The view is within 0.001° of up: the roll is uncertain by {float(f'{roll:.0e}'):g}°"
+    assert "any roll is possible" in warnings_of(above(1e-8), 2.0**-24)[0]
+
+
+def test_values_known_in_float64_leave_the_roll_certain():
+    assert warnings_of(above(1e-5), precision=2.0**-53) == []
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.1])
+def test_the_proposed_up_gives_the_same_picture_and_is_certain(angle):
+    camera = above(angle) if angle else Pinhole((0.48, 0.6, 0.64), (0, 0, 0), (0.48, 0.6, 0.64), 1000.0, 1920, 1080)
+    proposed = replace(camera, up=readouts.certain_up(camera))
+    assert proposed.sine_to_up == pytest.approx(1, abs=1e-12)
+    assert np.abs(np.stack(proposed.basis()) - np.stack(camera.basis())).max() < 1e-15
+    assert not any("roll" in sentence for sentence in warnings_of(proposed, 2.0**-24))
+
+
+def test_a_coordinate_axis_is_proposed_where_it_is_one():
+    assert readouts.certain_up(Pinhole((0, 0, 5), (0, 0, 0), (0, 0, 1), 50.0, 100, 60)) == (1, 0, 0)
+    assert readouts.certain_up(Pinhole((0, 1e-7, 5), (0, 0, 0), (0, 0, 1), 50.0, 100, 60)) == (0, -1, 0)
+
+
+def test_far_from_the_origin_the_rounding_is_told_in_pixels():
+    def warnings(far):
+        return warnings_of(Pinhole((far, 0, 0), (far, 10, 0), (0, 0, 1), 1000.0, 1920, 1080), 2.0**-24)
+
+    assert warnings(1e4) == []  # 2⁻²⁴ · 1000 px · 1e4 / 10 = 0.06 px
+    assert "may be 0.2 px off" in warnings(4e4)[-1]
+    assert "may be 40 px off" in warnings(6.4e6)[-1]
+
+
+def test_long_sentences_are_wrapped_to_the_width_of_the_region():
+    lines = readouts.wrapped("one two three four five six seven eight nine ten", 150)
+    assert len(lines) > 1
+    assert max(map(len, lines)) <= 22

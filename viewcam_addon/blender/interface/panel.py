@@ -73,6 +73,7 @@ def _draw_standing(layout: bpy.types.UILayout, camera_object: bpy.types.Object, 
         # One text: a long number takes the room that a short one beside it leaves.
         panel_rows.described(column, context, label, ("   ".join(texts),), share=0.25)
     row = layout.row()
+    row.use_property_split = row.use_property_decorate = False
     row.enabled = camera_object.data.type == "PERSP"
     row.prop(camera_object.virtual_pinhole, "enabled", text="Use", toggle=True)
 

@@ -23,7 +23,7 @@ from ...errors import InputError
 from ...pinhole import Pair, Pinhole
 from .. import camera as cameras
 from .. import datablocks, targets
-from . import kept, overlay, panel_rows
+from . import kept, overlay, panel_rows, readouts
 from .operators import CameraOperator
 from .panel_places import BelowSidebar, SubPanel
 
@@ -32,6 +32,7 @@ _AXES = "XYZ"
 _NEAR = 12  # pixels of the screen within which the mouse takes an end
 _SHORT = 8  # and a line that is shorter than this was a click
 _HANDLE, _LETTERS = 4, 13  # half a handle's size, and the letters', in points
+_PANELS_LETTERS = 11  # points
 _TOOLS = 50  # points that the toolbar may take
 _HELP = {
     EDGES: "Drag along an edge, towards where its axis points   X Y Z: axis to draw, or to mend   Backspace: delete",
@@ -353,6 +354,13 @@ def frame_in(context: bpy.types.Context, camera_object: bpy.types.Object) -> tup
     return min(xs), min(ys), max(xs), max(ys)
 
 
+def _right_end(context: bpy.types.Context) -> float:
+    """The right end of what the sidebar leaves of the region that is drawn, in its pixels."""
+    region = context.region
+    begins = [each.x - region.x for each in context.area.regions if each.type == "UI" and each.width > 1]
+    return min([region.width, *(x for x in begins if x > region.width / 2)])
+
+
 def _draw() -> None:
     """The lines, their ends, and what follows from them."""
     context, match = bpy.context, _drawn
@@ -398,7 +406,9 @@ def _draw() -> None:
     blf.size(0, _LETTERS * scale)
     # Along the lower edge: above are the header, the names of view and camera, and left the tools.
     x, y = max(left, _TOOLS * scale) + 10 * scale, max(bottom, 0.0) + 0.8 * _LETTERS * scale
-    for number, line in enumerate(reversed(words)):
+    room = (_right_end(context) - x) / scale * _PANELS_LETTERS / _LETTERS
+    lines_of_text = [line for sentence in words for line in readouts.wrapped(sentence, room)]
+    for number, line in enumerate(reversed(lines_of_text)):
         blf.enable(0, blf.SHADOW)
         blf.shadow(0, 3, 0.0, 0.0, 0.0, 1.0)
         blf.color(0, 1.0, 1.0, 1.0, 1.0)

@@ -192,8 +192,11 @@ def _name(context: bpy.types.Context) -> str:
     shading, settings = context.space_data.shading, context.scene.render
     if shading.type != "RENDERED":
         return shading.bl_rna.properties["type"].enum_items[shading.type].name
-    item = settings.bl_rna.properties["engine"].enum_items.get(settings.engine)
-    return item.name if item else settings.engine
+    if item := settings.bl_rna.properties["engine"].enum_items.get(settings.engine):
+        return item.name
+    own = settings.engine.removeprefix("BLENDER_").capitalize()  # Workbench, which nothing names
+    classes = bpy.types.RenderEngine.__subclasses__()  # those of add-ons; one, Blender's base of Hydra's, has no bl_idname
+    return next((each.bl_label for each in classes if getattr(each, "bl_idname", "") == settings.engine), own)
 
 
 _running: _Swipe | None = None

@@ -31,7 +31,6 @@ from ...tracer.scene.levels import least_level
 from ...tracer.tiles import Passes, Stopped
 from ..scenes import export
 from ..scenes.depsgraph import only_cameras_changed
-from ..scenes.ledger import Ledger
 
 if TYPE_CHECKING:
     from ...tracer.render import Keeper
@@ -86,7 +85,7 @@ class LiveView:
         settings, camera = depsgraph.scene_eval.virtual_pinhole_reference, camera_of(region, view)
         lit = settings.level != "GEOMETRY"
         if self._read is None or self._read[0] != lit:
-            self._read, self._followed = (lit, export.scene_through(depsgraph, camera, clip, Ledger(), lit)), None
+            self._read, self._followed = (lit, export.scene_through(depsgraph, camera, clip, lit)), None
         scene = self._read[1]
         level = least_level(scene)[0] if settings.level == "AUTO" else settings.level.lower()
         followed = camera, clip, level, settings.samples, settings.clay
