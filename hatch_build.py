@@ -51,7 +51,8 @@ LEVELS = ("v2", "v3", "v4")
 ONE_INSTANCE = "-DVIEWCAM_ONE_INSTANCE"
 # No contraction: a product and its sum round apart, which the triangle test stands on (core/shapes/triangle_mesh.h). No errno:
 # square roots are instructions.
-FLAGS = ["-std=c++20", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-DNDEBUG", "-g0"]
+# Nothing of wide vectors is passed between what different compilers compile, of which clang would warn a thousand times.
+FLAGS = ["-std=c++20", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-DNDEBUG", "-g0", "-Wno-psabi"]
 _PROBE = "#include <bit>\n#include <thread>\n#include <variant>\nint main() { return std::popcount(0u); }\n"
 
 
@@ -78,20 +79,30 @@ def build_core(platform: str, flags: tuple[str, ...] = (), travels: bool = False
     flags : more of them, as sanitizers need. travels : by ziglang, for machines whose C library is older than this one's.
     """
     compiler = system_compiler() if platform == this_platform() and not travels else None
-    target, _, name = PLATFORMS[platform]
-    command = [compiler] if compiler else [sys.executable, "-m", "ziglang", "c++", "-target", target]
-    command += [*FLAGS, *([] if platform.startswith("windows") else ["-fPIC"]), *flags]
-    if platform.startswith("macos"):
-        command.append(f"-Wl,-install_name,@rpath/{name}")  # in place of the folder that it is linked in
-    made_from = hashlib.sha256((repr(command) + inspect.getsource(_compiled)).encode())
-    for path in sorted(path for path in CORE.rglob("*") if path.suffix in (".h", ".cpp")):
-        made_from.update(f"{path.relative_to(CORE)}\0".encode() + path.read_bytes())
-    library = ROOT / "build" / "core" / f"{platform}-{made_from.hexdigest()[:16]}" / name
+    library, options = _place(platform, compiler, flags)
     if not library.exists():
         library.parent.mkdir(parents=True, exist_ok=True)
+        command = [*([compiler] if compiler else [sys.executable, "-m", "ziglang", "c++"]), *options]
         with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
             os.replace(_compiled(platform, command, compiler is None, Path(scratch)), library)
     return library
+
+
+def _place(platform: str, compiler: str | None, flags: tuple[str, ...] = ()) -> tuple[Path, list[str]]:
+    """The place of the library that these make, and all options of the compiler, which is ziglang's if it is None."""
+    target, _, name = PLATFORMS[platform]
+    options = [
+        *([] if compiler else ["-target", target]),
+        *FLAGS,
+        *([] if platform.startswith("windows") else ["-fPIC"]),
+        *flags,
+    ]
+    if platform.startswith("macos"):
+        options.append(f"-Wl,-install_name,@rpath/{name}")  # in place of the folder that it is linked in
+    made_from = hashlib.sha256((repr((compiler, options)) + inspect.getsource(_compiled)).encode())
+    for path in sorted(path for path in CORE.rglob("*") if path.suffix in (".h", ".cpp")):
+        made_from.update(f"{path.relative_to(CORE)}\0".encode() + path.read_bytes())
+    return ROOT / "build" / "core" / f"{platform}-{made_from.hexdigest()[:16]}" / name, options
 
 
 def _compiled(platform: str, command: list[str], zig: bool, folder: Path) -> Path:
@@ -111,7 +122,13 @@ def _compiled(platform: str, command: list[str], zig: bool, folder: Path) -> Pat
         return str(target)
 
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        if zig:  # which compiles its C++ library where one is first linked with: as long as it takes for three instances
+            empty = folder / "empty.cpp"
+            empty.touch()
+            linked_once = pool.submit(_run, [*command, "-shared", str(empty), "-o", str(folder / "empty")])
         objects = list(pool.map(compiled, parts))
+        if zig:
+            linked_once.result()
     library = folder / PLATFORMS[platform][2]
     linked = []
     if platform.startswith("linux"):
@@ -162,8 +179,8 @@ class CoreBuildHook(BuildHookInterface):
     """The hook that hatchling calls when pip builds the project."""
 
     def dependencies(self) -> list[str]:
-        """A compiler, where the system has none."""
-        return [] if system_compiler() else [ZIGLANG]
+        """A compiler, where the system has none and there is something to compile."""
+        return [] if system_compiler() or _place(this_platform(), None)[0].exists() else [ZIGLANG]
 
     def initialize(self, version: str, build_data: dict) -> None:
         """Compile for this machine. version : "standard" or "editable"."""

@@ -166,6 +166,9 @@ def compare(
         alarms = false_alarms or FALSE_ALARMS
         if framed is None:
             return radiance.compare(of, pictures, camera, test_samples, false_alarms=alarms)
+        if not framed.bounces.parts_diffuse:  # who rendered by himself may have the pass all the same
+            kept = ({name: passes for name, passes in each.passes.items() if name != "Diffuse Indirect"} for each in pictures)
+            pictures = [replace(each, passes=passes) for each, passes in zip(pictures, kept, strict=True)]
         makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(framed, threads))
         level, samples, seed = of.attributes.get("level", "path"), samples_of(of) or 0, seed_of(of)
 

@@ -142,6 +142,23 @@ def test_a_picture_and_itself_are_the_same_and_a_longer_lens_is_found(scene):
     assert not comparison.passed and "magnified by 0.999001" in comparison.sentence, comparison.sentence
 
 
+@pytest.mark.parametrize("bounces", [0, 1])
+def test_indirect_light_of_diffuse_surfaces_is_compared_where_they_may_scatter_and_nowhere_else(scene, bounces):
+    """Without diffuse bounces Cycles' pass is what a ray of a glossy lobe carries, and no picture's light is wrong by it."""
+    from viewcam_addon.tracer.scene.film import Bounces
+    from viewcam_addon.tracer.scene.lamps import Sun
+
+    sun = Sun("sun", towards=(0.2, -0.6, 1.0), irradiance=(2.0,) * 3, angle=0.3)
+    lit = replace(scene, lamps=(sun,), bounces=Bounces(total=2, diffuse=bounces))
+    picture, others = vp.render(lit, level="path", samples=16), []
+    for seed in (1, 2):
+        image = vp.render(lit, level="path", samples=16, seed=seed)
+        others.append(
+            replace(image, passes=dict(image.passes) | {"Diffuse Indirect": image["Diffuse Direct"] * np.float32(0.5)})
+        )
+    assert vp.compare(picture, others, lit).passed == (bounces == 0)
+
+
 def test_a_file_is_the_same_as_what_was_read_of_it(scene, tmp_path):
     from viewcam_addon import image
     from viewcam_addon.tracer.scene import scene_file

@@ -67,7 +67,7 @@ def test_what_went_wrong_is_told_by_name(tmp_path, painting):
     broken = {"shot_001": InputError("the lamp <Key & Fill> is broken: mend it")}
     painting.paint(tmp_path, 4, painter=painting.Painter(broken=broken, unlike=["shot_002"]), check=True)
     actual = page(tmp_path)
-    assert "3 are there, 1 failed, 1 failed the check." in actual.text
+    assert "3 are there, 1 could not be rendered, 1 different from Cycles' picture." in actual.text
     assert "the lamp <Key & Fill> is broken: mend it" in actual.text and "the left half is < the right half" in actual.text
     assert "Only what went wrong" in actual.text and 'class="different"' in (tmp_path / "contact-sheet.html").read_text()
 

@@ -177,4 +177,4 @@ def _tell(plan: Plan, events: Events, summary: Summary, folder: Folder, unknown:
         say(f"whether those that were kept are still right is not sure: --resume-known renders them. {unknown[0]}{more}")
     if unlike := [shot["name"] for shot in summary.shots if shot.get("passed") is False]:
         named = ", ".join(unlike[:_MOST_NAMED]) + (", …" if len(unlike) > _MOST_NAMED else "")
-        say(f"{len(unlike)} failed the check: {named}; {folder.summary} says how")
+        say(f"{len(unlike)} different: {named}; {folder.summary} says how")

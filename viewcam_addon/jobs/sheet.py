@@ -21,9 +21,9 @@ from ..files import written_whole
 from .summary import Result
 
 _WORDS = {
-    "failed": "failed",
+    "failed": "could not be rendered",
     "left": "left to render",
-    "checks_failed": "failed the check",
+    "checks_failed": "different from Cycles' picture",
     "not_all_modeled": "with objects that are not modeled",
 }
 

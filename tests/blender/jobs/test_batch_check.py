@@ -383,7 +383,7 @@ def test_a_failed_check_is_exit_status_1_and_one_that_passes_after_it_is_0(stage
     render = checking.cycles.render
     spoil(FAULTS["half a pixel to the right"])
     assert cli.main(command) == 1
-    assert "1 failed the check: as it stands" in capfd.readouterr().out
+    assert "1 different: as it stands" in capfd.readouterr().out
     record = json.loads((out / "as it stands.json").read_text(encoding="utf-8"))
     assert not record["check"]["passed"] and "the picture is shifted by" in record["check"]["verdict"]
     monkeypatch.setattr(checking.cycles, "render", render)
