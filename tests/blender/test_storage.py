@@ -321,18 +321,24 @@ def test_what_is_restored_is_as_it_was_whatever_was_stored(posed_camera):
 
 
 @pytest.mark.parametrize(
-    ("system", "scale", "value", "words"),
+    ("system", "unit", "scale", "value", "words"),
     [
-        ("METRIC", 1.0, 2.0, "2 m"),
-        ("METRIC", 0.01, 2.0, "2 cm"),
-        ("METRIC", 1.0, 1e-9, "1e-09"),  # Blender would say 0 m
-        ("METRIC", 1.0, math.inf, "inf"),
-        ("IMPERIAL", 1.0, 3.048, "10'"),
-        ("NONE", 0.01, 2.0, "2"),
+        ("METRIC", "METERS", 1.0, 2.0, "2 m"),
+        ("METRIC", "METERS", 0.01, 2.0, "0.02 m"),
+        ("METRIC", "CENTIMETERS", 1.0, -2.5, "-250 cm"),
+        ("METRIC", "MILLIMETERS", 1.0, 12345.6, "12345600 mm"),
+        ("METRIC", "ADAPTIVE", 0.01, 2.0, "2 cm"),
+        ("METRIC", "METERS", 1.0, 1e-9, "1e-09"),  # Blender would say 0 m
+        ("METRIC", "METERS", 1.0, math.inf, "inf"),
+        ("IMPERIAL", "FEET", 1.0, 3.048, "10'"),
+        ("IMPERIAL", "INCHES", 1.0, 0.0254, '1"'),
+        ("NONE", None, 0.01, 2.0, "2"),
     ],
 )
-def test_a_length_is_said_in_the_scenes_units(scene, system, scale, value, words):
+def test_a_length_is_said_in_the_scenes_units(scene, system, unit, scale, value, words):
     scene.unit_settings.system, scene.unit_settings.scale_length = system, scale
+    if unit:
+        scene.unit_settings.length_unit = unit
     assert datablocks.length(value, scene) == words
 
 

@@ -13,6 +13,17 @@ from . import versions
 
 # Meters: what is shorter, Blender calls zero.
 _SHORTEST_WORD = 1e-6
+_UNITS = {
+    "KILOMETERS": "km",
+    "METERS": "m",
+    "CENTIMETERS": "cm",
+    "MILLIMETERS": "mm",
+    "MICROMETERS": "µm",
+    "MILES": "mi",
+    "FEET": "'",
+    "INCHES": '"',
+    "THOU": "thou",
+}
 _KINDS = {"ORTHO": "orthographic", "PANO": "panoramic", "CUSTOM": "a custom camera"}
 
 
@@ -116,7 +127,14 @@ def length(value: float, scene: bpy.types.Scene, digits: int = 6) -> str:
     meters = value * units.scale_length
     if units.system == "NONE" or not _SHORTEST_WORD <= abs(meters) < math.inf:
         return f"{value:.{digits}g}"
-    return bpy.utils.units.to_string(units.system, "LENGTH", meters, precision=digits)
+    if (unit := _UNITS.get(units.length_unit)) is None:  # adaptive: the largest that leaves something before the point
+        return bpy.utils.units.to_string(units.system, "LENGTH", meters, precision=digits)
+    in_meters = float(
+        f"{bpy.utils.units.to_value(units.system, 'LENGTH', '1', str_ref_unit=unit):.7g}"
+    )  # Blender's are float32
+    number = meters / in_meters
+    text = f"{number:.{digits}g}" if abs(number) < 10**digits else f"{number:.0f}"
+    return f"{text}{unit}" if unit in "'\"" else f"{text} {unit}"
 
 
 def render_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:

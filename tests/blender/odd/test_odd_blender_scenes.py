@@ -166,7 +166,7 @@ def keep_above(camera_object, height):
 
 
 def test_a_smaller_scale_of_units_changes_nothing_but_the_words(posed_camera, scene, odd):
-    """A distance of 2 units is 2 cm here."""
+    """A distance of 2 units is 0.02 m here."""
     scene.unit_settings.scale_length = 0.01
     odd.check(posed_camera, then=lambda: keep_above(posed_camera, 7))
 
