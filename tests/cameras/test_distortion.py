@@ -22,7 +22,10 @@ from viewcam_addon.pinhole import Pinhole
 from . import test_of_strangers as mixed
 from . import test_read_only_formats as files
 
-cv2 = pytest.importorskip("cv2")
+
+def opencv():
+    """OpenCV's module; without it the test is skipped, and no other."""
+    return pytest.importorskip("cv2")
 
 
 RANDOM = np.random.default_rng(31)
@@ -78,7 +81,7 @@ def test_a_lens_of_colmap_moves_points_there_and_back_as_pycolmap_does(tmp_path,
 
 
 def test_opencvs_fourteen_coefficients_move_points_as_opencv_does():
-    cv2 = pytest.importorskip("cv2")
+    cv2 = opencv()
     document = {"K": np.eye(3).tolist(), "size": [4, 4], "dist": OPENCV}
     document["K"] = [[100, 0, 2], [0, 100, 2], [0, 0, 1]]
     (camera,) = cameras.read(json.dumps(document))
@@ -89,7 +92,7 @@ def test_opencvs_fourteen_coefficients_move_points_as_opencv_does():
 
 @pytest.mark.parametrize("model", ["equidistant", "fisheye", "kannala_brandt4"])
 def test_a_fisheye_of_kalibr_and_opencv_is_opencvs(model):
-    cv2 = pytest.importorskip("cv2")
+    cv2 = opencv()
     k = [0.05, -0.02, 0.005, -0.001]
     (camera,) = cameras.read(json.dumps({**files.K, "distortion_model": model, "distortion_coeffs": k}))
     points = 3 * POINTS
@@ -145,7 +148,7 @@ def realitycapture():
 
 @pytest.mark.parametrize("make", [metashape, meshroom, openmvg, nerfstudio, realitycapture])
 def test_brown_and_conradys_lens_is_opencvs_by_every_programs_names(make):
-    cv2 = pytest.importorskip("cv2")
+    cv2 = opencv()
     camera = cameras.read(make(), options=Options(size=(640, 360)))[0]
     numbers = np.array([BROWN[name] for name in ("k1", "k2", "p1", "p2", "k3")])
     moved, _ = cv2.projectPoints(np.c_[POINTS, np.ones(len(POINTS))], np.zeros(3), np.zeros(3), np.eye(3), numbers)
@@ -249,10 +252,13 @@ K = np.array([[150.0, 0, 83], [0, 151, 44], [0, 0, 1]])
 BROWN_LENS = {"k1": -0.2, "k2": 0.06, "p1": 0.004, "p2": -0.003}
 FISHEYE = {"k1": 0.03, "k2": -0.01, "k3": 0.002, "k4": 0.0}
 LENSES = {
-    "OPENCV": (distortion.opencv(BROWN_LENS), lambda points: cv2.undistortPoints(points, K, np.array([*BROWN_LENS.values()]))),
+    "OPENCV": (
+        distortion.opencv(BROWN_LENS),
+        lambda points: opencv().undistortPoints(points, K, np.array([*BROWN_LENS.values()])),
+    ),
     "OPENCV_FISHEYE": (
         distortion.fisheye(FISHEYE),
-        lambda points: cv2.fisheye.undistortPoints(points, K, np.array([*FISHEYE.values()])),
+        lambda points: opencv().fisheye.undistortPoints(points, K, np.array([*FISHEYE.values()])),
     ),
 }
 CLOSE = 1e-3
@@ -268,6 +274,7 @@ def seen_by_opencv(undistort):
     """The pinhole's points of all pixels' centers: (height, width, 2)."""
     centers = own_places(PLANE)
     if undistort is LENSES["OPENCV"][1]:
+        cv2 = opencv()
         criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-12)
         distorted = np.array([*BROWN_LENS.values()])
         return cv2.undistortPointsIter(centers.reshape(-1, 1, 2), K, distorted, None, None, criteria).reshape(centers.shape)

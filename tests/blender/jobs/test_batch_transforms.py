@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
-cv2 = pytest.importorskip("cv2")
 
 from viewcam_addon import child_process, cli
 
@@ -352,7 +351,7 @@ def calibrated(folder, model, numbers):
     return folder
 
 
-def of_opencv(document, model):
+def of_opencv(cv2, document, model):
     """(matrix, coefficients, module) by which OpenCV projects what transforms.json says."""
     k = np.array([[document["fl_x"], 0, document["cx"]], [0, document["fl_y"], document["cy"]], [0, 0, 1.0]])
     if model == "OPENCV_FISHEYE":
@@ -365,13 +364,13 @@ def to_camera(frame):
     return np.diag([1.0, -1, -1, 1]) @ np.linalg.inv(frame["transform_matrix"])
 
 
-def distances(picture, frame, document, model):
+def distances(cv2, picture, frame, document, model):
     """The distances in pixels of the board's corners that OpenCV finds in a picture from where it projects them.
 
     Of corners between squares of 16 pixels and more.
     """
     points = np.array([(x, y, 0.0) for y in range(-7, 8) for x in range(-11, 12)])[:, None]
-    matrix, (k, terms, module) = to_camera(frame), of_opencv(document, model)
+    matrix, (k, terms, module) = to_camera(frame), of_opencv(cv2, document, model)
     places = module.projectPoints(points, cv2.Rodrigues(matrix[:3, :3])[0], matrix[:3, 3], k, terms)[0].reshape(15, 23, 2)
     wide = np.min([np.linalg.norm(np.gradient(places, axis=axis), axis=-1) for axis in (0, 1)], axis=0)
     inside = ((places > 10) & (places < np.array([document["w"], document["h"]]) - 10)).all(axis=-1) & (wide > 16)
@@ -383,8 +382,10 @@ def distances(picture, frame, document, model):
     return np.linalg.norm(corners - expected, axis=-1)
 
 
+@pytest.mark.exhaustive  # which has OpenCV
 @pytest.mark.parametrize(("model", "numbers"), [("OPENCV", OPENCV), ("OPENCV_FISHEYE", FISHEYE)])
 def test_corners_are_where_opencv_projects_them_and_back_undistorted(blend, tmp_path, model, numbers):
+    cv2 = pytest.importorskip("cv2")
     lens, out, straight = calibrated(tmp_path / "lens", model, numbers), tmp_path / "out", tmp_path / "straight"
     words = ["--frames", "2..2", "--labels", "masks", "--check", "--transforms", "--distort", str(lens)]
     assert cli.main(["batch", str(blend), "--out", str(out), *words]) == 0, "the pinhole is what the tracer sees"
@@ -397,12 +398,12 @@ def test_corners_are_where_opencv_projects_them_and_back_undistorted(blend, tmp_
     pinholes = json.loads((straight / "transforms.json").read_text())
     (pinhole,) = pinholes["frames"]
     picture = cv2.imread(str(out / frame["file_path"]), cv2.IMREAD_GRAYSCALE)
-    off = distances(picture, frame, document, model)
+    off = distances(cv2, picture, frame, document, model)
     assert off.max() < CLOSE, f"{off.max():.2g} pixels aside"
     undistorted = cv2.imread(str(straight / pinhole["file_path"]), cv2.IMREAD_GRAYSCALE)
-    off = distances(undistorted, pinhole, pinholes, "PINHOLE")
+    off = distances(cv2, undistorted, pinhole, pinholes, "PINHOLE")
     assert off.max() < CLOSE, f"{off.max():.2g} pixels aside, undistorted"
     if model == "OPENCV":
         p1, p2 = document["p1"], document["p2"]
-        off = distances(picture, frame, document | {"p1": p2, "p2": p1}, model)
+        off = distances(cv2, picture, frame, document | {"p1": p2, "p2": p1}, model)
         assert np.median(off) > CLOSE, "p1 and p2 swapped are not found"
