@@ -121,22 +121,22 @@ def _compiled(platform: str, command: list[str], zig: bool, folder: Path) -> Pat
         _run([*command, *flags, "-c", str(source), "-o", str(target)])
         return str(target)
 
-    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        if zig:  # which compiles its C++ library where one is first linked with: as long as it takes for three instances
-            empty = folder / "empty.cpp"
-            empty.touch()
-            linked_once = pool.submit(_run, [*command, "-shared", str(empty), "-o", str(folder / "empty")])
-        objects = list(pool.map(compiled, parts))
-        if zig:
-            linked_once.result()
-    library = folder / PLATFORMS[platform][2]
-    linked = []
+    linked = [*command, "-shared", "-s"]
     if platform.startswith("linux"):
         exports = folder / "exports"  # the C interface alone: what is inlined of the standard library stays here
         exports.write_text("{ global: viewcam_*; local: *; };\n", encoding="utf-8")
-        linked = ["-pthread", f"-Wl,--version-script={exports}", *([] if zig else ["-static-libstdc++", "-static-libgcc"])]
+        linked += ["-pthread", f"-Wl,--version-script={exports}", *([] if zig else ["-static-libstdc++", "-static-libgcc"])]
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        if zig:  # which compiles its C++ library where one is first linked so: as long as it takes for three instances
+            empty = folder / "empty.cpp"
+            empty.touch()
+            first = pool.submit(_run, [*linked, str(empty), "-o", str(folder / "empty")])
+        objects = list(pool.map(compiled, parts))
+        if zig:
+            first.result()
+    library = folder / PLATFORMS[platform][2]
     # Of what several objects define alike, linkers take the first: that of the least instruction set.
-    _run([*command, "-shared", "-s", *linked, *objects, "-o", str(library)])
+    _run([*linked, *objects, "-o", str(library)])
     return library
 
 
