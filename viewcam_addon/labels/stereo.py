@@ -32,7 +32,7 @@ from ..files import folder_written_whole
 from ..image import BACKGROUND_DEPTH
 from ..pinhole import Pinhole
 from ..png import encoded
-from . import files
+from . import files, surface_points
 from .coco import read_pictures
 
 Words = tuple[str, str]
@@ -109,19 +109,22 @@ def _pair(*pictures: tuple[Path, dict[str, Any]]) -> Pair:
         if camera.lens or camera.pinhole.mirrored:
             raise InputError(f"{path} is {'mirrored' if camera.pinhole.mirrored else 'seen through a lens'}: no stereo pair is")
         cameras.append(camera.pinhole)
-        points.append(_points(camera.pinhole, passes["Depth"][..., 0]))
+        depth = passes["Depth"][..., 0].astype(np.float64)
+        depth[depth >= BACKGROUND_DEPTH] = np.nan
+        rows, columns = np.indices(depth.shape)
+        points.append(surface_points.positions(camera, rows, columns, depth))
     left, right = cameras
     if (left.distance, left.width, left.height) != (right.distance, right.width, right.height):
         raise InputError(f"{names} have different distances or sizes: give both cameras the same")
-    columns = np.arange(left.width) + 0.5
-    rows = left.height - (np.arange(left.height) + 0.5)[:, None]
-    disparities, heights = [], []
+    across = np.arange(left.width) + 0.5
+    upward = left.height - (np.arange(left.height) + 0.5)[:, None]
+    disparities, offsets = [], []
     for other, seen, sign in ((right, points[0], 1), (left, points[1], -1)):
         known = np.isfinite(seen).all(axis=-1)
         column, row, _ = other.project(np.where(known[..., None], seen, np.array(other.eye)))
-        disparities.append(sign * (columns - column))
-        heights.append(np.abs(row - rows)[known])
-    off = np.concatenate([*heights, [0.0]]).max()
+        disparities.append(sign * (across - column))
+        offsets.append(np.abs(row - upward)[known])
+    off = np.concatenate([*offsets, [0.0]]).max()
     baseline = float((np.array(right.eye) - left.eye) @ left.basis()[0])
     if not off <= _LEVEL or baseline <= 0:
         why = f"show points up to {off:.2g} rows apart" if baseline > 0 else "have the left camera on the right"
@@ -129,16 +132,7 @@ def _pair(*pictures: tuple[Path, dict[str, Any]]) -> Pair:
     d0, d1 = disparities
     both = _agree(d0, d1, -1), _agree(d1, d0, 1)
     photographs = tuple(files.photograph(path, document) for path, document in pictures)
-    return Pair(paths, photographs, (left, right), baseline, (d0, d1), both)  # type: ignore[arg-type]
-
-
-def _points(camera: Pinhole, depth: NDArray[np.float32]) -> NDArray[np.float64]:
-    """(height, width, 3): what the pixels' centers show, world space; nan where nothing is."""
-    columns, rows = np.meshgrid(np.arange(camera.width), camera.height - 1 - np.arange(camera.height))
-    x, y = camera.view_plane(columns + 0.5, rows + 0.5)
-    u, v, w = camera.basis()
-    z = np.where(depth < BACKGROUND_DEPTH, depth.astype(np.float64), np.nan)
-    return np.array(camera.eye) + z[..., None] * (x[..., None] * u + y[..., None] * v - w)
+    return Pair((paths[0], paths[1]), (photographs[0], photographs[1]), (left, right), baseline, (d0, d1), both)
 
 
 def _agree(disparity: NDArray[np.float64], other: NDArray[np.float64], sign: int) -> NDArray[np.bool_]:

@@ -69,6 +69,14 @@ def planes(
     return depth.astype(np.float64), state, ids
 
 
+def positions(view: cameras.Camera, rows: NDArray[np.intp], columns: NDArray[np.intp], depth: Array) -> Array:
+    """The points that pixels' centers show: (..., 3), world space. rows : from the top. depth : along the axis, nan for nan."""
+    camera = view.pinhole
+    x, y = distortion.view_plane(camera, view.lens, columns + 0.5, camera.height - (rows + 0.5))
+    u, v, w = camera.basis()
+    return np.add(camera.eye, depth[..., None] * (x[..., None] * u + y[..., None] * v - w))
+
+
 def sampled(
     number: int, view: cameras.Camera, depth: Array, state: NDArray[np.int64], colors: NDArray[np.uint8], points: int
 ) -> Sampled:
@@ -80,12 +88,8 @@ def sampled(
     rank = (columns * EVENLY[0] + rows * EVENLY[1]) % 1.0
     chosen = np.sort(np.argsort(rank, kind="stable")[:points])
     rows, columns = rows[chosen], columns[chosen]
-    camera = view.pinhole
-    x, y = distortion.view_plane(camera, view.lens, columns + 0.5, camera.height - (rows + 0.5))
-    u, v, w = camera.basis()
     z = depth[rows, columns]
-    positions = np.add(camera.eye, z[:, None] * (x[:, None] * u + y[:, None] * v - w))
-    return Sampled(positions, np.full(len(z), number), z, state[rows, columns], colors[rows, columns])
+    return Sampled(positions(view, rows, columns, z), np.full(len(z), number), z, state[rows, columns], colors[rows, columns])
 
 
 def visible(
