@@ -49,17 +49,15 @@ def read_transforms(text):
 def read_colmap(texts):
     """cameras.txt and images.txt as COLMAP reads them, lines parted at single spaces.
 
-    Sources: COLMAP's doc/format.rst (fields, axes, Hamilton's quaternion, parameters of SIMPLE_PINHOLE and PINHOLE),
-    src/colmap/scene/reconstruction_io_text.cc (two lines an image).
+    Sources: COLMAP's doc/format.rst (fields, axes, Hamilton's quaternion, parameters of PINHOLE),
+    src/colmap/scene/reconstruction_io_text.cc (two lines an image); gaussian-splatting's scene/colmap_loader.py (no other model).
     """
     cameras = {}
     for line in texts["cameras.txt"].splitlines():
         if line and not line.startswith("#"):
             number, model, _width, _height, *parameters = line.split(" ")
             parameters = [float(text) for text in parameters]
-            if model == "SIMPLE_PINHOLE":
-                parameters.insert(0, parameters[0])
-            assert model in ("SIMPLE_PINHOLE", "PINHOLE") and len(parameters) == 4, line
+            assert model == "PINHOLE" and len(parameters) == 4, f"Gaussian splatting refuses {line}"
             cameras[int(number)] = parameters
     assert not [line for line in texts["points3D.txt"].splitlines() if line and not line.startswith("#")]
     lines = iter(texts["images.txt"].split("\n"))

@@ -202,7 +202,7 @@ def test_on_paper_a_view_along_y_is_a_quarter_turn_about_x_and_one_straight_down
 
 def test_pictures_with_the_same_intrinsics_share_a_camera():
     assert content(colmap.texts(THREE)["cameras.txt"]) == [
-        "1 SIMPLE_PINHOLE 640 360 1200.0 320.0 180.0",
+        "1 PINHOLE 640 360 1200.0 1200.0 320.0 180.0",
         "2 PINHOLE 640 360 1200.0 800.0 300.0 210.0",
     ]
     assert [line.split(" ")[8] for line in content(colmap.texts(THREE)["images.txt"])[::2]] == ["1", "2", "1"]
@@ -244,7 +244,7 @@ def test_the_quaternion_has_length_1_and_its_first_number_that_is_not_0_is_posit
 def test_the_numbers_have_the_digits_of_float64():
     pinhole = Pinhole((0.1, 1e-7, 1 / 3), (1e6, 2, 3), (0, 0, 1), 1e5 / 3, 640, 360, (1 / 7, 2.0**-30))
     camera = content(colmap.texts([Camera("a", pinhole)])["cameras.txt"])[0].split(" ")[4:]
-    assert [float(text) for text in camera] == [1e5 / 3, 1 / 7, 360 - 2.0**-30]
+    assert [float(text) for text in camera] == [1e5 / 3, 1e5 / 3, 1 / 7, 360 - 2.0**-30]
 
 
 def test_the_three_files_are_written_and_nothing_else_with_the_same_bytes_each_time(tmp_path):

@@ -216,6 +216,21 @@ def test_points_have_the_pictures_colors_where_splatting_looks_for_them(learned)
     )
 
 
+def test_gaussian_splatting_finds_each_picture_by_a_model_that_it_takes(learned):
+    """The rules of its scene/colmap_loader.py and dataset_readers.py, and of nerfstudio's colmap_dataparser.py, which takes one
+    model of all cameras: words parted at any white space, PINHOLE alone, two lines an image, pictures by their last name."""
+    lines = {
+        name: [line for line in (learned / "sparse" / "0" / f"{name}.txt").read_text().split("\n") if line[:1] != "#"]
+        for name in ("cameras", "images")
+    }
+    cameras_of_file = [line.split() for line in lines["cameras"] if line]
+    assert [(model, len(numbers)) for _, model, _, _, *numbers in cameras_of_file] == [("PINHOLE", 4)]
+    images = [line.split() for line in lines["images"][:-1:2]]
+    assert [words[9] for words in images] == [f"r_{i}.png" for i in range(9)] and {len(words) for words in images} == {10}
+    assert all((learned / words[9]).is_file() and words[8] == cameras_of_file[0][0] for words in images)
+    assert all(len(line.split()) % 3 == 0 for line in lines["images"][1::2])
+
+
 def test_instant_ngp_has_depth_in_scene_units_and_a_cube_that_holds_the_points(learned):
     document = json.loads((learned / "transforms.json").read_text())
     assert document["integer_depth_scale"] == 0.001 and all(

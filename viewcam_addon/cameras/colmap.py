@@ -1,9 +1,9 @@
 """A COLMAP model: text and binary in; text out, and binary by colmap_binary.py; and a points3D without points where none are
 known: labels/colmap.py knows some.
 
-**Cameras.** One for each set of intrinsics that the pictures have: SIMPLE_PINHOLE (f, cx, cy) where pixels are square, else
-PINHOLE (fx, fy, cx, cy); with a lens OPENCV or the first model that has its terms. The upper left corner of the picture is
-(0, 0), its first pixel's center (0.5, 0.5).
+**Cameras.** One for each set of intrinsics that the pictures have: PINHOLE (fx, fy, cx, cy), the only one that Gaussian
+splatting's reader of text takes; with a lens OPENCV or the first model that has its terms. The upper left corner of the picture
+is (0, 0), its first pixel's center (0.5, 0.5).
 
 **Images.** In text two lines each, the second one a list of image points, empty where there are none. The pose takes world
 space to the camera's x right, y down, z into the view, as a unit quaternion (w first, Hamilton's) and a translation. All
@@ -409,11 +409,8 @@ def intrinsics_of(pinhole: Pinhole, lens: distortion.Lens | None = None) -> _Int
         if its lens is none of COLMAP's.
     """
     (f_x, _, c_x), (_, f_y, c_y), _ = intrinsics(pinhole)
-    if lens is not None:
-        model, bent = _model_of(lens)
-        return _Intrinsics(model, pinhole.width, pinhole.height, (f_x, f_y, c_x, c_y, *bent))
-    model, focal = ("SIMPLE_PINHOLE", (f_x,)) if f_x == f_y else ("PINHOLE", (f_x, f_y))
-    return _Intrinsics(model, pinhole.width, pinhole.height, (*focal, c_x, c_y))
+    model, bent = ("PINHOLE", ()) if lens is None else _model_of(lens)
+    return _Intrinsics(model, pinhole.width, pinhole.height, (f_x, f_y, c_x, c_y, *bent))
 
 
 def _model_of(lens: distortion.Lens) -> tuple[str, tuple[float, ...]]:

@@ -128,9 +128,9 @@ def read_colmap(folder):
     lenses = {}
     for line in filter(None, lines["cameras"]):
         number, model, width, height, *parameters = line.split(" ")
-        parameters = [*map(float, parameters)]
-        f, c = {"SIMPLE_PINHOLE": (parameters[:1] * 2, parameters[1:]), "PINHOLE": (parameters[:2], parameters[2:])}[model]
-        lenses[number] = tuple(f), tuple(c), (int(width), int(height))
+        assert model == "PINHOLE"
+        f_x, f_y, *c = map(float, parameters)
+        lenses[number] = (f_x, f_y), tuple(c), (int(width), int(height))
     cameras = {}
     for line in lines["images"][0::2]:
         if not line:
