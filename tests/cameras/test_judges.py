@@ -65,6 +65,68 @@ def test_what_pycolmap_writes_we_see_through_as_it_does(tmp_path, name, binary):
     assert read.name == name and read.size_stated
 
 
+def with_rigs(folder, binary):
+    """A model of two rigs with three cameras each, as pycolmap writes it, and the function that writes one of it there."""
+    pycolmap = pytest.importorskip("pycolmap")
+    options = pycolmap.SyntheticDatasetOptions(num_rigs=2, num_cameras_per_rig=3, num_frames_per_rig=2, num_points3D=3)
+    options.camera_model_id, options.camera_params = pycolmap.CameraModelId.PINHOLE, [1280.0, 1290.0, 500.0, 384.0]
+    options.sensor_from_rig_rotation_stddev, options.sensor_from_rig_translation_stddev = 30.0, 0.5
+    model = pycolmap.synthesize_dataset(options)
+    (model.write_binary if binary else model.write_text)(folder)
+    return model
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_cameras_of_rigs_are_where_pycolmap_has_them(tmp_path, binary):
+    model = with_rigs(tmp_path, binary)
+    read = {camera.image: camera.pinhole for camera in cameras.read(tmp_path)}
+    assert read.keys() == {image.name for image in model.images.values()} and len(read) == 12
+    assert (tmp_path / f"rigs.{'bin' if binary else 'txt'}").is_file()
+    for image in model.images.values():
+        points = points_before(read[image.name])
+        seen = np.array([image.project_point(point) for point in points])
+        judged(read[image.name], seen[:, 0], seen[:, 1], points)
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_images_that_were_changed_beside_their_rigs_are_refused_and_read_without(tmp_path, binary):
+    """As by scripts that know cameras, images and points alone: COLMAP would not see the change, and all others would."""
+    suffix = "bin" if binary else "txt"
+    model = with_rigs(tmp_path, binary)
+    rigs = [tmp_path / f"{name}.{suffix}" for name in ("rigs", "frames")]
+    before = [path.read_bytes() for path in rigs]
+    pycolmap = pytest.importorskip("pycolmap")
+    model.transform(pycolmap.Sim3d(1.0, pycolmap.Rotation3d(), [5e-4, 0.0, 0.0]))
+    (model.write_binary if binary else model.write_text)(tmp_path)
+    for path, content in zip(rigs, before, strict=True):
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=rf"and 9 more have another pose than by .*rigs\.{suffix} and .*frames\.{suffix}, and"):
+        cameras.read(tmp_path)
+    for path in rigs:
+        path.unlink()
+    assert len(cameras.read(tmp_path)) == 12
+
+
+@pytest.mark.parametrize("binary", [False, True])
+@pytest.mark.parametrize("name", ["rigs", "frames"])
+def test_damaged_rigs_are_a_sentence(tmp_path, binary, name):
+    with_rigs(tmp_path, binary)
+    path = tmp_path / f"{name}.{'bin' if binary else 'txt'}"
+    content = path.read_bytes()
+    path.write_bytes(content[:-9] if binary else content.rpartition(b" ")[0])
+    with pytest.raises(InputError, match=rf"{path.name} ends in the middle"):
+        cameras.read(tmp_path)
+
+
+@pytest.mark.parametrize(("form", "binary"), [("colmap", True), ("colmap", False), ("colmap_binary", False)])
+def test_nothing_is_written_beside_a_model_that_would_be_read_in_its_place(tmp_path, form, binary):
+    with_rigs(tmp_path, binary)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    with pytest.raises(InputError, match=r"has rigs\.\w+, .* of another model.*: choose another folder, or take them out"):
+        cameras.save([of(UNMIRRORED[0])], tmp_path, form)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
 def test_our_binary_model_is_pycolmaps_to_the_byte(tmp_path):
     pycolmap = pytest.importorskip("pycolmap")
     cameras.save([of(name) for name in UNMIRRORED], tmp_path / "ours", "colmap_binary")

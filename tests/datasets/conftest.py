@@ -50,7 +50,8 @@ def read_colmap(texts):
     """cameras.txt and images.txt as COLMAP reads them, lines parted at single spaces.
 
     Sources: COLMAP's doc/format.rst (fields, axes, Hamilton's quaternion, parameters of PINHOLE),
-    src/colmap/scene/reconstruction_io_text.cc (two lines an image); gaussian-splatting's scene/colmap_loader.py (no other model).
+    src/colmap/scene/reconstruction_io_text.cc (two lines an image); gaussian-splatting's scene/colmap_loader.py (no other
+    model).
     """
     cameras = {}
     for line in texts["cameras.txt"].splitlines():

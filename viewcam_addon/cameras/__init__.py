@@ -26,6 +26,7 @@ A format is a module in `FORMATS` with
     notes_in(source) → texts        where a file that it wrote has this project's notes, if that is not its text
     read_again(cameras, options) → list[Camera]     where it takes its time: what `read` makes of what `write` gives
     LENSES                          of what writes a camera's lens, too, and refuses itself what it can't say
+    NOT_BESIDE                      of several files: names of others with which programs would not read these
     in_world(source, options) → Options             where a file says its own axes and unit: the options with these
 
 **To the bit.** A matrix or an angle holds fewer digits than the values of which it was made. So a writer puts these beside
@@ -343,9 +344,11 @@ def save(cameras: Iterable[Camera], path: str | os.PathLike[str], format: str, o
     Raises
     ------
     InputError
-        as `write` does, or if a file can't be written; FullDiskError if the disk is full.
+        as `write` does, or if a file can't be written or would be read with others of its folder; FullDiskError if the disk
+        is full.
     """
     content = write(cameras, format, options)
+    check_no_other_model(path, format)
     files: Mapping[Path, str | bytes] = (
         {Path(path): content}
         if isinstance(content, str | bytes)
@@ -355,6 +358,16 @@ def save(cameras: Iterable[Camera], path: str | os.PathLike[str], format: str, o
         for file, each in files.items():
             stack.enter_context(written_whole(file)).write_bytes(each if isinstance(each, bytes) else each.encode("utf-8"))
     return [*files]
+
+
+def check_no_other_model(path: str | os.PathLike[str], format: str) -> None:
+    """Raise InputError if a folder has files of another model, by which programs would read this one otherwise."""
+    others = [name for name in getattr(_module(format, "write"), "NOT_BESIDE", ()) if Path(path, name).exists()]
+    if others:
+        raise InputError(
+            f"{os.fspath(path)} has {several(others)} of another model, which programs would read with this one or in its "
+            "place: choose another folder, or take them out"
+        )
 
 
 def _module(name: str, does: str) -> ModuleType:

@@ -11,8 +11,9 @@ numbers have as many digits as bring back the same float64. Comments before them
 binary model, in which COLMAP leaves no room, has these in a file of their own beside it. Of text and binary in one folder the
 binary one counts, as for COLMAP.
 
-rigs and frames, new in COLMAP 3.12, are neither written nor read: without them each image is a frame of its own, as older
-readers take it, and with them the images repeat the poses that they compose.
+rigs and frames, new in COLMAP 3.12, are not written: without them each image is a frame of its own. With them the images repeat
+the poses that they compose; COLMAP passes over those of the images, and all others over rigs and frames: where somebody has
+changed one of the two alone, it is refused.
 
 Sources: COLMAP's doc/format.rst, doc/database.rst (pixel centers), src/colmap/sensor/models.h (the lenses) and
 src/colmap/scene/reconstruction_io_text.cc and _binary.cc (what parts a line: a name ends at a space).
@@ -21,7 +22,7 @@ src/colmap/scene/reconstruction_io_text.cc and _binary.cc (what parts a line: a 
 import itertools
 import re
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -65,10 +66,17 @@ MODELS: dict[str, tuple[int, tuple[str, ...]]] = {
 
 _STRAIGHT = ("f", "fx", "fy", "cx", "cy")
 _FILES = ("cameras", "images")
+_RIGS = ("rigs", "frames")
+_SENSORS = {"CAMERA": 0, "IMU": 1}
+_AS_THE_RIG = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # the pose in it of a rig's first sensor
+_SAME_POSE = 1e-5  # relative: what two poses of one image may differ by for the six digits of one
 
 TEXTS = ("images.txt", "cameras.txt", "points3D.txt")
 """The files of a model that is written."""
 NOTES = "virtual_pinhole.txt"
+FORMS_OF_RIGS = tuple(f"{name}{suffix}" for name in _RIGS for suffix in (".txt", ".bin"))
+NOT_BESIDE = (*FORMS_OF_RIGS, "cameras.bin", "images.bin", "points3D.bin")
+"""Files of another model that count before those that are written: for COLMAP binary ones do, and rigs have the poses."""
 _FOLDERS = ((), ("0",), ("sparse", "0"), ("sparse",), ("colmap", "sparse", "0"))
 
 
@@ -113,6 +121,8 @@ def read(source: Source, options: Options) -> list[Camera]:
         intrinsic, images = _binary_cameras(files[0]), [*_binary_images(files[1])]
     else:
         intrinsic, images = _text_cameras(files[0]), [*_text_images(files[1])]
+    if rigs := _files(source, folder, suffix, _RIGS):
+        _refuse_other_poses(images, _poses_of_frames(*map(_Reader if suffix == ".bin" else _Words, rigs)), rigs)
     has_texts = suffix == ".bin" and _files(source, folder, ".txt")
     notes = ("The folder has the model as text, too: the binary one counts",) if has_texts else ()
     planes: dict[int, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}
@@ -155,7 +165,7 @@ def model(source: Source) -> tuple[tuple[str, ...], str] | None:
     """The place of the model in a folder, part by part, and the suffix of its files; None if there is none."""
     if not source.is_folder:
         path = source.path
-        ours = path and path.stem in (*_FILES, "points3D", "rigs", "frames") and path.suffix in (".txt", ".bin")
+        ours = path and path.stem in (*_FILES, *_RIGS, "points3D") and path.suffix in (".txt", ".bin")
         return ((), path.suffix) if ours and _files(source, (), path.suffix) else None
     for folder in _FOLDERS:
         for suffix in (".bin", ".txt"):
@@ -170,9 +180,9 @@ def model(source: Source) -> tuple[tuple[str, ...], str] | None:
     return None
 
 
-def _files(source: Source, folder: Sequence[str], suffix: str) -> list[Source]:
+def _files(source: Source, folder: Sequence[str], suffix: str, names: Sequence[str] = _FILES) -> list[Source]:
     """The files of cameras and images; none if one is not there."""
-    paths = [source.file(*folder, f"{name}{suffix}") for name in _FILES]
+    paths = [source.file(*folder, f"{name}{suffix}") for name in names]
     return paths if all(paths) else []
 
 
@@ -263,11 +273,79 @@ def _id(word: str, place: str) -> int:
     return int(word)
 
 
+def _poses_of_frames(rigs: "_Reader | _Words", frames: "_Reader | _Words") -> dict[int, tuple[float, ...]]:
+    """Number of an image → the pose of its rig in the world, and that of its camera in the rig, one after the other."""
+    in_rig: dict[tuple[int, ...], tuple[float, ...]] = {}
+    for _ in range(rigs.count()):
+        rig, sensors = rigs.numbers("2I")
+        for place in range(sensors):
+            sensor = rigs.numbers("iI")
+            if place == 0:
+                in_rig[rig, *sensor] = _AS_THE_RIG
+            elif rigs.numbers("B")[0]:
+                in_rig[rig, *sensor] = rigs.numbers("7d")
+    poses = {}
+    for _ in range(frames.count()):
+        _, rig, *pose, taken = frames.numbers("2I7dI")
+        for _ in range(taken):
+            *sensor, image = frames.numbers("iIQ")
+            if sensor[0] == _SENSORS["CAMERA"] and (rig, *sensor) in in_rig:
+                poses[image] = (*pose, *in_rig[rig, *sensor])
+    return poses
+
+
+def _refuse_other_poses(images: Sequence[_Image], poses: dict[int, tuple[float, ...]], rigs: Sequence[Source]) -> None:
+    """Raise InputError if an image has another pose than its rig gives it."""
+    images = [image for image in images if image.number in poses]
+    whats = [f"image {checks.quoted(image.name)}" for image in images]
+    rows = [
+        checks.vector(f"the pose of {what}", (*image.quaternion, *image.translation, *poses[image.number]), 21)
+        for what, image in zip(whats, images, strict=True)
+    ]
+    numbers = np.array(rows).reshape(-1, 3, 7)
+    turn, of_rig, in_rig = (axes.rotations_of(numbers[:, i, :4], whats) for i in range(3))
+    place, of_rigs_place, in_rigs_place = (numbers[:, i, 4:] for i in range(3))
+    carried = np.einsum("nij,nj->ni", in_rig, of_rigs_place) + in_rigs_place
+    reach = np.abs(numbers[:, :, 4:]).max(axis=(1, 2), initial=0.0)
+    differ = np.abs(turn - in_rig @ of_rig).max(axis=(1, 2), initial=0.0) > _SAME_POSE
+    differ |= np.abs(place - carried).max(axis=1, initial=0.0) > _SAME_POSE * reach
+    if differ.any():
+        raise InputError(
+            f"{several([what for what, other in zip(whats, differ, strict=True) if other])} have another pose than by "
+            f"{' and '.join(file.name for file in rigs)}, and programs differ in which of them counts: take these two files "
+            "out, or write the model again"
+        )
+
+
+class _Words:
+    """Numbers of a text of a model, one after another, as `_Reader` has them of a binary one."""
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._lines = [words for line in _lines(source) if (words := line.split()) and not words[0].startswith("#")]
+        self._words = itertools.chain.from_iterable(self._lines)
+
+    def count(self) -> int:
+        return len(self._lines)
+
+    def numbers(self, form: str) -> tuple:
+        kinds = "".join(kind * int(count or 1) for count, kind in re.findall(r"(\d*)(\D)", form))
+        words = [*itertools.islice(self._words, len(kinds))]
+        of_kind: dict[str, Callable[[str], float]] = {"d": float, "i": _SENSORS.__getitem__}
+        try:
+            return tuple(of_kind.get(kind, int)(word) for kind, word in zip(kinds, words, strict=True))
+        except (ValueError, KeyError):
+            raise InputError(f"{self._source.name} ends in the middle, or is no COLMAP file: copy it again") from None
+
+
 class _Reader:
     """Little-endian numbers of a file, one after another."""
 
     def __init__(self, source: Source) -> None:
         self._source, self._at = source, 0
+
+    def count(self) -> int:
+        return self.numbers("Q")[0]
 
     def numbers(self, form: str) -> tuple:
         try:

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 
 from . import naming
 from .camera import Camera, Options
-from .colmap import MODELS, NOTES, check_names, comments, intrinsics_of, pose_of
+from .colmap import FORMS_OF_RIGS, MODELS, NOTES, TEXTS, check_names, comments, intrinsics_of, pose_of
 
 TITLE = "COLMAP model, binary"
 SUFFIX = ""
 LENSES = True
+NOT_BESIDE = (*FORMS_OF_RIGS, *TEXTS)  # text counts before it for nerfstudio
 
 
 def write(cameras: Sequence[Camera], options: Options) -> dict[str, str | bytes]:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cameras import Camera, colmap, save, transforms
+from ..cameras import Camera, check_no_other_model, colmap, save, transforms
 from ..cameras.distortion import Lens
 from ..errors import InputError, several
 from ..files import check_writable, written_whole
@@ -61,6 +61,7 @@ def refuse(shots: Sequence[Job], suffix: str, test: str | None = None) -> None:
 def check_folder(folder: Folder) -> None:
     """Raise InputError if a dataset can't be written into the folder, as far as that is known before anything is rendered."""
     check_writable(folder.path / transforms.FILE)
+    check_no_other_model(folder.path.joinpath(*MODEL), "colmap")
     for file in (*colmap.TEXTS, labels.PLY):
         check_writable(folder.path.joinpath(*MODEL, file))
 
