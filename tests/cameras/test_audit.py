@@ -526,6 +526,19 @@ def test_a_lens_that_was_left_out_is_named_with_its_coefficient(name):
     assert named >= 3
 
 
+def test_a_lens_that_moves_less_than_a_pixel_is_no_wrong_focal_length_where_the_evidence_is_as_exact():
+    for seed in range(10):
+        random = np.random.default_rng(seed)
+        views, middle = a_right_dataset(random)
+        straight = points_in_pictures(random, views, middle, 0.0)
+        in_plane = (straight.places - views.center[straight.which]) / views.focal[straight.which]
+        of_k1 = in_plane * (in_plane**2).sum(axis=1, keepdims=True) * views.focal[straight.which]  # what 1 of it moves them
+        k1 = -0.8 / np.percentile(np.hypot(*of_k1.T), 95)
+        places = straight.places + k1 * of_k1 + 0.05 * random.normal(size=of_k1.shape)
+        verdict = _audited(views, Tracks(straight.which, places, straight.points))
+        assert verdict.kind == "lens_left_out", (seed, verdict)
+
+
 def test_a_data_set_of_colmap_with_a_lens_is_right(tmp_path, capsys):
     random = np.random.default_rng(3)
     lens = distortion.opencv({"k1": -0.2})

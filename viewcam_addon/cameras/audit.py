@@ -31,7 +31,8 @@ Array = NDArray[np.float64]
 # log likelihood by which one explanation must beat another: e¹⁴ : 1, whatever the number of mistakes that are tried.
 _SURE, _TIED = 14.0, 10.0
 _FEWEST = 40  # observations
-_LEFT_OUT = 2.0  # pixels: less may be anything's
+_LEFT_OUT = 2.0  # pixels: less may be anything's,
+_SEEN = 4.0  # but for a lens that moves pictures by so many times what is left over with it
 _ROUNDS = 10  # of weighing outliers
 _LENS_FITS = 1.0  # pixels: a lens that was left out explains the evidence to this, or is none
 _FITTED_LENSES = (  # projection, terms and whether the focal length is fitted, too: the simpler ones first
@@ -508,7 +509,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
         lenses = _lenses_of_depths(views, evidence) if min(_usual(each, evidence) for each in known) > _EXPLAINED else []
     else:  # what a lens moves aside is seen in the largest errors but for outliers
         nearest = min(float(np.sort(each)[int(0.95 * (len(each) - 1))]) for each in known)
-        lenses = _lens_of_tracks(views, evidence) if nearest > _LEFT_OUT / 2 else []
+        lenses = _lens_of_tracks(views, evidence) if nearest > _SEEN / 2 * evidence.floor else []
     tried += lenses
     errors += [evidence.errors(mistake.undone(views)) for mistake in lenses]
     # The usual error is that of the best explanation, so that it does not hide in the worse ones.
@@ -655,14 +656,14 @@ def _lens_of_tracks(views: Views, evidence: Tracks) -> list[Mistake]:
             best = fit
     if best is None:
         return []
-    lens, factor, _ = best
+    lens, factor, error = best
     with np.errstate(all="ignore"):
         as_is = points * factor
         if any(views.lenses):
             as_is = (views.project(evidence.which[there], evidence.points[there])[0] - center) / focal
         moved = np.hypot(*((lens.distort(points) * factor - as_is) * focal).T)
     moved = moved[np.isfinite(moved)]
-    if not len(moved) or np.percentile(moved, 95) < _LEFT_OUT:
+    if not len(moved) or np.percentile(moved, 95) < min(_LEFT_OUT, _SEEN * error):
         return []
     return [_of_lens(views, lens, factor)]
 
