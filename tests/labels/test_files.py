@@ -210,7 +210,8 @@ def test_pycocotools_loads_it_and_finds_every_mask(pictures, tmp_path, kind):
 def test_categories_and_keypoints_are_those_of_pycocotools_and_yolo(tmp_path):
     """A ball's center is in the ball, its far side is as well, and what is behind it is hidden."""
     joints = {"middle": [0.0, 0, 0], "behind": [0.0, 4, 0], "aside": [0.0, -60, 9]}
-    annotations = {"Ball": {"category": "person", "keypoints": joints}, "Cube": {"category": "person"}}
+    bones = {"aside": "behind", "behind": "middle"}
+    annotations = {"Ball": {"category": "person", "keypoints": joints, "bones": bones}, "Cube": {"category": "person"}}
     labels = label(room(), ("masks",), annotations=annotations)
     path = tmp_path / "shots" / "a.exr"
     path.parent.mkdir()
@@ -222,6 +223,7 @@ def test_categories_and_keypoints_are_those_of_pycocotools_and_yolo(tmp_path):
     dataset = loader(tmp_path / "all.json")
     categories = {each["name"]: each for each in dataset.loadCats(dataset.getCatIds())}
     assert [*categories] == ["Floor", "person"] and categories["person"]["keypoints"] == [*joints]
+    assert sorted(categories["person"]["skeleton"]) == [[1, 2], [2, 3]]
     people = dataset.loadAnns(dataset.getAnnIds(catIds=[categories["person"]["id"]]))
     (ball,) = (each for each in people if each["num_keypoints"])
     expected = [column[0] - 0.5, 48 - row[0] - 0.5, 2, column[1] - 0.5, 48 - row[1] - 0.5, 1, 0, 0, 0]

@@ -39,7 +39,12 @@ def instances(folder: Path, amodal: bool = False) -> Document:
                 }
             )
     numbered = [
-        each | ({"keypoints": names[each["name"]], "skeleton": []} if each["name"] in names else {})
+        each
+        | (
+            {"keypoints": of_it, "skeleton": _skeleton(pictures, each["name"], of_it)}
+            if (of_it := names.get(each["name"]))
+            else {}
+        )
         for each in _categories(categories)
     ]
     return {"images": _images(pictures), "annotations": annotations, "categories": numbered}
@@ -79,6 +84,19 @@ def keypoint_names(pictures: Sequence[tuple[Path, Document]]) -> dict[str, list[
             for point in each.get("keypoints", ()):
                 names.setdefault(category(each), {})[point["name"]] = None
     return {name: [*points] for name, points in names.items()}
+
+
+def _skeleton(pictures: Sequence[tuple[Path, Document]], of_category: str, names: Sequence[str]) -> list[list[int]]:
+    """The pairs of keypoints of a category of which one hangs on the other, numbered from 1."""
+    points = (
+        point
+        for _, document in pictures
+        for each in document["instances"]
+        if category(each) == of_category
+        for point in each.get("keypoints", ())
+    )
+    pairs = dict.fromkeys((point["parent"], point["name"]) for point in points if point.get("parent") in names)
+    return [[names.index(end) + 1 for end in pair] for pair in pairs]
 
 
 def _keypoints(instance: Document, names: Sequence[str]) -> Document:

@@ -128,8 +128,9 @@ def _check(document: dict[str, Any]) -> None:
     if len({each["id"] for each in document["instances"]}) < len(document["instances"]):
         raise ValueError("two instances have one id")
     for each in document["instances"]:
-        texts += [each["name"], each.get("category", ""), *(point["name"] for point in each.get("keypoints", ()))]
+        texts += [each["name"], each.get("category", "")]
         for point in each.get("keypoints", ()):
+            texts += [point["name"], point.get("parent", "")]
             _check_numbers([point["x"], point["y"]], (2,))
             if point["visible"] not in (0, 1, 2):
                 raise ValueError("a keypoint is seen, hidden or not there")

@@ -46,7 +46,8 @@ def label(
     """The labels of a scene's picture. keepers : of what other scenes share with it. The rest is as in api.label.
 
     lens : what bends the picture of all frames, whose cameras have its own plane. annotations : by the names of objects their
-    `category` and `keypoints`, which are (x, y, z) in the object's coordinates by their names.
+    `category`, `keypoints`, which are (x, y, z) in the object's coordinates by their names, and `bones`: of a keypoint's name
+    that of the one which it hangs on.
     """
     if unknown := [kind for kind in kinds if kind not in KINDS]:
         raise InputError(f"there is no label {unknown[0]!r}: give some of {', '.join(KINDS)}")
@@ -138,7 +139,7 @@ def _instances(
         if "category" in about:
             figures["category"] = about["category"]
         if about.get("keypoints"):
-            figures["keypoints"] = _keypoints(surfaces, number, about["keypoints"])
+            figures["keypoints"] = _keypoints(surfaces, number, about["keypoints"], about.get("bones", {}))
         if with_masks:
             figures["visible"] = seen
         if with_amodal:
@@ -150,7 +151,7 @@ def _instances(
     return result
 
 
-def _keypoints(surfaces: Surfaces, number: int, points: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _keypoints(surfaces: Surfaces, number: int, points: Mapping[str, Any], bones: Mapping[str, str]) -> list[dict[str, Any]]:
     """The places of an instance's keypoints in the picture, from its upper left corner, and COCO's figure of what is seen.
 
     It is 2 where the pixel shows the instance itself, which a joint is inside of, or nothing that is nearer than the point; 1
@@ -165,4 +166,8 @@ def _keypoints(surfaces: Surfaces, number: int, points: Mapping[str, Any]) -> li
     seen = (surfaces.instance[pixels] == number) | (surfaces.depth[pixels] >= depth)
     visible = np.where(inside, 1 + seen, 0)
     x, y = (np.where(inside, place, 0.0) for place in (column, camera.height - row))
-    return [{"name": name, "x": float(x[i]), "y": float(y[i]), "visible": int(visible[i])} for i, name in enumerate(points)]
+    return [
+        {"name": name, "x": float(x[i]), "y": float(y[i]), "visible": int(visible[i])}
+        | ({"parent": bones[name]} if name in bones else {})
+        for i, name in enumerate(points)
+    ]

@@ -130,6 +130,35 @@ def test_an_instance_has_one_id_in_all_shots_and_what_its_properties_say(stage, 
     assert np.hypot(point["x"] - column, camera.height - point["y"] - row) < ALLOWED
 
 
+def test_a_joint_hangs_on_the_next_empty_above_it_or_on_that_of_the_next_bone(stage, tmp_path):
+    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    stage.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = [armature.data.edit_bones.new(name) for name in ("arm", "forearm", "hand")]
+    for i, bone in enumerate(bones):
+        bone.head, bone.tail, bone.parent = (i, 0, 0), (i + 1, 0, 0), bones[i - 1] if i else None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    stage.objects["Suzanne"].modifiers.new("Rig", "ARMATURE").object = armature
+
+    def joint(name, parent, bone=None):
+        empty = bpy.data.objects.new("Empty", None)
+        stage.collection.objects.link(empty)
+        empty["keypoint"], empty.parent = name, parent
+        if bone:
+            empty.parent_type, empty.parent_bone = "BONE", bone
+        return empty
+
+    joint("elbow", armature, "arm")
+    wrist = joint("wrist", armature, "hand")  # the bone between has no joint
+    joint("thumb", wrist)
+    joint("root", armature)
+    shoot(tmp_path, [STATED], Outputs(picture=False, labels=("masks",)))
+    points = read_labels(tmp_path, "stated")[1]["Suzanne"]["keypoints"]
+    above = {point["name"]: point.get("parent") for point in points}
+    assert above == {"elbow": None, "wrist": "elbow", "thumb": "wrist", "root": None}
+
+
 def test_pictures_are_the_same_bytes_with_and_without_labels_and_the_scene_is_as_before(stage, tmp_path):
     shots = [FRAMES[0], FRAMES[2], STATED]
     shoot(tmp_path / "with", shots, Outputs(labels=ALL.labels))

@@ -97,10 +97,12 @@ def _annotations(scene: bpy.types.Scene) -> dict[str, dict[str, Any]]:
     result: dict[str, dict[str, Any]] = {
         each.name: {"category": str(each["category"])} for each in bpy.data.objects if "category" in each
     }
-    for empty in bpy.data.objects:
-        if empty.type != "EMPTY" or "keypoint" not in empty:
-            continue
-        owner = empty.parent
+    joints = {
+        each: str(each["keypoint"]) or each.name for each in bpy.data.objects if each.type == "EMPTY" and "keypoint" in each
+    }
+    of_bones = {(each.parent, each.parent_bone): name for each, name in joints.items() if each.parent_type == "BONE"}
+    for empty, name in joints.items():
+        above, owner = _joint_above(empty, joints, of_bones), empty.parent
         while owner is not None and owner.type == "EMPTY":
             owner = owner.parent
         if owner is None:
@@ -109,6 +111,22 @@ def _annotations(scene: bpy.types.Scene) -> dict[str, dict[str, Any]]:
         place = empty.evaluated_get(graph).matrix_world.translation
         for each in owners:
             local = each.evaluated_get(graph).matrix_world.inverted_safe() @ place
-            name = str(empty["keypoint"]) or empty.name
-            result.setdefault(each.name, {}).setdefault("keypoints", {})[name] = [*local]
+            about = result.setdefault(each.name, {})
+            about.setdefault("keypoints", {})[name] = [*local]
+            if above is not None:
+                about.setdefault("bones", {})[name] = above
     return result
+
+
+def _joint_above(
+    empty: bpy.types.Object, joints: dict[bpy.types.Object, str], of_bones: dict[tuple[bpy.types.Object, str], str]
+) -> str | None:
+    """The joint that a joint hangs on: the next empty above it that is one, or that of the next bone above its own."""
+    while empty.parent is not None and empty.parent_type != "BONE":
+        empty = empty.parent
+        if empty in joints:
+            return joints[empty]
+    rig = empty.parent
+    bone = rig.data.bones.get(empty.parent_bone) if rig is not None and rig.type == "ARMATURE" else None
+    above = (of_bones.get((rig, each.name)) for each in (bone.parent_recursive if bone else ()))
+    return next(filter(None, above), None)
