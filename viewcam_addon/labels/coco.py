@@ -38,15 +38,8 @@ def instances(folder: Path, amodal: bool = False) -> Document:
                     **_keypoints(each, names.get(category(each), [])),
                 }
             )
-    numbered = [
-        each
-        | (
-            {"keypoints": of_it, "skeleton": _skeleton(pictures, each["name"], of_it)}
-            if (of_it := names.get(each["name"]))
-            else {}
-        )
-        for each in _categories(categories)
-    ]
+    of_points = {name: {"keypoints": names[name], "skeleton": _skeleton(pictures, name, names[name])} for name in names}
+    numbered = [each | of_points.get(each["name"], {}) for each in _categories(categories)]
     return {"images": _images(pictures), "annotations": annotations, "categories": numbered}
 
 

@@ -2,6 +2,7 @@ import json
 import math
 import re
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import findings
 from viewcam_addon.blender.interface import camera_files, clipboard, file_menu
 from viewcam_addon.blender.jobs import renderer as jobs
-from viewcam_addon.cameras import Camera, Options, naming
+from viewcam_addon.cameras import Camera, Options, distortion, naming
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.scene import LedgerEntry, scene_file
@@ -131,6 +132,42 @@ def test_pictures_are_backgrounds_where_they_are_found_and_told_where_not(scene,
     image_names = [[each.image.name for each in block.data.background_images] for block in imported("0")]
     assert image_names == [["view_000.png"], [], ["view_002.png"]]
     assert "1 of 3 pictures were not found" in capfd.readouterr().out
+
+
+def flight(tmp_path, names, lens=None):
+    """A transforms.json of cameras with these pictures, imported as one that flies: its camera."""
+    views = [replace(each, image=name, lens=lens) for each, name in zip(around(len(names)), names, strict=True)]
+    formats.save(views, tmp_path / "transforms.json", "transforms")
+    for name in names:
+        write_picture(tmp_path / name)
+    assert import_(tmp_path / "transforms.json", set_size=True, import_as="FLIGHT") == {"FINISHED"}
+    return imported("transforms")[0]
+
+
+@pytest.mark.parametrize(("first", "start"), [(7, 1), (0, 101), (1, 1)])
+def test_a_flight_shows_the_picture_of_each_frame(scene, tmp_path, first, start):
+    scene.frame_start = start
+    names = [f"shot2_{number:04}.png" for number in range(first, first + 4)]
+    (background,) = flight(tmp_path, names).data.background_images
+    for i, name in enumerate(names):
+        scene.frame_set(start + i)
+        assert background.image.filepath_from_user(image_user=background.image_user).endswith(name)
+
+
+@pytest.mark.parametrize(
+    ("names", "lens", "sentence"),
+    [
+        (["a_1.png", "a_2.png", "a_4.png"], None, "do not go with the frames"),
+        (["a_1.png", "b_2.png", "a_3.png"], None, "do not go with the frames"),
+        (["a_9.png", "a_10.png", "a_11.png"], None, "do not go with the frames"),
+        (["a.png", "b.png", "c.png"], None, "do not go with the frames"),
+        (["a_1.png", "a_2.png", "a_3.png"], distortion.opencv({"k1": 0.1}), "viewcam camera --undistort"),
+    ],
+)
+def test_pictures_that_a_flight_can_not_show_are_told(scene, tmp_path, capfd, names, lens, sentence):
+    assert not flight(tmp_path, names, lens).data.background_images
+    assert sentence in capfd.readouterr().out
+    assert not [image for image in bpy.data.images if image.source == "SEQUENCE"]
 
 
 def test_no_file_makes_blender_open_a_picture_that_is_elsewhere(scene, tmp_path):

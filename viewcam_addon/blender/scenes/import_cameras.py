@@ -10,12 +10,16 @@ The photograph of a camera with a lens is shown without it: as an undistorted co
 Rejected: a movie clip with Blender's own tracking camera, which undistorts to 0.03 pixels, but has no fisheyes, and takes the
 number in a file's name for a frame: at another frame of the scene it shows another camera's photograph.
 
+The pictures of a flight are shown frame by frame, if their numbers go with its frames; none is copied, so that those of a lens
+are not shown.
+
 A flight is plain keyframes of location, rotation and lens, as Bake writes them. Rejected: curves of the four values, which hold
 eye and look-at in float32 each, and the direction between them in fewer digits.
 """
 
 import contextlib
 import itertools
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +36,8 @@ from .. import datablocks, picture, pose, versions
 from ..temporary_settings import Overrides
 
 _WIDEST = 2048  # pixels of an undistorted copy along its longer side, which takes two seconds
+_NUMBERED = re.compile(r"(?P<before>.*?)(?P<number>[0-9]{1,9})(?P<after>[^0-9]*)", re.DOTALL)
+"""The path of a picture of a sequence: the last number in it counts, as for Blender."""
 _OF_DATA = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height")
 
 
@@ -86,14 +92,16 @@ class _CameraImport:
         self._note(note for camera in cameras for note in camera.notes)
         if len(cameras) > 1:
             self._world = self._linked(f"{self._name} World", None)
+        pictures = 0
         if as_flight:
             objects = (self._new(self._name),)
-            self._fly(objects[0], cameras)
+            cameras, at = self._timed(cameras)
+            self._fly(objects[0], cameras, at)
+            pictures = 0 if folder is None else self._show_sequence(objects[0], cameras, at, folder)
         else:
             objects = tuple(self._new(camera.name) for camera in cameras)
         if self._scene.camera is None:
             self._overrides.set(self._scene, "camera", objects[0])
-        pictures = 0
         if not as_flight:
             bpy.context.view_layer.update()
             for block, camera in zip(objects, cameras, strict=True):
@@ -101,12 +109,15 @@ class _CameraImport:
             if folder is not None:
                 pictures = sum([self._show(block, camera, folder) for block, camera in zip(objects, cameras, strict=True)])
                 named = sum(camera.image is not None or camera.picture is not None for camera in cameras)
-                if pictures < named:
-                    self._note([f"{named - pictures} of {named} pictures were not found beside the file, nor in images/"])
+                self._note_missing(named - pictures, named)
         return ImportedCameras(objects, pictures, tuple(self._notes))
 
     def _note(self, notes: Iterable[str]) -> None:
         self._notes |= dict.fromkeys(notes)
+
+    def _note_missing(self, missing: int, named: int) -> None:
+        if missing:
+            self._note([f"{missing} of {named} pictures were not found beside the file, nor in images/"])
 
     def _new(self, name: str) -> bpy.types.Object:
         data = bpy.data.cameras.new(name)
@@ -131,9 +142,8 @@ class _CameraImport:
 
     # --- A flight
 
-    def _fly(self, block: bpy.types.Object, cameras: Sequence[Camera]) -> None:
+    def _fly(self, block: bpy.types.Object, cameras: Sequence[Camera], at: Sequence[float]) -> None:
         scene, frame = self._scene, datablocks.frame_of(self._scene)
-        cameras, at = self._timed(cameras)
         if len({camera.pinhole.mirrored for camera in cameras}) > 1:
             raise InputError(
                 "some of the cameras are mirrored and some are not, which no flight can be: import them one by one"
@@ -190,6 +200,40 @@ class _CameraImport:
             image = self._undistorted(camera, image)
         if image is None:
             return False
+        self._put_behind(block, camera, image)
+        return True
+
+    def _show_sequence(self, block: bpy.types.Object, cameras: Sequence[Camera], at: Sequence[float], folder: Path) -> int:
+        """Give a camera that flies all pictures as one background; returns how many these are."""
+        named = [camera for camera in cameras if camera.image is not None]
+        if any(camera.lens is not None for camera in named):
+            self._note(["A flight does not show pictures with a lens: import what viewcam camera --undistort writes of them"])
+            return 0
+        paths = [path for camera in named if (path := picture_of(camera, folder)) is not None]
+        self._note_missing(len(named) - len(paths), len(named))
+        if len(paths) < len(cameras):
+            return 0
+        numbered = [match for path in paths if (match := _NUMBERED.fullmatch(str(path)))]
+        alike = {(match["before"], len(match["number"]), match["after"]) for match in numbered}
+        numbers = [int(match["number"]) for match in numbered]
+        frames = [round(frame, 3) for frame in at]  # of times, which are rounded
+        ahead = {number - frame for number, frame in zip(numbers, frames, strict=False)}
+        if len(numbered) < len(paths) or len(alike) > 1 or len(ahead) > 1 or frames[0] % 1:
+            self._note(
+                ["The numbers of the pictures do not go with the frames, so that they are not shown: import a camera each"]
+            )
+            return 0
+        try:
+            image = bpy.data.images.load(str(paths[0]))
+        except RuntimeError:  # no picture by its content
+            return 0
+        self._overrides.afterwards(bpy.data.batch_remove, [image])
+        image.source = "SEQUENCE"
+        user = self._put_behind(block, cameras[0], image).image_user
+        user.frame_start, user.frame_offset, user.frame_duration = int(frames[0]), numbers[0] - 1, numbers[-1] - numbers[0] + 1
+        return len(paths)
+
+    def _put_behind(self, block: bpy.types.Object, camera: Camera, image: bpy.types.Image) -> bpy.types.CameraBackgroundImage:
         background = block.data.background_images.new()
         background.image = image
         # As wide as the view, as the camera is (picture.py); what is higher is cut off in the middle.
@@ -199,7 +243,7 @@ class _CameraImport:
         is_higher = camera.pinhole.height / aspect * width * pixel > height * camera.pinhole.width
         background.frame_method = "CROP" if is_higher else "FIT"
         block.data.show_background_images = True
-        return True
+        return background
 
     def _undistorted(self, camera: Camera, photograph: bpy.types.Image) -> bpy.types.Image | None:
         """A copy of the photograph as the pinhole sees it; None where it is of another size than its camera."""
