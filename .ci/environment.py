@@ -61,9 +61,14 @@ def debian_packages(sonames: list[str]) -> list[str]:
     return packages
 
 
+def may_install() -> bool:
+    """Return True where Debian's package manager may be used without a password."""
+    return sys.platform == "linux" and os.geteuid() == 0 and shutil.which("apt-get") is not None
+
+
 def update_lists() -> None:
     """Let Debian's package manager know today's packages, where this user may."""
-    if os.geteuid() == 0 and shutil.which("apt-get"):
+    if may_install():
         subprocess.run(["apt-get", "update", "--quiet=2"], check=True)
 
 
@@ -81,15 +86,19 @@ def install_packages(packages: list[str]) -> None:
 
 def main(folder: Path, requirements: list[str]) -> None:
     """Make the environment, or bring the one that is there up to date."""
-    if not importlib.util.find_spec("ensurepip"):
+    packages = [] if importlib.util.find_spec("ensurepip") else [f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"]
+    if not CORE.exists() and not any(map(shutil.which, filter(None, COMPILERS))):
+        if may_install():  # half of ziglang's time, which compiles its C++ library, too
+            packages.append("g++")
+        else:
+            print("Compiling the tracer's core by ziglang, as there is no C++ compiler: a minute or two", flush=True)
+    if packages:
         update_lists()
-        install_packages([f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"])
+        install_packages(packages)
     if not (folder / "bin" / "pip").exists():
         print(f"Making the Python {sys.version.split()[0]} environment {folder}", flush=True)
         subprocess.run([sys.executable, "-m", "venv", "--clear", folder], check=True)
     pip = [folder / "bin" / "python", "-m", "pip", "--disable-pip-version-check"]
-    if not CORE.exists() and not any(map(shutil.which, filter(None, COMPILERS))):
-        print("Compiling the tracer's core by ziglang, as there is no C++ compiler: a minute or two", flush=True)
     # Python compiles what it imports, which is a small part of what all these bring along: half a minute an environment.
     subprocess.run([*pip, "install", "--quiet", "--no-compile", *requirements], check=True)
     site = next(folder.glob("lib/python3.*")) / "site-packages"
