@@ -60,7 +60,7 @@ test-fresh:
 
 # What is slow and needs Blender, the oldest and the newest run: test-matrix and test-blender.
 test-exhaustive: .venv/test
-	$(call PARALLEL,.venv) --numprocesses=3 -m "exhaustive or (slow and not blender)"
+	$(call PARALLEL,.venv) --numprocesses=4 -m "exhaustive or (slow and not blender)"
 
 # GCC's sanitizers, which come with it: preloaded, since Python itself is compiled without them.
 sanitizers-address = address,undefined
@@ -131,6 +131,7 @@ tests-4.5 = tests/blender $(foreach each,interface jobs light,--ignore=tests/ble
 without-4.5 = $(empty) and not slow
 tests-5.0 = $(TOUCHING_BLENDER)
 SLOW_LIGHT := $(shell grep -lE '^pytestmark = .*slow' tests/blender/light/*.py) tests/blender/test_light_by_light.py
+without-4.2 = $(without-5.2)
 tests-4.2 = $(TOUCHING_BLENDER) $(QUICK) $(SLOW_LIGHT:%=--ignore=%)
 without-5.2 = $(empty) and (blender or not slow)
 tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender tests/test_leftovers.py tests/comparison/test_sabotage_on_cycles.py,$(TOUCHING_BLENDER)) $(QUICK) tests/jobs

@@ -92,7 +92,7 @@ def test_the_roll_is_stored_within_4e_7_radians(camera_object, scene, mode, kind
 @pytest.mark.parametrize("mode", MODES)
 def test_the_roll_is_stored_within_4e_7_radians_in_thousands_of_poses(camera_object, scene, mode, kind):
     camera_object.rotation_mode = mode
-    check(camera_object, scene, kind(np.random.default_rng(2), 1500))
+    check(camera_object, scene, kind(np.random.default_rng(2), 500))
 
 
 @pytest.mark.parametrize("exponent", range(-17, 0))

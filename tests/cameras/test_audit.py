@@ -144,8 +144,8 @@ def test_of_a_hundred_datasets_with_a_mistake_99_are_named(kind):
 
 
 @pytest.mark.exhaustive
-@pytest.mark.parametrize("first", range(1000, 3000, 500))
-def test_500_right_datasets_four_times_raise_no_alarm(first):
+@pytest.mark.parametrize("first", range(1000, 2000, 500))
+def test_500_right_datasets_twice_raise_no_alarm(first):
     assert Counter(map(alarm, range(first, first + 500))) == {"none": 500}
 
 

@@ -14,6 +14,8 @@ from .test_distortion import COLMAP, of_colmap
 cv2 = pytest.importorskip("cv2")
 pycolmap = pytest.importorskip("pycolmap")
 
+pytestmark = pytest.mark.slow
+
 WIDTH, HEIGHT = 640, 360
 BENT = [model for model in COLMAP if model not in ("THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE")]
 

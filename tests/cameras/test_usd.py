@@ -16,6 +16,8 @@ from .conftest import CAMERAS
 
 pytest.importorskip("pxr")
 
+pytestmark = pytest.mark.slow
+
 GIVEN = Options(size=(640, 360))
 SECONDS = 80 if sys.platform == "win32" else 20
 """The time that a busy machine may take to answer, on Windows after 20 s of any kind; a stage without bounds takes minutes.

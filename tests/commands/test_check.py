@@ -113,7 +113,7 @@ def test_a_picture_that_differs_fails_its_case_and_the_command(tmp_path, monkeyp
 def test_a_search_for_a_bias_ends_with_the_samples_that_it_takes_and_is_kept_as_any_check(tmp_path, capfd):
     words = ("--frames", "1..1", "--size", "32x18", "--threads", "1", "--level", "path", "--find", "5%")
     out, result = tmp_path / "out", tmp_path / "a.json"
-    assert check(FLIGHT, *words, "--report", out, "--json", result) == 0
+    assert check(CORNELL, *words, "--report", out, "--json", result) == 0
     assert "samples a pixel, about" in capfd.readouterr().err
     (sidecar,) = out.glob("frame_*.json")
     record = json.loads(sidecar.read_text(encoding="utf-8"))["check"]
@@ -122,8 +122,8 @@ def test_a_search_for_a_bias_ends_with_the_samples_that_it_takes_and_is_kept_as_
     assert record["figures"]["samples"] == {"reference": searched["samples"], "test": searched["samples"]}
     page = sidecar.with_suffix(".html").read_text(encoding="utf-8")
     assert f"The samples came in {searched['rounds']} rounds" in page and "for one that is off by 5 %" in page
-    assert searched["samples"] == 64 and searched["rounds"] == 2 and "in 99 of 100 cases" in record["verdict"]
-    assert check(FLIGHT, *words, "--report", out, "--resume") == 0
+    assert searched["samples"] == 256 and searched["rounds"] == 3 and "in 99 of 100 cases" in record["verdict"]
+    assert check(CORNELL, *words, "--report", out, "--resume") == 0
     assert "1 of them kept" in capfd.readouterr().out
 
 
@@ -143,7 +143,7 @@ def test_a_search_for_a_bias_ends_with_the_first_round_of_a_wrong_picture(tmp_pa
 
     monkeypatch.setattr(stage.cycles, "render", turned)
     words = ("--size", "32x18", "--threads", "1", "--level", "path", "--find", "0.5%", "--seed", str(2**31 - 4))
-    assert check(FLIGHT, *words, "--json", result, "--report", tmp_path / "out") == 1
+    assert check(CORNELL, *words, "--json", result, "--report", tmp_path / "out") == 1
     searched = json.loads(result.read_text(encoding="utf-8"))["find"]
     assert (searched["samples"], searched["rounds"]) == (16, 1) and searched["seconds"] > 0
     assert len(set(seeds)) == 8

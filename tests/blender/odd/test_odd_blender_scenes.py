@@ -11,6 +11,8 @@ from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def collected(posed_camera, scene):

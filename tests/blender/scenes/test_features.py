@@ -17,6 +17,8 @@ from viewcam_addon.image import Image
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def monkey(scene, camera_object):
