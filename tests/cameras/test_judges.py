@@ -90,7 +90,7 @@ def test_cameras_of_rigs_are_where_pycolmap_has_them(tmp_path, binary):
 
 @pytest.mark.parametrize("binary", [False, True])
 def test_images_that_were_changed_beside_their_rigs_are_refused_and_read_without(tmp_path, binary):
-    """As by scripts that know cameras, images and points alone: COLMAP would not see the change, and all others would."""
+    """Scripts that know cameras, images and points alone do so: COLMAP would not see the change, and all others would."""
     suffix = "bin" if binary else "txt"
     model = with_rigs(tmp_path, binary)
     rigs = [tmp_path / f"{name}.{suffix}" for name in ("rigs", "frames")]
