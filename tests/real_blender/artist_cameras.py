@@ -2,7 +2,7 @@
 
 import bpy
 from artist_hands import FOLDER, choose_in_the_file_browser, picture, room, warnings
-from hands_in_a_window import NOWHERE, camera, click, press, region, values, window
+from hands_in_a_window import NOWHERE, SCALE, WAITING, camera, click, press, region, values, window
 from tour_hands import SIDEBAR, VIEWPORT, call, drag, find, look, push, settle, strike, until
 
 
@@ -173,10 +173,10 @@ def draw_on_light_and_dark():
         yield from picture(f"diagram_on_{name}", VIEWPORT)
     shading.background_type = "THEME"
     _, sidebar = region(*SIDEBAR)
-    yield from drag((sidebar.x + 1, sidebar.y + 300), (90, 0))
+    yield from drag((sidebar.x + 1, sidebar.y + 300 * SCALE), (90 * SCALE, 0))
     yield from picture("narrow", SIDEBAR)
     print(f"the sidebar is {region(*SIDEBAR)[1].width} pixels wide", flush=True)
-    yield from drag((region(*SIDEBAR)[1].x + 1, sidebar.y + 300), (-90, 0))
+    yield from drag((region(*SIDEBAR)[1].x + 1, sidebar.y + 300 * SCALE), (-90 * SCALE, 0))
 
 
 def render_two_formats():
@@ -192,7 +192,7 @@ def render_two_formats():
     yield
     yield from choose_in_the_file_browser(bpy.ops.viewcam.render_all_cameras, FOLDER)
     yield from until(lambda: render_all.background.running or render_all._sheet, "the rendering's start")
-    yield from until(lambda: render_all.background.running is None, "the pictures", 2000)
+    yield from until(lambda: render_all.background.running is None, "the pictures", 2000, WAITING)
     (folder,) = [each for each in FOLDER.iterdir() if "all cameras" in each.name]
     sheet = (folder / "contact-sheet.html").read_text(encoding="utf-8")
     assert {path.stem for path in folder.glob("*.exr")} == {"Camera", "Portrait"}

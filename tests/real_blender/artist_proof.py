@@ -4,7 +4,7 @@ import time
 
 import bpy
 from artist_hands import FOLDER, picture, room
-from hands_in_a_window import NOWHERE, camera, press, window
+from hands_in_a_window import NOWHERE, WAITING, camera, press, window
 from tour_hands import call, settle, until
 
 PATIENCE = 120  # seconds that one comparison may take on a busy machine
@@ -29,7 +29,7 @@ def prove_two_cameras_during_playback():
         yield from _play_and_press_escape(proof)
         ends = time.monotonic() + PATIENCE
         while proof.background.running and time.monotonic() < ends:
-            yield
+            yield WAITING
         outcome = proof.background.latest
         assert outcome and outcome.answer == "same" and outcome.camera == each.name, outcome
         assert outcome.headline.startswith("Identical to ") and outcome.headline.endswith(" px"), outcome.headline

@@ -46,6 +46,33 @@ class Host:
         environment = {**os.environ, "BLENDER_USER_RESOURCES": str(self.user_folder)}
         return subprocess.run([*self.command, *map(str, arguments)], env=environment, cwd=ROOT, capture_output=True, text=True)
 
+    def run_in_a_window(
+        self,
+        script: Path,
+        *arguments: str | Path,
+        size: tuple[int, int] = (1600, 1000),
+        scale: float = 1,
+        simulated: bool = True,
+    ) -> subprocess.CompletedProcess:
+        """Run a script (hands_in_a_window.py) in the real Blender's window on a virtual screen, and keep what it says.
+
+        size : of the window, pixels at scale 1. scale : of Blender's interface and of the window.
+        simulated : mouse and keys are the script's.
+        """
+        corner = ("-p", "0", "0", *(str(int(scale * pixels)) for pixels in size))
+        events = ["--enable-event-simulate"] if simulated else []
+        return subprocess.run(
+            [
+                *(ROOT / ".ci" / "blender-window", "--factory-startup", "--addons", "bl_ext.user_default.virtual_pinhole"),
+                *(*events, *corner, "--python", script, "--", *arguments),
+            ],
+            env={**os.environ, "BLENDER_USER_RESOURCES": str(self.user_folder), "VIEWCAM_UI_SCALE": str(scale)},
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=1200,  # many times what it takes, on a busy machine too
+        )
+
     def run_inside(self, *arguments: str | Path) -> str:
         """Run inside_blender.py with these arguments; what it printed. Fails the test if that fails."""
         if self.is_real:

@@ -5,13 +5,18 @@ A timer takes one step at a time, so that Blender handles the events and draws i
 
 import os
 import sys
+import time
 import traceback
 
 import bpy
 import numpy as np
 
 KEYS = {"-": "MINUS", "0": "ZERO", "1": "ONE", "3": "THREE", "5": "FIVE", "7": "SEVEN", ".": "PERIOD"}
-NOWHERE = (600, 500)  # a place in the 3D viewport
+# Of the interface and of all places here: a window of half the width and height is drawn in software in a third of the time.
+SCALE = float(os.environ.get("VIEWCAM_UI_SCALE", "1"))
+NOWHERE = (int(600 * SCALE), int(500 * SCALE))  # a place in the 3D viewport
+# A step that yields these seconds leaves the processors to what it waits for: where events are simulated, Blender never sleeps.
+WAITING = 0.1
 ROW = 9  # pixels between two looks for a button, less than half its height
 
 
@@ -107,7 +112,7 @@ def strike(text):
 
 def take_a_step(running, interval):
     try:
-        next(running)
+        time.sleep(next(running) or 0)
     except StopIteration:
         os._exit(0)
     except BaseException:
@@ -122,6 +127,7 @@ def start(steps, interval=0.01):
 
     interval : seconds for Blender to handle what has happened, and to draw.
     """
+    bpy.context.preferences.view.ui_scale = SCALE
     bpy.context.preferences.view.show_splash = False
     running = steps()
     bpy.app.timers.register(lambda: take_a_step(running, interval), first_interval=1.0, persistent=True)

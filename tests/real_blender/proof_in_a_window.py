@@ -19,7 +19,7 @@ from pathlib import Path
 import bpy
 
 sys.path.append(str(Path(__file__).parent))
-from hands_in_a_window import NOWHERE, click, move, press, region, start, unfold, window
+from hands_in_a_window import NOWHERE, WAITING, click, move, press, region, start, unfold, window
 from tour_hands import SIDEBAR, look, photograph
 
 FILE, FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
@@ -121,7 +121,7 @@ def compare_to_the_verdict():
             yield
             picture("running.png")
         steps.add(words)
-        yield
+        yield WAITING
     outcome = proof.background.latest
     assert outcome and outcome.answer == "same", outcome or "no verdict"
     print(f"verdict after {time.monotonic() - started:.1f} s: {outcome.verdict}", flush=True)
@@ -252,7 +252,7 @@ def write_the_labels():
     yield from push("viewcam.write_labels")
     ends = time.monotonic() + PATIENCE
     while labels.background.latest is None and time.monotonic() < ends:
-        yield
+        yield WAITING
     folder, sentence = labels.background.latest or (None, "nothing came of it")
     assert folder and folder.parent == FOLDER and sentence == f"Written to {folder}", sentence
     missing = {*labels.file_names(bpy.context.scene.camera, settings.chosen())} - {path.name for path in folder.iterdir()}

@@ -1,9 +1,7 @@
 """The render engine in a real Blender: from the shell the pixels of `viewcam render`, and F12 and Escape in a window."""
 
 import json
-import os
 import statistics
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -62,18 +60,7 @@ def test_what_can_not_be_rendered_is_status_1_and_a_sentence_and_no_file(real_bl
 
 
 def in_a_window(real_blender, *arguments, simulated):
-    events = ["--enable-event-simulate"] if simulated else []
-    outcome = subprocess.run(
-        [
-            *(ROOT / ".ci" / "blender-window", "--factory-startup", "--addons", "bl_ext.user_default.virtual_pinhole"),
-            *(*events, "-p", "0", "0", "1600", "1000", "--python", SCRIPT, "--", *arguments),
-        ],
-        env={**os.environ, "BLENDER_USER_RESOURCES": str(real_blender.user_folder)},
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=180,
-    )
+    outcome = real_blender.run_in_a_window(SCRIPT, *arguments, simulated=simulated)
     output = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0 and "Traceback" not in output, output
 

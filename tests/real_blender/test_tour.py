@@ -9,22 +9,9 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 SCRIPT = Path(__file__).with_name("tour_in_a_window.py")
 # A virtual screen on a busy machine may lose a click: one loss is no finding, two at different times are.
 ATTEMPTS = 2
+TALL = (1600, 2000)
 MOVING_SCRIPT = Path(__file__).with_name("moving_picture.py")
 PHOTO, PICTURES_SCRIPT = (Path(__file__).with_name(name) for name in ("photo_of_a_room.py", "pictures_in_a_window.py"))
-
-
-def run_in_a_window(real_blender, script, height, *folder):
-    return subprocess.run(
-        [
-            *(ROOT / ".ci" / "blender-window", "--factory-startup", "--addons", "bl_ext.user_default.virtual_pinhole"),
-            *("--enable-event-simulate", "-p", "0", "0", "1600", str(height), "--python", script, "--", *folder),
-        ],
-        env={**os.environ, "BLENDER_USER_RESOURCES": str(real_blender.user_folder)},
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=1200,  # many times what it takes, on a busy machine too
-    )
 
 
 def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_blender, tmp_path):
@@ -33,7 +20,7 @@ def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_b
         take_the_pictures(real_blender, tmp_path, ROOT / folder)
         return
     for _ in range(ATTEMPTS):
-        outcome = run_in_a_window(real_blender, SCRIPT, 2000)
+        outcome = real_blender.run_in_a_window(SCRIPT, size=TALL, scale=0.5)
         if outcome.returncode == 0:
             break
     assert_it_went_through(outcome)
@@ -48,17 +35,17 @@ def assert_it_went_through(outcome):
 def take_the_pictures(real_blender, scratch, folder):
     """The tour's, the README's moving one, and those of docs/artists.md that no step of the tour takes."""
     images = folder.parent
-    assert_it_went_through(run_in_a_window(real_blender, SCRIPT, 2000, folder))
+    assert_it_went_through(real_blender.run_in_a_window(SCRIPT, folder, size=TALL))
     make_the_moving_picture(real_blender, scratch / "frames", images / "moving.webp")
     photo = scratch / "photo.png"
     subprocess.run([sys.executable, PHOTO, photo], check=True)
-    assert_it_went_through(run_in_a_window(real_blender, PICTURES_SCRIPT, 1000, images, photo))
+    assert_it_went_through(real_blender.run_in_a_window(PICTURES_SCRIPT, images, photo))
 
 
 def make_the_moving_picture(real_blender, frames, target):
     from PIL import Image
 
     frames.mkdir()
-    assert_it_went_through(run_in_a_window(real_blender, MOVING_SCRIPT, 1000, frames))
+    assert_it_went_through(real_blender.run_in_a_window(MOVING_SCRIPT, frames))
     first, *rest = [Image.open(path).convert("RGB") for path in sorted(frames.glob("frame-*.png"))]
     first.save(target, save_all=True, append_images=rest, duration=90, loop=0, quality=48)

@@ -4,7 +4,6 @@ import contextlib
 import json
 import math
 import os
-import subprocess
 from pathlib import Path
 
 from viewcam_addon import cameras
@@ -24,23 +23,9 @@ PNG = bytes.fromhex(
 ATTEMPTS = 2
 
 
-def run_in_a_window(real_blender, script, *arguments, size=("1600", "1000")):
-    return subprocess.run(
-        [
-            *(ROOT / ".ci" / "blender-window", "--factory-startup", "--addons", "bl_ext.user_default.virtual_pinhole"),
-            *("--enable-event-simulate", "-p", "0", "0", *size, "--python", script, "--", *arguments),
-        ],
-        env={**os.environ, "BLENDER_USER_RESOURCES": str(real_blender.user_folder)},
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=1200,
-    )
-
-
 def test_handles_drag_eye_look_at_and_up_and_the_diagram_is_drawn_where_it_belongs(real_blender):
     for _ in range(ATTEMPTS):
-        outcome = run_in_a_window(real_blender, HANDLES_SCRIPT, size=("1000", "700"))
+        outcome = real_blender.run_in_a_window(HANDLES_SCRIPT, size=(1000, 700))
         if outcome.returncode == 0:
             break
     output = outcome.stdout + outcome.stderr
@@ -54,7 +39,7 @@ def test_what_an_artist_tries_on_the_first_day_goes_as_with_blenders_own_cameras
     for attempt in range(ATTEMPTS):
         (tmp_path / str(attempt)).mkdir()
         script = Path(__file__).with_name("artist_in_a_window.py")
-        outcome = run_in_a_window(real_blender, script, tmp_path / str(attempt), *folder)
+        outcome = real_blender.run_in_a_window(script, tmp_path / str(attempt), *folder, scale=1 if folder else 0.5)
         if outcome.returncode == 0:
             break
     output = outcome.stdout + outcome.stderr
@@ -77,7 +62,7 @@ def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_
     folder = [each for each in [os.environ.get("VIEWCAM_PICTURES")] if each]
     script = Path(__file__).with_name("cameras_in_a_window.py")
     for _ in range(ATTEMPTS):
-        outcome = run_in_a_window(real_blender, script, tmp_path, *folder)
+        outcome = real_blender.run_in_a_window(script, tmp_path, *folder)
         if outcome.returncode == 0:
             break
     output = outcome.stdout + outcome.stderr
@@ -86,7 +71,7 @@ def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_
 
 
 def test_rounds_of_enabling_and_disabling_leave_nothing_behind_in_a_window(real_blender):
-    outcome = run_in_a_window(real_blender, ROOT / "tests" / "real_blender" / "leftovers_in_a_window.py", size=("1000", "700"))
+    outcome = real_blender.run_in_a_window(ROOT / "tests" / "real_blender" / "leftovers_in_a_window.py", size=(1000, 700))
     output = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0 and "done: leave_nothing_behind" in output, output
     assert "Traceback" not in output, output
@@ -96,7 +81,7 @@ def test_compare_with_cycles_comes_to_a_verdict_and_ends_in_every_other_way_with
     """With the extension as it is installed, wheels and all; the last one is on its way when Blender is quit."""
     real_blender.run_inside("make", tmp_path / "scene.blend")
     for _ in range(ATTEMPTS):
-        outcome = run_in_a_window(real_blender, PROOF_SCRIPT, tmp_path / "scene.blend", tmp_path)
+        outcome = real_blender.run_in_a_window(PROOF_SCRIPT, tmp_path / "scene.blend", tmp_path)
         if outcome.returncode == 0:
             break
     output = outcome.stdout + outcome.stderr

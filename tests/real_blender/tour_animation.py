@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from hands_in_a_window import NOWHERE, press, window
+from hands_in_a_window import NOWHERE, WAITING, press, window
 from tour_hands import call, key_over, push, type_into
 from tour_step import Step, camera, is_at_its_values, room, values
 
@@ -91,7 +91,7 @@ class Render(Step):
             assert bpy.ops.render.render("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
         yield
         while bpy.app.is_job_running("RENDER"):
-            yield
+            yield WAITING
         for _ in range(8):
             yield
 

@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 import bpy
-from hands_in_a_window import move, press, region, window
+from hands_in_a_window import WAITING, move, press, region, window
 from tour_hands import call, push, unfold
 from tour_step import UPPER_PART, Step, camera, is_at_its_values, room, values
 
@@ -35,7 +35,7 @@ class CompareWithCycles(Step):
             if room("interface.proof").background.running:
                 break
         while room("interface.proof").background.running:
-            yield
+            yield WAITING
         for _ in range(6):
             yield
         yield from push("viewcam.show_difference(")

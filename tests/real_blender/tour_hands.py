@@ -12,15 +12,15 @@ import bpy
 import tour_step
 from bpy_extras.object_utils import world_to_camera_view
 from bpy_extras.view3d_utils import location_3d_to_region_2d
-from hands_in_a_window import NOWHERE, click, move, open_the_panels, press, region, window
+from hands_in_a_window import NOWHERE, SCALE, click, move, open_the_panels, press, region, window
 from mathutils import Euler, Vector
 
 SIDEBAR, PROPERTIES, VIEWPORT = ("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW"), ("VIEW_3D", "WINDOW")
 SCREEN_HEIGHT = 2000
-_HEADER = 60  # pixels from the panel's top within which its checkbox stands
+_HEADER = int(60 * SCALE)  # pixels from the panel's top within which its checkbox stands
 _PATIENCE = 4  # looks
 _STEPS = 200  # that something may take to happen
-_ROW = 18  # pixels between two looks, less than a button's height
+_ROW = int(18 * SCALE)  # pixels between two looks, less than a button's height
 _NOTHING = 25  # rows without a button, more than a panel's texts and closed sub-panels are, below which there is none
 # Where in a row its buttons are looked for, as shares of the panel's width; of operators there are many in a row.
 LEFT, _MIDDLE, _CHECKBOX, _OPERATORS = 0.2, 0.5, 0.13, (0.31, 0.38, 0.46, 0.53, 0.6, 0.72, 0.85)
@@ -301,12 +301,12 @@ def call(operator, where=VIEWPORT, **properties):
         return operator("INVOKE_DEFAULT", True, **properties)  # with its undo step
 
 
-def until(is_so, what, steps=_STEPS):
-    """Steps until something has happened: none is counted on to take a time."""
+def until(is_so, what, steps=_STEPS, seconds=0):
+    """Steps until something has happened: none is counted on to take a time. seconds : of each, where it does take some."""
     for _ in range(steps):
         if is_so():
             return
-        yield
+        yield seconds
     raise AssertionError(f"{what} does not happen")
 
 
