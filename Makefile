@@ -131,9 +131,9 @@ tests-4.5 = tests/blender $(foreach each,interface jobs light,--ignore=tests/ble
 without-4.5 = $(empty) and not slow
 tests-5.0 = $(TOUCHING_BLENDER)
 SLOW_LIGHT := $(shell grep -lE '^pytestmark = .*slow' tests/blender/light/*.py) tests/blender/test_light_by_light.py
-without-4.2 = $(without-5.2)
+without-4.2 = $(empty) and (blender or not slow)
 tests-4.2 = $(TOUCHING_BLENDER) $(QUICK) $(SLOW_LIGHT:%=--ignore=%)
-without-5.2 = $(empty) and (blender or not slow)
+without-5.2 = $(without-4.2)
 tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender tests/test_leftovers.py tests/comparison/test_sabotage_on_cycles.py,$(TOUCHING_BLENDER)) $(QUICK) tests/jobs
 
 # Few examples of each property: make test has the many, and what a version changes, it changes for most of them. What is slow
@@ -145,8 +145,8 @@ test-light: $(MATRIX:%=test-light-%)
 
 # The oldest and the newest share the scenes out, the newest having those that take long; of the versions between them one or two
 # tell whether Cycles shades otherwise.
-light-4.2 = -k "not (interior or street or foliage or toys or dressed_studio or wide or flight or spheres or bunny)"
-light-5.2 = -k "not (roadster or fairground or gallery or glassware or backdrop or portrait or straight_down or spot or teapot)"
+light-4.2 = -k "not (interior or street or foliage or toys or studio or metals or wide or flight or spheres or bunny)"
+light-5.2 = -k "not (cornell or roadster or fairground or gallery or glassware or backdrop or portrait or straight_down or spot or teapot)"
 light-4.5 = -k "cornell or perfume"
 
 test-light-%: .venvs/%/ready
