@@ -37,7 +37,7 @@ struct Material {
     bool is_bumped() const { return bumped_; }
     // Whether the BSDFs of four points can be made at once, and whether the points' own values are needed for that.
     bool is_wide() const { return wide_ && scatters() && !emits() && !transparent_ && !VIEWCAM_ISA::is_bumped(normal); }
-    bool varies() const { return bumped_ || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.varies; }); }
+    bool varies() const { return varies_; }
     // Whether it asks for the tangents of a UV map.
     bool needs_tangents() const {
         return normal_on_tangents || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.on_tangents; });
@@ -66,6 +66,7 @@ struct Material {
                     }
                 },
                 one.closure);
+        varies_ = bumped_ || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.varies; });
     }
 
     template <class At> BSDFAt<At> bsdf(const At& at) const {
@@ -111,7 +112,7 @@ struct Material {
 
     uint32_t kinds_ = 0, rough_kinds_ = 0;
     Vec3 mean_emission_;
-    bool shines_evenly_ = true, transparent_ = false, bumped_ = false, wide_ = true;
+    bool shines_evenly_ = true, transparent_ = false, bumped_ = false, varies_ = false, wide_ = true;
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

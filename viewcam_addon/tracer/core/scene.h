@@ -335,13 +335,11 @@ class Scene {
         if (triangles.bvh.root == NOTHING || !count) return;
         auto& [all, some] = of_this_thread<std::array<Packet, 2>>();
         enter(triangles.bvh, rays, nearest, count, all);
-        auto trace = [&](Packet& packet) {
-            packet.close();
-            triangles.intersect<ANY>(packet);
-            for (int i = 0; i < packet.count; i++) nearest.t[packet.source[i]] = packet.t[i], nearest.name[packet.source[i]] = packet.name[i];
-        };
         if (std::all_of(all.key, all.key + count, [&](int key) { return key == all.key[0]; })) {
-            if (all.key[0] >= 0) trace(all);
+            if (all.key[0] < 0) return;
+            all.close();
+            triangles.intersect<ANY>(all);
+            for (int i = 0; i < count; i += 4) store(nearest.t + i, load<double4>(all.t + i)), store(nearest.name + i, load<ulong4>(all.name + i));
             return;
         }
         for (int i = 0; i < count; i++) {
@@ -354,7 +352,9 @@ class Scene {
                     all.key[j] = -1;
                 }
             if (some.count >= FEW) {
-                trace(some);
+                some.close();
+                triangles.intersect<ANY>(some);
+                for (int j = 0; j < some.count; j++) nearest.t[some.source[j]] = some.t[j], nearest.name[some.source[j]] = some.name[j];
                 continue;
             }
             for (int j = 0; j < some.count; j++) {

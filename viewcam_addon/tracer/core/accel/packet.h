@@ -127,7 +127,7 @@ inline void enter(const Bvh& bvh, const Rays& rays, const Hits& nearest, int cou
         double4 start = t_min * per, end = load<double4>(packet.t + i) * per, far = splat4(0.0);
         for (int axis = 0; axis < 3; axis++) {
             unit[axis] = d[axis] * inverse;
-            reciprocal[axis] = copysign(min(abs(longest * reciprocal[axis]), splat4(1e200)), unit[axis]);
+            reciprocal[axis] = with_sign(min(abs(longest * reciprocal[axis]), splat4(1e200)), unit[axis]);
             from[axis] = (origin[axis] - splat4(bvh.center[axis])) * splat4(bvh.scale);
             double4 edge = splat4(bvh.half[axis] * (1 + 1e-9) + 1e-300) + splat4(4e-16) * abs(from[axis]);
             double4 one = (-edge - from[axis]) * reciprocal[axis], other = (edge - from[axis]) * reciprocal[axis];
@@ -141,8 +141,8 @@ inline void enter(const Bvh& bvh, const Rays& rays, const Hits& nearest, int cou
         DominantAxis dominant({size[0], size[1], size[2]});
         long4 key = ~dominant.x & ((dominant.y & splat4(int64_t(1) << 3)) | (~dominant.y & splat4(int64_t(2) << 3)));
         for (int axis = 0; axis < 3; axis++) {
-            double4 entry = from[axis] + start * unit[axis], forward = copysign(error, unit[axis]);
-            double4 bounded = copysign(min(abs(reciprocal[axis]), splat4(1e12)), reciprocal[axis]);
+            double4 entry = from[axis] + start * unit[axis], forward = with_sign(error, unit[axis]);
+            double4 bounded = with_sign(min(abs(reciprocal[axis]), splat4(1e12)), reciprocal[axis]);
             store(packet.near_origin[axis] + i, __builtin_convertvector(entry + forward, float4));
             store(packet.far_origin[axis] + i, __builtin_convertvector(entry - forward, float4));
             store(packet.near_reciprocal[axis] + i, __builtin_convertvector(bounded * splat4(1.0 - 6 * FLOAT_ROUNDING), float4));
@@ -150,7 +150,7 @@ inline void enter(const Bvh& bvh, const Rays& rays, const Hits& nearest, int cou
             key |= ((long4)unit[axis] >> 63) & splat4(int64_t(1) << axis);
         }
         double4 along = dominant.of({d[0], d[1], d[2]}), next = dominant.of({d[1], d[2], d[0]}), after = dominant.of({d[2], d[0], d[1]});
-        double4 by_z = copysign(inverse, along);
+        double4 by_z = with_sign(inverse, along);
         store(packet.by_x + i, next * by_z);
         store(packet.by_y + i, after * by_z);
         store(packet.by_z + i, by_z);
@@ -169,9 +169,11 @@ template <bool ANY, class Visit> inline void traverse_packet(const Bvh& bvh, Pac
     // Of each group's rays together, and of all: near planes from the origin farthest along, by the reciprocal of least size; far
     // planes the other way. Where there is no group, those of the last one, with an end before the start.
     BoxRays<8> each, all;
+    int from[8];
+    for (int g = 0; g < 8; g++) from[g] = 8 * std::min(g, groups - 1);
     auto reduce = [&](const float* values, bool most, float* of_each, float* of_all) {
         float8 group[8];
-        for (int g = 0; g < 8; g++) group[g] = load<float8>(values + 8 * std::min(g, groups - 1));
+        for (int g = 0; g < 8; g++) group[g] = load<float8>(values + from[g]);
         float8 found = most ? reduce_eight<true>(group) : reduce_eight<false>(group);
         store(of_each, found);
         store(of_all, splat8(most ? reduce_max(found) : reduce_min(found)));

@@ -6,7 +6,8 @@
 namespace viewcam::VIEWCAM_ISA {
 
 // albedo: as of OrenNayar.
-template <class At, class T> inline void add_diffuse(BSDFOf<T>& bsdf, const At& at, Vec3Of<T> color, Vec3Of<T> normal, T roughness, Vec3Of<T> albedo) {
+template <class At, class T>
+[[gnu::always_inline]] inline void add_diffuse(BSDFOf<T>& bsdf, const At& at, const Vec3Of<T>& color, const Vec3Of<T>& normal, T roughness, const Vec3Of<T>& albedo) {
     constexpr double SMOOTH = 1e-5;
     Mask<T> smooth(roughness < SMOOTH);
     if (any(smooth)) bsdf.add(LambertOf<T>{select(smooth, color, Vec3Of<T>{}), normal});

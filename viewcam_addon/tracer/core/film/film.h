@@ -29,7 +29,7 @@ struct PathLight {
     double covered;
     uint8_t brought;  // categories that anything was added to, as bits: the others hold nothing yet
 
-    void clear() { covered = 0, brought = 0; }
+    void clear() { covered = 1, brought = 0; }  // nothing yet of a path that has not left the scene
     void add(Category category, double4 rgb) {
         of[category] = brought >> category & 1 ? of[category] + rgb : rgb;
         brought |= uint8_t(1 << category);
@@ -105,14 +105,14 @@ class Pixel {
 
     [[gnu::always_inline]] void add_few(const PathLight* samples, uint32_t count, const FilmSettings& film, uint32_t batch_size) {
         double4 shown[FEW] = {};
-        unsigned brought = 0;
-        for (uint32_t i = 0; i < count; i++) brought |= samples[i].brought;
+        unsigned brought = 0, by_all = ~0u;
+        for (uint32_t i = 0; i < count; i++) brought |= samples[i].brought, by_all &= samples[i].brought;
         while (brought) {
             int category = take_bit(brought);
             bool is_shown = category != COLOR && !(film.transparent && category == ENVIRONMENT);
             double4 total = totals_[category];
             for (uint32_t i = 0; i < count; i++) {
-                if (!(samples[i].brought >> category & 1)) continue;
+                if (!(by_all >> category & 1) && !(samples[i].brought >> category & 1)) continue;
                 total += samples[i].of[category];
                 if (is_shown) shown[i] += samples[i].of[category];
             }

@@ -49,7 +49,8 @@ class TileSampler {
     void trace(uint32_t row, uint32_t column, uint32_t samples, const LightPasses& passes, const volatile int* stop) {
         std::vector<Pixel>& kept = under_way_[size_t(row / TILE) * tiles(camera_.width) + column / TILE];
         Tile tile{row, column, std::min(TILE, camera_.height - row), std::min(TILE, camera_.width - column), std::exchange(kept, {})};
-        tile.pixels.resize(TILE * TILE);
+        auto& spare = of_this_thread<std::vector<Pixel>>();  // the memory of the tile before
+        if (tile.pixels.empty()) tile.pixels = std::move(spare), tile.pixels.assign(TILE * TILE, {});
         uint32_t taken = tile.pixels[0].count();
         if (samples <= taken) throw std::invalid_argument("a tile has that many samples already");
         if (error_ > 0 && samples_ > 1) {
@@ -60,8 +61,8 @@ class TileSampler {
             sample(tile, all(tile), taken, samples, batch, stop);
             if (stop && *stop) return;
             for (uint32_t place : all(tile)) tile.pixels[place].write(passes, pixel(tile, place), film_, batch, integrator_.is_random());
-            if (samples < samples_) kept = std::move(tile.pixels);
         }
+        (samples < samples_ ? kept : spare) = std::move(tile.pixels);
     }
 
    private:

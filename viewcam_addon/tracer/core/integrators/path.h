@@ -123,7 +123,6 @@ class PathIntegrator {
         Block& block = of_this_thread<Block>();
         block.samples = &samples, block.light = light;
         block.live = 0;
-        for (int i = 0; i < count; i++) light[i].clear();
         start(count, block);
         for (int depth = 1; block.live > 0 || block.wide; depth++) {
             scatter(depth, block);
@@ -155,14 +154,25 @@ class PathIntegrator {
         Ray ray;
         double pdf = INFINITE;
     };
-    // What a light brings to a path if nothing hides it.
-    struct Shadowed {
-        double4 light, other;  // other: of what is not diffuse where the eye sees it
-        int sample;
-        Category category;
-        bool traced, has_other;
-        RayKind shadow_rays;
-        RayState ray;  // where anything lets light through
+    // What a light brings to paths if nothing hides it.
+    struct Lit {
+        int count;
+        bool plain;  // whether each has a shadow ray, and such a one as most lights have
+        double4 light[MOST], other[MOST];  // other: of what is not diffuse where the eye sees it
+        uint64_t others;                   // a bit for each that has it
+        int sample[MOST];
+        Category category[MOST];
+        uint32_t shadow_rays[MOST];  // RayKind
+        RayState ray[MOST];          // where anything lets light through
+        Rays rays;
+
+        void clear() { count = 0, plain = true, others = 0; }
+        // The place of one more.
+        int add(double4 brought, int of_sample, Category to, uint32_t kind) {
+            light[count] = brought, sample[count] = of_sample, category[count] = to, shadow_rays[count] = kind;
+            plain &= kind == SHADOW;
+            return count++;
+        }
     };
     // Where a path has come to a wide material: on a triangle, of which nothing has been computed yet.
     struct WidePoint {
@@ -181,15 +191,14 @@ class PathIntegrator {
     struct Block {
         const CameraSamples* samples;
         PathLight *light, ignored;
-        int live = 0, lit[LightSampler::ASKED] = {};
+        int live = 0;
         Path paths[MOST], onwards[MOST];
         // Paths at wide materials by slot, which is the sample's number for rays from the eye; `wide`: a bit for each slot that has one.
         uint64_t wide = 0;
         Path wide_paths[MOST];
         WidePoint wide_points[MOST];
         Interaction tables[2][2 * MOST], *points = tables[0], *next_points = tables[1];  // those of wide materials behind the others
-        Shadowed shadowed[LightSampler::ASKED][MOST];  // by the light that was asked
-        Rays shadow_rays[LightSampler::ASKED];
+        Lit lit[LightSampler::ASKED];  // by the light that was asked
         Hits hits;
         // What the rays of some paths meet.
         Ray met_rays[MOST];
@@ -460,13 +469,16 @@ class PathIntegrator {
     // What the eye's rays come to, and the light that is of this alone.
     void start(int count, Block& block) const {
         int met = 0;
+        bool meets_lamps = lights_.meets_lamps(CAMERA);
+        PathLight* light = block.light;
         scene_.closest(block.samples->rays, count, CAMERA, block.hits);
+        for (int i = 0; i < count; i++) light[i].clear();
         for (int i = 0; i < count; i++) {
-            Hit& hit = block.met[met] = block.hits.hit(i);
-            block.light[i].covered = 1;
+            Hit hit = block.hits.hit(i);
             bool is_wide = hit && meets_wide(hit, block.wide_points[i]);
             block.wide |= uint64_t(is_wide) << i;
-            if (is_wide && !lights_.meets_lamps(CAMERA)) continue;
+            if (is_wide && !meets_lamps) continue;
+            block.met[met] = hit;
             Ray& ray = block.met_rays[met] = block.samples->rays.ray(i);
             Path& path = block.paths[met];  // the rest is known when it is scattered
             path.sample = i, path.from = met;
@@ -492,7 +504,7 @@ class PathIntegrator {
     // Adds what lights may bring to all points where paths are, and finds the rays on which they go on.
     void scatter(int depth, Block& block) const {
         int onwards = 0;
-        for (int& lit : block.lit) lit = 0;
+        for (Lit& lit : block.lit) lit.clear();
         for (int i = 0; i < block.live; i++) {
             const Path& path = block.paths[i];
             const Interaction& point = block.points[path.from];
@@ -593,7 +605,10 @@ class PathIntegrator {
         }
         if (depth == 1) {
             auto rays = [&](const double (&values)[3][PACKET]) {
-                auto of_slots = [&](const double* value) { return gather4([&](int i) { return value[four.slots[i]]; }); };
+                auto of_slots = [&](const double* value) {
+                    bool in_turn = four.slots[3] == four.slots[0] + 3;
+                    return in_turn ? load<double4>(value + four.slots[0]) : gather4([&](int i) { return value[four.slots[i]]; });
+                };
                 return Vec3x4{of_slots(values[0]), of_slots(values[1]), of_slots(values[2])};
             };
             origin = rays(block.samples->rays.origin), direction = rays(block.samples->rays.direction);
@@ -624,10 +639,11 @@ class PathIntegrator {
     }
     void scatter_wide(const WidePaths& four, BSDFOf<double4>& bsdf, int depth, int& onwards, Block& block) const {
         if (depth == 1) {
-            Vec3x4 color = bsdf.diffuse_color();
+            double4 colors[4];
+            rows(bsdf.diffuse_color(), colors);
             for (unsigned left = four.lanes; left;) {
                 int i = take_bit(left);
-                block.light[four.samples[i]].add(COLOR, lane(color, i));
+                block.light[four.samples[i]].add(COLOR, colors[i]);
             }
         }
         if (bsdf.is_black() || !lit_) return;
@@ -643,7 +659,7 @@ class PathIntegrator {
             return point;
         };
         // The lanes that have lobes of a kind; of these, where rays can bring anything, and those on which the path ends.
-        unsigned diffuse = bits(has(bsdf.kinds(), DIFFUSE)), glossy = bits(has(bsdf.kinds(), GLOSSY)), last_diffuse = 0, last_glossy = 0;
+        unsigned diffuse = lanes_with(bsdf.kinds(), DIFFUSE), glossy = lanes_with(bsdf.kinds(), GLOSSY), last_diffuse = 0, last_glossy = 0;
         for (int i = 0; i < 4; i++) {
             auto ends = [&](RayKind kind) { return unsigned(depth >= most_ || four.paths[i]->scattered[row(kind)] + 1 >= most_of_[kind]) << i; };
             last_diffuse |= ends(DIFFUSE), last_glossy |= ends(GLOSSY);
@@ -654,7 +670,7 @@ class PathIntegrator {
         LightSampler::Choices choices[LightSampler::ASKED];
         double4 brightest{}, sky = splat4(1.0), u{};
         Vec2x4 u_light;
-        if (unsigned lit = four.lanes & bits(has(bsdf.spread_kinds(), DIFFUSE | GLOSSY)); lit && lights_.count() > 0) {
+        if (unsigned lit = four.lanes & lanes_with(bsdf.spread_kinds(), DIFFUSE | GLOSSY); lit && lights_.count() > 0) {
             if (lights_.is_random()) u = number(SobolSampler::LIGHT), u_light = pair(SobolSampler::LIGHT_POINT);
             lights_.choose(point_of, lit, u, depth == 1, choices, brightest);
         }
@@ -674,8 +690,8 @@ class PathIntegrator {
 
         if (!(four.lanes & (diffuse | glossy))) return;
         BSDFSampleOf<double4> sampled = bsdf.sample(bsdf.needs_choice() ? number(SobolSampler::LOBE) : double4{}, [&] { return pair(SobolSampler::DIRECTION); });
-        unsigned is_diffuse = bits(sampled.is_diffuse), goes_diffuse = bits(has(sampled.kind, DIFFUSE));
-        unsigned going = four.lanes & ((goes_diffuse & diffuse) | (bits(has(sampled.kind, GLOSSY)) & glossy));
+        unsigned is_diffuse = bits(sampled.is_diffuse), goes_diffuse = lanes_with(sampled.kind, DIFFUSE);
+        unsigned going = four.lanes & ((goes_diffuse & diffuse) | (lanes_with(sampled.kind, GLOSSY) & glossy));
         going &= bits(long4(dot(sampled.direction, four.at.normal) > 0.0));
         Vec3x4 weight = min(four.weight * sampled.weight, MOST_WEIGHT), origin = four.at.ray_origin(sampled.direction);
         while (going) {
@@ -711,23 +727,12 @@ class PathIntegrator {
     template <class PointOf>
     void ask(const LightSampler::Choices& choice, int slot, const WidePaths& four, const BSDFOf<double4>& bsdf, const PointOf& point_of, const Vec2x4& u, int depth, Block& block) const {
         LightSampleOf<double4> sample = choice.sample_li(four.at, point_of, u);
-        uint4 kinds{};
-        long4 lossy{}, found_by_diffuse{}, found_by_glossy{};
-        unsigned traced = 0;
-        for (unsigned left = choice.lanes; left;) {
-            int i = take_bit(left);
-            const Light& light = *choice.light[i];
-            if (lights_.is_linked() && !lights_.reaches(light, point_of(i))) continue;
-            kinds[i] = ~light.hidden_from;
-            lossy[i] = -int64_t(light.multiple_importance);
-            found_by_diffuse[i] = -int64_t(light.is_found_by(DIFFUSE)), found_by_glossy[i] = -int64_t(light.is_found_by(GLOSSY));
-            traced |= unsigned(light.casts_shadow) << i;
-        }
+        uint4 kinds = choice.flags([](const Light& light) { return ~light.hidden_from; }), found_by = choice.flags([](const Light& light) { return light.found_by(); });
+        uint4 shadow_rays = choice.flags([](const Light& light) { return uint32_t(light.casts_shadow ? light.shadow_rays : NO_RAY); });
         // See the other one.
-        double4 zero{};
-        lossy &= ~long4(dot(four.at.normal, sample.direction) > zero);
+        long4 lossy = has(choice.flags([](const Light& light) { return uint32_t(light.multiple_importance); }), 1) & ~long4(dot(four.at.normal, sample.direction) > 0.0);
         auto weight = [&](RayKind kind, auto&& pdf) {
-            long4 shared = lossy | (kind == DIFFUSE ? found_by_diffuse : found_by_glossy);
+            long4 shared = lossy | has(found_by, kind);
             return any(shared) ? select(shared, power_heuristic(sample.pdf * choice.chance, pdf()), splat4(1.0)) : splat4(1.0);
         };
         ScatteredLightOf<double4> light = bsdf.eval(sample.direction, kinds, weight);
@@ -735,26 +740,22 @@ class PathIntegrator {
         light.diffuse = light.diffuse * sample.weight, light.other = light.other * sample.weight;
         long4 black = is_black(light.diffuse), has_other = ~is_black(light.other);
         unsigned lanes = choice.lanes & bits(~black | has_other), others = bits(has_other);
+        if (lights_.is_linked())
+            for (unsigned left = lanes; left;)
+                if (int i = take_bit(left); !lights_.reaches(*choice.light[i], point_of(i))) lanes &= ~(1u << i);
         if (!lanes) return;
-        light.diffuse = light.diffuse * four.weight / choice.chance;
-        double4 diffuse[4] = {light.diffuse.x, light.diffuse.y, light.diffuse.z, zero}, other[4] = {};
-        transpose(diffuse[0], diffuse[1], diffuse[2], diffuse[3]);
-        if (others) {
-            light.other = light.other * four.weight / choice.chance;
-            other[0] = light.other.x, other[1] = light.other.y, other[2] = light.other.z;
-            transpose(other[0], other[1], other[2], other[3]);
-        }
+        double4 diffuse[4], other[4];
+        rows(light.diffuse * four.weight / choice.chance, diffuse);
+        if (others) rows(light.other * four.weight / choice.chance, other);
         Vec3x4 origin = four.at.ray_origin(sample.direction);
-        double4 end = shadow_ray_end(four.at, origin, sample);
+        Lit& lit = block.lit[slot];
+        lit.rays.set(lit.count, lanes, origin, sample.direction, shadow_ray_end(four.at, origin, sample));
         while (lanes) {
-            int i = take_bit(lanes), place = block.lit[slot]++;
+            int i = take_bit(lanes);
             const Path& path = *four.paths[i];
-            Shadowed& shadowed = block.shadowed[slot][place];
-            shadowed.light = diffuse[i], shadowed.other = other[i], shadowed.has_other = others >> i & 1;
-            shadowed.sample = four.samples[i], shadowed.category = after(path.category, true, depth);
-            shadowed.traced = traced >> i & 1, shadowed.shadow_rays = choice.light[i]->shadow_rays;
-            if (transparent_) shadowed.ray = {SHADOW, false, false, depth, path.passed, path.scattered, 0, has_pixels_ ? four.footprint[i] : 0};
-            if (shadowed.traced) block.shadow_rays[slot].set(place, {lane(origin, i), lane(sample.direction, i), 0, end[i]});
+            int place = lit.add(diffuse[i], four.samples[i], after(path.category, true, depth), shadow_rays[i]);
+            if (others >> i & 1) lit.other[place] = other[i], lit.others |= uint64_t(1) << place;
+            if (transparent_) lit.ray[place] = {SHADOW, false, false, depth, path.passed, path.scattered, 0, has_pixels_ ? four.footprint[i] : 0};
         }
     }
 
@@ -778,22 +779,21 @@ class PathIntegrator {
         auto weight = [&](RayKind kind, auto&& pdf) {
             if (unseen & kind) return 1.0;
             bool is_lost = behind != (kind == TRANSMISSION);
-            return (is_lost && choice.light->multiple_importance) || choice.light->is_found_by(kind) ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1.0;
+            return (is_lost && choice.light->multiple_importance) || choice.light->found_by() & kind ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1.0;
         };
         ScatteredLight light = bsdf.eval(sample.direction, kinds, weight);
         if (depth > 1) light.diffuse += light.other, light.other = {};
         light.diffuse = light.diffuse * sample.weight, light.other = light.other * sample.weight;
         if (is_black(light.diffuse) && is_black(light.other)) return;
-        int place = block.lit[choice.slot]++;
         bool traced = choice.light->casts_shadow && !hidden_from_some;
         Vec3 diffuse = light.diffuse * path.weight / choice.chance, other = light.other * path.weight / choice.chance;
-        block.shadowed[choice.slot][place] = {double4{diffuse.x, diffuse.y, diffuse.z, 0}, double4{other.x, other.y, other.z, 0}, path.sample, after(path.category, true, depth),
-                                              traced, !is_black(light.other), choice.light->shadow_rays, {SHADOW, false, false, depth, path.passed, path.scattered}};
-        if (has_pixels_) block.shadowed[choice.slot][place].ray.width = at.footprint();
-        if (!traced) return;
+        Lit& lit = block.lit[choice.slot];
+        int place = lit.add(double4{diffuse.x, diffuse.y, diffuse.z, 0}, path.sample, after(path.category, true, depth), traced ? choice.light->shadow_rays : NO_RAY);
+        if (!is_black(light.other)) lit.other[place] = double4{other.x, other.y, other.z, 0}, lit.others |= uint64_t(1) << place;
+        lit.ray[place] = {SHADOW, false, false, depth, path.passed, path.scattered, 0, has_pixels_ ? at.footprint() : 0};
         Ray ray = shadow_ray(point, sample);
         if (end > 0) ray.t_max = max(min(ray.t_max, sample.distance - end), 0.0);
-        block.shadow_rays[choice.slot].set(place, ray);
+        lit.rays.set(place, ray);
     }
 
     // Leaves of kinds of rays those that see a light otherwise than shadow rays do. unseen: receives those of them that don't see it.
@@ -817,28 +817,24 @@ class PathIntegrator {
 
     // Sends the shadow rays, and adds the light that nothing hides.
     void gather(int depth, Block& block) const {
-        for (int slot = 0; slot < LightSampler::ASKED; slot++) {
-            int count = block.lit[slot];
+        for (Lit& lit : block.lit) {
             bool hidden[MOST];
-            Rays& rays = block.shadow_rays[slot];
-            const Shadowed* shadowed = block.shadowed[slot];
-            auto is_plain = [](const Shadowed& one) { return one.traced && one.shadow_rays == SHADOW; };
-            if (count > 0 && depth == 1 && std::all_of(shadowed, shadowed + count, is_plain)) {
-                rays.fill(count);
-                scene_.occluded(rays, count, hidden);
+            if (lit.count > 0 && depth == 1 && lit.plain) {
+                lit.rays.fill(lit.count);
+                scene_.occluded(lit.rays, lit.count, hidden);
             } else {
-                for (int i = 0; i < count; i++) hidden[i] = shadowed[i].traced && scene_.occluded(rays.ray(i), shadowed[i].shadow_rays);
+                for (int i = 0; i < lit.count; i++) hidden[i] = lit.shadow_rays[i] != NO_RAY && scene_.occluded(lit.rays.ray(i), RayKind(lit.shadow_rays[i]));
             }
-            for (int i = 0; i < count; i++) {
-                PathLight& light = block.light[shadowed[i].sample];
+            for (int i = 0; i < lit.count; i++) {
                 if (hidden[i] && !transparent_) continue;
                 double4 left = splat4(1.0);
                 if (hidden[i]) {
-                    Vec3 through = transmittance(rays.ray(i), shadowed[i].shadow_rays, shadowed[i].ray);
+                    Vec3 through = transmittance(lit.rays.ray(i), RayKind(lit.shadow_rays[i]), lit.ray[i]);
                     left = double4{through.x, through.y, through.z, 0};
                 }
-                light.add(shadowed[i].category, shadowed[i].light * left);
-                if (shadowed[i].has_other) light.add(OTHER, shadowed[i].other * left);
+                PathLight& light = block.light[lit.sample[i]];
+                light.add(lit.category[i], lit.light[i] * left);
+                if (lit.others >> i & 1) light.add(OTHER, lit.other[i] * left);
             }
         }
     }

@@ -16,7 +16,8 @@ class Light {
     // hidden_from: the kinds of rays that don't see it; what a light hides from, it does not light. receivers: a bit that objects have
     // which it lights, Object::lit_by. shadow_rays: the kind of those that are sent to it.
     Light(Kind kind, uint32_t hidden_from, bool casts_shadow, uint64_t receivers = EVERYTHING, RayKind shadow_rays = SHADOW)
-        : hidden_from(hidden_from), casts_shadow(casts_shadow), receivers(receivers), shadow_rays(shadow_rays), kind_(std::move(kind)) {}
+        : hidden_from(hidden_from), casts_shadow(casts_shadow), receivers(receivers), shadow_rays(shadow_rays), kind_(std::move(kind)),
+          sized_(std::visit([](const auto& light) { return light.is_sized(); }, kind_)) {}
 
     uint32_t hidden_from;
     bool casts_shadow;
@@ -108,13 +109,11 @@ class Light {
             },
             kind_);
     }
-    bool is_sized() const {
-        return std::visit([](const auto& light) { return light.is_sized(); }, kind_);
-    }
+    bool is_sized() const { return sized_; }
     const MeshLight* mesh() const { return std::get_if<MeshLight>(&kind_); }
     bool is_environment() const { return std::holds_alternative<EnvironmentLight>(kind_); }
-    // Whether rays of a kind that are scattered all over find it, too: diffuse ones see no lamps.
-    bool is_found_by(RayKind kind) const { return mesh() || is_environment() || (kind != DIFFUSE && is_sized() && multiple_importance); }
+    // The kinds of rays that are scattered all over and find it, too: diffuse ones see no lamps.
+    uint32_t found_by() const { return mesh() || is_environment() ? ~0u : is_sized() && multiple_importance ? ~uint32_t(DIFFUSE) : 0; }
 
     // Lets nodes change what a lamp gives, at each place of it and in each direction.
     void shine_by(const Color& emission, Vec3 middle, const Scene* scene) { emission_ = emission, middle_ = middle, scene_ = scene; }
@@ -135,6 +134,7 @@ class Light {
     }
 
     Kind kind_;
+    bool sized_;
     Color emission_;
     Vec3 middle_;
     const Scene* scene_ = nullptr;

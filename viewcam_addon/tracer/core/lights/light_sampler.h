@@ -31,26 +31,25 @@ class LightSampler {
         int slot = 0;
     };
 
-    // What some of four points choose.
+    // What some of four points choose; a lane that has no choice goes along with one that has.
     struct Choices {
         const Light* light[4];
         double4 chance, rest;
         unsigned lanes = 0;
 
+        bool is_one() const { return light[0] == light[1] && light[0] == light[2] && light[0] == light[3]; }
+        // of(light), flags, of each.
+        template <class Of> uint4 flags(const Of& of) const {
+            return is_one() ? splat4(uint32_t(of(*light[0]))) : uint4{of(*light[0]), of(*light[1]), of(*light[2]), of(*light[3])};
+        }
+
         // The samples of these lights. point_of(i): all that is known of a point.
         template <class PointOf> LightSampleOf<double4> sample_li(const SurfacePoint<double4>& from, const PointOf& point_of, const Vec2x4& u) const {
+            if (is_one()) return light[0]->sample_li(from, point_of, lanes, rest, u);
             LightSampleOf<double4> samples;
             for (unsigned left = lanes; left;) {
-                const Light* first = light[std::countr_zero(left)];
-                unsigned alike = 0;
-                for (unsigned some = left; some;)
-                    if (int i = take_bit(some); light[i] == first) alike |= 1u << i;
-                if (alike == lanes) return first->sample_li(from, point_of, lanes, rest, u);
-                left &= ~alike;
-                while (alike) {
-                    int i = take_bit(alike);
-                    samples.set(i, first->sample_li(point_of(i), rest[i], {u.x[i], u.y[i]}));
-                }
+                int i = take_bit(left);
+                samples.set(i, light[i]->sample_li(point_of(i), rest[i], {u.x[i], u.y[i]}));
             }
             return samples;
         }
@@ -205,6 +204,7 @@ class LightSampler {
             double most;
             for (int k = choose(point_of(i), u[i], seen, false, chosen, most); k-- > 0;) {
                 Choices& to = choices[chosen[k].slot];
+                if (!to.lanes) std::fill_n(to.light, 4, chosen[k].light), to.chance = splat4(1.0), to.rest = double4{};
                 to.light[i] = chosen[k].light, to.chance[i] = chosen[k].chance, to.rest[i] = chosen[k].rest, to.lanes |= 1u << i;
             }
             brightest[i] = most;

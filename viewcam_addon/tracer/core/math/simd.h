@@ -22,6 +22,7 @@ typedef int64_t long4 __attribute__((vector_size(32)));
 typedef uint64_t ulong4 __attribute__((vector_size(32)));
 typedef int32_t int4 __attribute__((vector_size(16)));
 typedef uint32_t uint4 __attribute__((vector_size(16)));
+typedef uint8_t byte16 __attribute__((vector_size(16)));
 
 template <class V, class T> inline V load(const T* from) {
     V v;
@@ -91,6 +92,8 @@ inline double4 abs(double4 a) { return (double4)((long4)a & splat4(INT64_MAX)); 
 inline double4 copysign(double4 size, double4 sign) {
     return (double4)(((long4)size & splat4(INT64_MAX)) | ((long4)sign & splat4(INT64_MIN)));
 }
+// The same of sizes that have no sign of their own.
+inline double4 with_sign(double4 size, double4 sign) { return (double4)((long4)size | ((long4)sign & splat4(INT64_MIN))); }
 inline double4 select(long4 mask, double4 a, double4 b) { return mask ? a : b; }
 
 inline double4 sqrt(double4 a) {
@@ -132,7 +135,13 @@ template <class Of> inline auto gather4(const Of& of) {
 }
 
 // The lanes of a mask of half the width.
-inline unsigned bits(int4 mask) { return bits(__builtin_convertvector(mask, long4)); }
+inline unsigned bits(int4 mask) {
+#if defined(__SSE2__)
+    return unsigned(_mm_movemask_ps((__m128)mask));
+#else
+    return bits(__builtin_convertvector(mask, long4));
+#endif
+}
 inline bool any(long4 mask) { return bits(mask); }
 inline bool all(long4 mask) { return bits(mask) == 15; }
 // The bits of numbers, and numbers of bits.
@@ -157,6 +166,8 @@ template <class T> using Flags = std::conditional_t<std::is_same_v<T, double4>, 
 inline uint32_t where(bool mask, uint32_t flags) { return mask ? flags : 0; }
 inline uint4 where(long4 mask, uint32_t flags) { return (uint4)__builtin_convertvector(mask, int4) & flags; }
 inline bool has(uint32_t flags, uint32_t flag) { return flags & flag; }
+// Which of four have a flag, as bits.
+inline unsigned lanes_with(uint4 flags, uint32_t flag) { return ~bits(int4((flags & flag) == 0u)) & 15; }
 inline long4 has(uint4 flags, uint32_t flag) { return __builtin_convertvector((int4)((flags & flag) != 0u), long4); }
 
 // A right-handed orthonormal frame about a unit vector, without a singularity; its error is 4e-16 for any vector.
@@ -180,6 +191,12 @@ inline void transpose(double4& a, double4& b, double4& c, double4& d) {
     double4 cd0 = __builtin_shufflevector(c, d, 0, 4, 2, 6), cd1 = __builtin_shufflevector(c, d, 1, 5, 3, 7);
     a = __builtin_shufflevector(ab0, cd0, 0, 1, 4, 5), c = __builtin_shufflevector(ab0, cd0, 2, 3, 6, 7);
     b = __builtin_shufflevector(ab1, cd1, 0, 1, 4, 5), d = __builtin_shufflevector(ab1, cd1, 2, 3, 6, 7);
+}
+
+// Each of four vectors with 0 behind it.
+inline void rows(const Vec3x4& v, double4 (&rows)[4]) {
+    rows[0] = v.x, rows[1] = v.y, rows[2] = v.z, rows[3] = double4{};
+    transpose(rows[0], rows[1], rows[2], rows[3]);
 }
 
 inline float reduce_min(float8 v) {

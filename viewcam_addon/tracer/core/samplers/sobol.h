@@ -77,6 +77,10 @@ class SobolSampler {
         return value;
     }
     uint4 digits(uint4 samples, int dimension) const {
+        // Those that follow one another stand so in the table.
+        int depth = dimension < FILM ? 0 : (dimension - FILM) / SCATTERING;
+        if (depth < depths_ && samples[3] < tabulated_ && bits(int4(samples == samples[0] + uint4{0, 1, 2, 3})) == 15)
+            return load<uint4>(&table_[(size_t(depth) * ROWS + dimension - depth * SCATTERING) * tabulated_ + samples[0]]);
         return uint4{digits(samples[0], dimension), digits(samples[1], dimension), digits(samples[2], dimension), digits(samples[3], dimension)};
     }
 
@@ -99,6 +103,13 @@ class SobolSampler {
         word = (word >> 4 & 0x0f0f0f0fu) | (word & 0x0f0f0f0fu) << 4;
         word = (word >> 8 & 0x00ff00ffu) | (word & 0x00ff00ffu) << 8;
         return word >> 16 | word << 16;
+    }
+
+    static uint4 reversed(uint4 word) {
+        word = (word >> 1 & 0x55555555u) | (word & 0x55555555u) << 1;
+        word = (word >> 2 & 0x33333333u) | (word & 0x33333333u) << 2;
+        auto bytes = (byte16)((word >> 4 & 0x0f0f0f0fu) | (word & 0x0f0f0f0fu) << 4);
+        return (uint4)__builtin_shufflevector(bytes, bytes, 3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12);
     }
 
     // Which of Sobol's points a sample has at a scattering: Owen's permutation, each bit flipped, or not, by those above it.

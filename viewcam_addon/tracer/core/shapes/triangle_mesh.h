@@ -299,7 +299,7 @@ class TriangleSurfaces {
     // Seen from the start, corners are rounded by √3 u L; each of the three products u, v, w of the test is rounded by
     // 2 u L² and their sum is the normal's projection, so that the plane seems to lie off by 6 u L σ, σ = L²/|N|. An instance's
     // ray is rounded by as much again as its matrix's condition enlarges it.
-    double4 offset() const {
+    [[gnu::always_inline]] double4 offset() const {
         double4 reach = max(max_component(abs(corner_[0])), max(max_component(abs(corner_[1])), max_component(abs(corner_[2]))));
         reach = max(reach, max_component(abs(translation_)));
         double4 placing = of_objects([](auto& object) {
@@ -310,7 +310,7 @@ class TriangleSurfaces {
     }
 
     // The vertices' normals in the world, interpolated, of any length; 0 without any.
-    Vec3x4 smooth_normal() const {
+    [[gnu::always_inline]] Vec3x4 smooth_normal() const {
         // Cycles turns those of a mesh that only one object uses into the world before it interpolates, and normalizes them
         // there; those of a shared mesh it interpolates in object space.
         double4 inverse[3][3];
@@ -318,7 +318,7 @@ class TriangleSurfaces {
             for (int column = 0; column < 3; column++)
                 inverse[row][column] = of_objects([=](auto& object) { return object.inverse[row][column]; });
         long4 mirrored = long4(of_objects([](auto& object) { return double(object.mirrored); }) > splat4(0.0));
-        auto turned = [&](const Vec3x4& normal) {
+        auto turned = [&](const Vec3x4& normal) __attribute__((always_inline)) {
             if (any([](const TriangleHit& hit) { return hit.object->flat; }))
                 return gather4([&](int i) { return hits_[i].object->turned_normal(lane(normal, i)); });
             Vec3x4 turned = transposed_product(inverse, normal);
