@@ -1,7 +1,7 @@
 # Each command sets up what it needs, and is quick the second time.
 #   make demo          the sample scene rendered by Cycles and by the tracer, compared; ends with the report
 #   make quick         lint and the tests that need neither Blender nor processes nor many samples; under a minute
-#   make test          lint and the tests that are quick to run, with the newest bpy wheel for the Python found; four to six minutes on two cores
+#   make test          lint and the tests that are quick to run, with the newest bpy wheel for the Python found; about four minutes on two cores
 #   make test-fresh    make demo and make test on a bare Debian 12 of its own, as a newcomer has them; needs root
 #   make test-exhaustive  the rest of them: whole pictures, whole clusters, and what takes minutes: 10⁸ rays, hundreds of thousands of hostile numbers
 #   make test-sanitizers  the core compiled with sanitizers, and what its tests find of addresses, undefined behavior and threads

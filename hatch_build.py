@@ -16,6 +16,7 @@ a second tool where there is no compiler), -ffast-math and -march=native (pictur
 import argparse
 import base64
 import concurrent.futures
+import contextlib
 import functools
 import hashlib
 import inspect
@@ -28,9 +29,13 @@ import sysconfig
 import tempfile
 import tomllib
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
 
-from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+try:
+    from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+except ModuleNotFoundError:  # compiling alone (--compile) asks for nothing beside Python
+    BuildHookInterface = object
 
 ROOT = Path(__file__).resolve().parent
 CORE = ROOT / "viewcam_addon" / "tracer" / "core"
@@ -80,12 +85,26 @@ def build_core(platform: str, flags: tuple[str, ...] = (), travels: bool = False
     """
     compiler = system_compiler() if platform == this_platform() and not travels else None
     library, options = _place(platform, compiler, flags)
-    if not library.exists():
-        library.parent.mkdir(parents=True, exist_ok=True)
-        command = [*([compiler] if compiler else [sys.executable, "-m", "ziglang", "c++"]), *options]
-        with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
-            os.replace(_compiled(platform, command, compiler is None, Path(scratch)), library)
+    library.parent.mkdir(parents=True, exist_ok=True)
+    with _alone(library.parent):
+        if not library.exists():
+            command = [*([compiler] if compiler else [sys.executable, "-m", "ziglang", "c++"]), *options]
+            with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
+                os.replace(_compiled(platform, command, compiler is None, Path(scratch)), library)
     return library
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """A folder's lock, so that of two processes that need a library one compiles it, where the system has such locks."""
+    try:
+        import fcntl
+    except ModuleNotFoundError:
+        yield
+        return
+    with open(folder / "lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def _place(platform: str, compiler: str | None, flags: tuple[str, ...] = ()) -> tuple[Path, list[str]]:
@@ -213,7 +232,13 @@ def main() -> None:
     parser.add_argument("platforms", nargs="*", default=[this_platform()], metavar="PLATFORM", help=", ".join(PLATFORMS))
     parser.add_argument("--into", type=Path, default=ROOT / "dist", metavar="FOLDER", help="dist by default")
     parser.add_argument("--sanitize", metavar="NAMES", help="no wheel: the package for this machine, to be tested")
+    parser.add_argument(
+        "--compile", action="store_true", help="no wheel: the library that pip's wheel for this machine will hold"
+    )
     arguments = parser.parse_args()
+    if arguments.compile:
+        build_core(this_platform())
+        return None
     if arguments.sanitize:
         return sanitized(arguments.sanitize, arguments.into)
     for platform in arguments.platforms:

@@ -6,6 +6,7 @@ that needs no password (root, in a container or on a build machine); elsewhere o
 standard library, since this runs before there is anything else. Rejected: a list of libraries, which each new wheel outdated.
 """
 
+import contextlib
 import ctypes
 import importlib.util
 import os
@@ -17,7 +18,8 @@ from pathlib import Path
 
 # Loaded by name and only when Blender draws, as it does for Grease Pencil, which ends the process where it is missing.
 LOADED_BY_NAME = ["libEGL.so.1"]
-CORE = Path(__file__).resolve().parent.parent / "build" / "core"
+ROOT = Path(__file__).resolve().parent.parent
+CORE = ROOT / "build" / "core"
 PROJECT = "virtual-pinhole"
 COMPILERS = (os.environ.get("CXX"), "c++", "g++", "clang++")
 
@@ -85,17 +87,16 @@ def install_packages(packages: list[str]) -> None:
     subprocess.run(command, check=True, env=quiet, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
-def install(folder: Path, requirements: list[str]) -> None:
-    """Install what pip is asked for into the environment, by uv or by pip.
+def install(python: Path, requirements: list[str]) -> None:
+    """Install what pip is asked for into the environment of a Python, by uv or by pip.
 
     uv takes a third of pip's time, downloads several wheels at once, and keeps them unpacked for the next environment; where
     it fails, as it does behind an index that only pip's own settings name, pip says why, or does it.
     """
-    python = folder / "bin" / "python"
     pip = [python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet"]
     subprocess.run([*pip, "uv"], check=True)
     # uv looks at pyproject.toml alone to see if the project has changed, and not at what the core is compiled from.
-    uv = [folder / "bin" / "uv", "pip", "install", "--quiet", "--python", python, "--reinstall-package", PROJECT]
+    uv = [python.with_name("uv"), "pip", "install", "--quiet", "--python", python, "--reinstall-package", PROJECT]
     if subprocess.run([*uv, *requirements], stderr=subprocess.DEVNULL).returncode:
         # Python compiles what it imports, which is a small part of what all these bring along: half a minute an environment.
         subprocess.run([*pip, "--no-compile", *requirements], check=True)
@@ -112,10 +113,14 @@ def main(folder: Path, requirements: list[str]) -> None:
     if packages:
         update_lists()
         install_packages(packages)
-    if not (folder / "bin" / "pip").exists():
-        print(f"Making the Python {sys.version.split()[0]} environment {folder}", flush=True)
-        subprocess.run([sys.executable, "-m", "venv", "--clear", folder], check=True)
-    install(folder, requirements)
+    # The core is compiled while packages are downloaded: uv would begin with it when all of them are there.
+    compile_core = [sys.executable, ROOT / "hatch_build.py", "--compile"]
+    has_compiler = any(map(shutil.which, filter(None, COMPILERS)))
+    with subprocess.Popen(compile_core, stderr=subprocess.DEVNULL) if has_compiler else contextlib.nullcontext():
+        if not (folder / "bin" / "pip").exists():
+            print(f"Making the Python {sys.version.split()[0]} environment {folder}", flush=True)
+            subprocess.run([sys.executable, "-m", "venv", "--clear", folder], check=True)
+        install(folder / "bin" / "python", requirements)
     site = next(folder.glob("lib/python3.*")) / "site-packages"
     if sys.platform == "linux" and (missing := missing_libraries(site)):
         if not shutil.which("apt-cache"):

@@ -5,12 +5,14 @@ that what documents name exists.
 """
 
 import ast
+import concurrent.futures
 import functools
 import graphlib
 import json
 import re
 import subprocess
 import sys
+import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -645,3 +647,29 @@ def test_the_examples_of_the_api_are_typed_and_a_wrong_one_is_told(tmp_path):
     outcome = typed(tmp_path, "\n".join(blocks))
     assert len(blocks) > 3 and outcome.returncode == 0, outcome.stdout
     assert 'incompatible type "str"' in typed(tmp_path, blocks[0].replace("distance=1500", 'distance="1500"')).stdout
+
+
+def test_a_core_that_two_need_at_a_time_is_compiled_once_and_a_broken_one_is_left_to_the_next(tmp_path, monkeypatch):
+    pytest.importorskip("fcntl", reason="Windows has locks of another kind")
+    monkeypatch.syspath_prepend(ROOT)
+    import hatch_build
+
+    compiled = []
+
+    def compile_slowly(platform, command, zig, folder):
+        time.sleep(0.2)
+        compiled.append(command)
+        if len(compiled) == 1:
+            sys.exit("the compiler was killed")
+        (folder / "library").write_bytes(b"\x7fELF")
+        return folder / "library"
+
+    monkeypatch.setattr(hatch_build, "_compiled", compile_slowly)
+    monkeypatch.setattr(hatch_build, "_place", lambda *words: (tmp_path / "core" / "library", []))
+    monkeypatch.setattr(hatch_build, "system_compiler", lambda: "c++")
+    platform = hatch_build.this_platform()
+    with pytest.raises(SystemExit):
+        hatch_build.build_core(platform)
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        libraries = set(pool.map(hatch_build.build_core, [platform] * 4))
+    assert libraries == {tmp_path / "core" / "library"} and len(compiled) == 2
