@@ -147,10 +147,10 @@ def test_whoever_is_killed_the_files_are_those_of_one_process_and_each_worker_lo
     with cluster.opened(None, 2, bpy.app.binary_path or None) as machines:
         batch = Batch(machines, blend, alone, tmp_path / "out")
         assert batch.has_done(1), batch.ear.events
+        worker, blender = batch.hold_the_slow_shot()
         first = batch.workers()
         assert [len(blenders) for blenders in first.values()] == [1, 1], f"a Blender for each worker, not {first}"
 
-        worker, blender = batch.hold_the_slow_shot()
         assert batch.has_done(len(SHOTS) - 1) and "slow" not in batch.ear.shots("shot_done"), batch.ear.events
         assert batch.workers() == first, "a Blender was started again, though nobody had ended one"
         os.kill(blender, signal.SIGKILL)
