@@ -60,7 +60,7 @@ test-fresh:
 
 # What is slow and needs Blender, the oldest and the newest run: test-matrix and test-blender.
 test-exhaustive: .venv/test
-	$(call PARALLEL,.venv) --numprocesses=4 -m "exhaustive or (slow and not blender)"
+	$(call PARALLEL,.venv) --numprocesses=3 -m "exhaustive or (slow and not blender)"
 
 # GCC's sanitizers, which come with it: preloaded, since Python itself is compiled without them.
 sanitizers-address = address,undefined
