@@ -183,8 +183,12 @@ WINDOWS_BLENDER = $(filter-out $(SLOW),$(shell find tests/blender -name 'test_*.
 WINDOWS_OWN = $(filter-out $(QUICK),$(wildcard tests/jobs/test_*.py tests/labels/test_*.py tests/commands/test_*.py) \
 	tests/tracer/test_c_interface.py tests/test_files.py tests/test_child_process.py tests/test_terminal.py tests/test_cli.py \
 	tests/test_crashes.py)
+# Slow modules that run there all the same, for what they call is compiled for Windows: OpenUSD, OpenCV, Blender's odd files.
+WINDOWS_SLOW = $(WINDOWS_PYTEST) -m "slow and not exhaustive"
 test-windows-suite: .venv/zips
 	status=0; \
+	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_SLOW) tests/cameras/test_usd.py tests/cameras/test_undistortion.py || status=1; \
+	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_SLOW) tests/blender/scenes/test_features.py tests/blender/odd || status=1; \
 	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_PYTEST) $(filter-out $(SLOW),$(QUICK)) || status=1; \
 	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_PYTEST) $(WINDOWS_BLENDER) $(filter-out $(SLOW),$(WINDOWS_OWN)) || status=1; \
 	.venv/bin/python .ci/emulated.py windows-4.2 $(WINDOWS_PYTEST) $(WINDOWS_BLENDER) || status=1; \
