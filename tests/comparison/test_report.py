@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from viewcam_addon.comparison import light_report, pictures, radiance
-from viewcam_addon.comparison.far_from_origin import FarFromOrigin
 from viewcam_addon.comparison.geometry import compare
 from viewcam_addon.comparison.report import write_report
+from viewcam_addon.comparison.verdict import FarFromOrigin
 from viewcam_addon.errors import InputError
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
