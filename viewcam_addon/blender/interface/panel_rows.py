@@ -1,4 +1,4 @@
-"""What panels share: their places, of which a camera's panel has two, among its data's properties and in the sidebar; and rows,
+"""The places that panels share, of which a camera's panel has two, among its data's properties and in the sidebar; and rows,
 a name beside what it names, or above it where an artist has made the panel too narrow for both."""
 
 from typing import ClassVar
