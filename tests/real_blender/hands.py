@@ -1,8 +1,8 @@
 """The hands of an artist in a real Blender with a window: finds a button and clicks it, types, drags, looks at the screen.
 
 Everything is a generator, of which a timer takes one step at a time (`start`), so that Blender handles the events and draws in
-between. No coordinate of a button is assumed: the mouse moves over the panel, and Blender is asked which property or operator it
-is on. Where a button stood the last time is looked at first.
+between. No coordinate of a button is assumed: the mouse moves over the panel, and Blender is asked which property or operator
+it is on. Where a button stood the last time is looked at first.
 """
 
 import math
