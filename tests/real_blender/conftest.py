@@ -54,7 +54,7 @@ class Host:
         scale: float = 1,
         simulated: bool = True,
     ) -> subprocess.CompletedProcess:
-        """Run a script (hands_in_a_window.py) in the real Blender's window on a virtual screen, and keep what it says.
+        """Run a script (hands.py) in the real Blender's window on a virtual screen, and keep what it says.
 
         size : of the window, pixels at scale 1. scale : of Blender's interface and of the window.
         simulated : mouse and keys are the script's.

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from viewcam_addon.blender.rendering import tracing
+from viewcam_addon.blender.rendering import engine
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import render as renders
@@ -137,7 +137,7 @@ SCENE = Scene(Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 40, 30), {}, ())
 
 
 def bands(is_canceled=lambda: False, scene=SCENE):
-    return tracing.bands(scene, "geometry", 1, 0, 2, is_canceled)
+    return engine.bands(scene, "geometry", 1, 0, 2, is_canceled)
 
 
 @pytest.fixture
@@ -182,7 +182,7 @@ def test_whether_it_is_canceled_is_asked_every_twentieth_of_a_second(endless, mo
             waits.append((len(asked), timeout))
             raise queue.Empty
 
-    monkeypatch.setattr(tracing, "queue", SimpleNamespace(SimpleQueue=Bands, Empty=queue.Empty))
+    monkeypatch.setattr(engine, "queue", SimpleNamespace(SimpleQueue=Bands, Empty=queue.Empty))
     list(bands(lambda: asked.append(1) or len(asked) > 5))
     assert waits == [(number, 0.05) for number in range(1, 6)] and endless == ["began", "stopped"]
 
@@ -198,7 +198,7 @@ def test_who_takes_no_more_bands_leaves_no_thread_behind(endless):
 
 def test_an_error_of_the_tracer_is_raised_here():
     with pytest.raises(InputError, match="the level is 'light'"):
-        list(tracing.bands(SCENE, "light", 1, 0, 2, lambda: False))
+        list(engine.bands(SCENE, "light", 1, 0, 2, lambda: False))
 
 
 def test_a_canceled_render_leaves_nothing_for_the_garbage_collector(monkeypatch):
@@ -213,7 +213,7 @@ def test_a_canceled_render_leaves_nothing_for_the_garbage_collector(monkeypatch)
     gc.disable()
     try:
         asked = iter([False])
-        list(tracing.bands(SCENE, "direct", 10**6, 0, 2, lambda: next(asked, True)))
+        list(engine.bands(SCENE, "direct", 10**6, 0, 2, lambda: next(asked, True)))
         assert tracers and not any(tracer() for tracer in tracers)
     finally:
         gc.enable()
