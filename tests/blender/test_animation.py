@@ -467,8 +467,8 @@ def test_the_values_of_many_keyed_cameras_are_true_at_each_frame_and_no_bit_of_a
     for frame in FRAMES:
         scene.frame_set(frame)
         for each in flock:
-            found = cameras.check(each, cameras.stated(each, scene), scene)
-            assert not any(finding.words or finding.differing for finding in found), f"frame {frame}, {each.name}: {found}"
+            findings_of = cameras.check(each, cameras.stated(each, scene), scene)
+            assert not any(finding.words or finding.differing for finding in findings_of), f"frame {frame}, {each.name}"
     in_use = [conversion.state_of(each) for each in flock]
     for each in flock:
         each.virtual_pinhole.enabled = False
@@ -482,6 +482,7 @@ def test_the_values_of_many_keyed_cameras_are_those_that_each_by_itself_would_ha
     """But for what one of them takes for rounding and the other adopts."""
     together = [scene.frame_set(frame) or numbers_of(flock) for frame in FRAMES]
     assert storage.load(flock[0]).precision == 2.0**-53, "they have all of their digits"
+    assert CameraSync.of(flock[0])._raw == storage.raw(flock[0]), "what was written, without a look at it"
     scene.frame_set(1)
     cameras.forget_all()
     monkeypatch.setattr(CameraSync, "carry", lambda cameras, _scene, _depsgraph: [sync for sync, _ in cameras])
@@ -492,7 +493,7 @@ def test_the_values_of_many_keyed_cameras_are_those_that_each_by_itself_would_ha
 
 def test_most_keyed_cameras_are_followed_together(flock, scene, monkeypatch):
     left, carry = [], CameraSync.carry
-    monkeypatch.setattr(CameraSync, "carry", lambda *given: left.append(carry(*given)) or left[-1])
+    monkeypatch.setattr(CameraSync, "carry", lambda *arguments: left.append(carry(*arguments)) or left[-1])
     scene.frame_set(2)
     scene.frame_set(3)
     assert {sync.camera_object.name for sync in left[-1]} == {f"Camera {i}" for i in (1, 2, 4, 5, 6)}

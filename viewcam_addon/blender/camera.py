@@ -316,8 +316,13 @@ class CameraSync:
         after = moved_poses(before, is_moved, is_turned, eyes, rotation.nearest(axes), preferences.up_axis(), rounding)
         is_view = make_views(*after.swapaxes(0, 1)) & (np.abs(after) <= intrinsics.LARGEST_FLOAT32).all(axis=(-2, -1))
         left = []
-        for (sync, _, state), is_valid, is_changed, pose_after, shown in zip(
-            moved, is_view.tolist(), (is_moved | is_turned).tolist(), after.tolist(), storage.shown(after).tolist(), strict=True
+        for (sync, _, state), is_valid, is_changed, pose_after, vectors in zip(
+            moved,
+            is_view.tolist(),
+            (is_moved | is_turned).tolist(),
+            after.tolist(),
+            storage.zeroed(after).tolist(),
+            strict=True,
         ):
             values = sync._values
             distance = values.distance if state[2:] == sync._state[2:] else sync._distance_of_lens(picture)
@@ -327,7 +332,7 @@ class CameraSync:
             if is_changed or distance != values.distance:
                 eye, look_at, up = map(tuple, pose_after)
                 sync._values = values.animated(eye, look_at, up, distance, values.zoom, 2.0**-53)
-                sync._raw = storage.follow(sync.camera_object, sync._values, shown)
+                sync._raw = storage.follow(sync.camera_object, sync._values, vectors)
             sync._state, sync._rests, sync._is_moving, sync._placed = state, (), False, ()
         return left
 

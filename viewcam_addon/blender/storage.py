@@ -90,7 +90,7 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
 
 
 def raw(camera_object: bpy.types.Object) -> Raw | None:
-    """What Blender holds of the four values and the zoom: ten numbers, `exact`, and the factor, None where that is the default.
+    """The four values and the zoom as Blender holds them: ten numbers, `exact`, and the factor, None where that is the default.
 
     It takes a third of the time that the properties take. The evaluated object may be given as well. Returns None where a curve
     asks for another look at a value, or where a value has never been set.
@@ -183,7 +183,7 @@ def store(camera_object: bpy.types.Object, values: CameraValues, *names: str) ->
 def follow(camera_object: bpy.types.Object, values: CameraValues, vectors: list[list[float]]) -> Raw:
     """Write the four values of a camera, each of which has been set before, and move nothing: as `store`, in half of the time.
 
-    vectors : eye, look-at and up as `shown` has them. Blender hears of the distance, which is set last, and evaluates anew all
+    vectors : eye, look-at and up as `zeroed` has them. Blender hears of the distance, which is set last, and evaluates anew all
     that looks at any of them. Returns them as `raw`.
     """
     global is_storing
@@ -262,7 +262,7 @@ def restored(camera_object: bpy.types.Object, *names: str) -> Iterator[None]:
                 setattr(group, name, value)
 
 
-def shown(vectors: NDArray[np.float64]) -> NDArray[np.float32]:
+def zeroed(vectors: NDArray[np.float64]) -> NDArray[np.float32]:
     """`_as_shown` of (..., 3) vectors, as Blender rounds them."""
     sizes = np.abs(vectors)
     return np.where(sizes > 2.0**-23 * sizes.max(axis=-1, keepdims=True), vectors, 0.0).astype(np.float32)
