@@ -5,6 +5,7 @@ Each text is the least that shows what was read wrongly, or refused without need
 Files with several cameras, one of which is no pinhole: the others are read, and that one is named.
 """
 
+import dataclasses
 import json
 import math
 import re
@@ -15,8 +16,9 @@ import numpy as np
 import pytest
 
 from viewcam_addon import cameras
-from viewcam_addon.cameras import Camera, Options
+from viewcam_addon.cameras import Camera, Options, distortion
 from viewcam_addon.errors import InputError
+from viewcam_addon.pinhole import Pinhole
 
 from . import test_read_only_formats as files
 from .conftest import CAMERAS
@@ -368,3 +370,252 @@ def test_a_model_is_found_above_its_folder_0(tmp_path):
     (tmp_path / "sparse" / "1").mkdir()
     with pytest.raises(InputError, match="2 models"):
         cameras.read(tmp_path / "sparse")
+
+
+def storage(path, **values):
+    """OpenCV's own file of matrices and numbers; their order stays."""
+    cv2 = pytest.importorskip("cv2")
+    file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    for name, value in values.items():
+        file.write(name, value)
+    file.release()
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "M1 D1 M2 D2",
+        "K1 D1 K2 D2",
+        "cameraMatrix1 distCoeffs1 cameraMatrix2 distCoeffs2",
+        "cameraMatrixL distCoeffsL cameraMatrixR distCoeffsR",
+        "left_K left_D right_K right_D",
+    ],
+)
+@pytest.mark.parametrize("beside", ["", "extrinsics.yml"])
+def test_a_stereo_pair_of_opencv_is_two_cameras_in_the_places_that_its_r_and_t_say(tmp_path, names, beside):
+    cv2 = pytest.importorskip("cv2")
+    k = [np.array([[f, 0, 320.5], [0, f + 1, 240.25], [0, 0, 1.0]]) for f in (600, 620)]
+    d = [np.array([[-0.2, 0.05, 0.001, -0.002, 0.01]]), np.array([[-0.1, 0.02, 0, 0.001, 0.0]])]
+    turn, shift = cv2.Rodrigues(np.array([0.02, -0.05, 0.01]))[0], np.array([[-0.12], [0.003], [0.01]])
+    pair = dict(zip(names.split(), (k[0], d[0], k[1], d[1]), strict=True))
+    between = {"R": turn, "T": shift, "R1": np.eye(3), "R2": np.eye(3), "P1": np.eye(3, 4), "P2": np.eye(3, 4), "Q": np.eye(4)}
+    if beside:
+        storage(tmp_path / "intrinsics.yml", **pair)
+        storage(tmp_path / beside, **between)
+        with pytest.raises(InputError, match="has R and T and no K"):
+            cameras.read(tmp_path / beside, options=VGA)
+    else:
+        storage(tmp_path / "intrinsics.yml", **pair, **between)
+    read_cameras = cameras.read(tmp_path / "intrinsics.yml", options=VGA)
+    points = np.array([[0.3, -0.2, 4], [-1, 0.5, 6], [0.1, 0.8, 3.0]])
+    for camera, k_of, d_of, pose in zip(read_cameras, k, d, ((np.eye(3), np.zeros(3)), (turn, shift)), strict=True):
+        wanted, _ = cv2.projectPoints(points, *pose, k_of, d_of)
+        column, row, _ = distortion.project(camera.pinhole, camera.lens, points)
+        np.testing.assert_allclose(np.stack([column, 480 - row], axis=-1) - 0.5, wanted[:, 0], atol=1e-9)
+
+
+ORB_SLAM = """%YAML:1.0
+
+# Camera calibration and distortion parameters (OpenCV)
+Camera.type: "{}"
+Camera.fx: 458.654
+Camera.fy: 457.296
+Camera.cx: 367.215
+Camera.cy: 248.375
+
+Camera.k1: -0.28340811
+Camera.k2: 0.07395907
+Camera.p1: 0.00019359
+Camera.p2: 1.76187114e-05
+
+Camera.width: 752
+Camera.height: 480
+Camera.fps: 20.0
+Camera.RGB: 1
+ORBextractor.nFeatures: 1000
+"""
+VINS = """%YAML:1.0
+---
+model_type: PINHOLE
+camera_name: camera
+image_width: 752
+image_height: 480
+distortion_parameters:
+   k1: -0.28340811
+   k2: 0.07395907
+   p1: 0.00019359
+   p2: 1.76187114e-05
+projection_parameters:
+   fx: 458.654
+   fy: 457.296
+   cx: 367.215
+   cy: 248.375
+"""
+BY_NAME = {"fx": 458.654, "fy": 457.296, "width": 752, "height": 480}
+OF_PYTHON = """camera_matrix:
+- - 458.654
+  - 0.0
+  - 367.215
+- - 0.0
+  - 457.296
+  - 248.375
+- - 0.0
+  - 0.0
+  - 1.0
+dist_coeff:
+- - -0.28340811
+  - 0.07395907
+  - 0.00019359
+  - 1.76187114e-05
+  - 0.0
+image_size:
+- 752
+- 480
+"""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ORB_SLAM.format("PinHole"),
+        ORB_SLAM.replace("Camera.", "Camera1.").format("PinHole").replace("\n", "\r\n"),
+        VINS,
+        OF_PYTHON,
+        json.dumps(
+            {
+                "color": {
+                    **BY_NAME,
+                    "ppx": 367.215,
+                    "ppy": 248.375,
+                    "coeffs": [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0],
+                }
+            }
+        ),
+        json.dumps(
+            {
+                **BY_NAME,
+                "cx": 367.215,
+                "cy": 248.375,
+                "k1": -0.28340811,
+                "k2": 0.07395907,
+                "p1": 0.00019359,
+                "p2": 1.76187114e-05,
+            }
+        ),
+        json.dumps(
+            {
+                "intrinsics": {**BY_NAME, "cx": 367.215, "cy": 248.375},
+                "distortion": {"k1": -0.28340811, "k2": 0.07395907, "p1": 0.00019359, "p2": 1.76187114e-05},
+            }
+        ),
+    ],
+    ids=["ORB-SLAM2", "ORB-SLAM3", "VINS", "yaml.dump", "RealSense", "by name", "objects"],
+)
+def test_k_and_distortion_number_by_number_and_in_blocks_are_those_of_opencv(text):
+    (camera,) = cameras.read(text)
+    pinhole = camera.pinhole
+    assert (pinhole.width, pinhole.height, pinhole.distance) == (752, 480, (458.654, 457.296))
+    assert pinhole.principal_point == pytest.approx((367.715, 231.125), abs=1e-12)
+    assert camera.lens == distortion.opencv({"k1": -0.28340811, "k2": 0.07395907, "p1": 0.00019359, "p2": 1.76187114e-05})
+
+
+def test_a_lens_of_another_model_is_none_of_opencvs_however_its_numbers_are_called():
+    text = ORB_SLAM.replace("p1", "k3").replace("p2", "k4").format("KannalaBrandt8")
+    (camera,) = cameras.read(text)
+    assert camera.lens.projection == "equidistant"
+    with pytest.raises(InputError, match="inverse_brown_conrady"):
+        cameras.read(
+            json.dumps({**BY_NAME, "ppx": 367, "ppy": 248, "model": "inverse_brown_conrady", "coeffs": [0.1, 0, 0, 0, 0]})
+        )
+    (camera,) = cameras.read(
+        json.dumps({**BY_NAME, "ppx": 367, "ppy": 248, "model": "inverse_brown_conrady", "coeffs": [0] * 5})
+    )
+    assert camera.lens is None
+
+
+K_ALONE = [[500, 0, 320], [0, 510, 240], [0, 0, 1]]
+
+
+@pytest.mark.parametrize("name", ["k.json", "k.txt", "k.npy"])
+def test_k_alone_is_a_camera_at_the_origin_and_asks_for_its_size(tmp_path, name):
+    path = tmp_path / name
+    match path.suffix:
+        case ".json":
+            path.write_text(json.dumps(K_ALONE))
+        case ".txt":
+            np.savetxt(path, K_ALONE)
+        case _:
+            np.save(path, K_ALONE)
+    with pytest.raises(InputError, match="does not say how many pixels"):
+        cameras.read(path)
+    (camera,) = cameras.read(path, options=VGA)
+    assert camera.pinhole.distance == (500, 510) and camera.pinhole.principal_point == (320.5, 239.5)
+
+
+def test_arrays_of_poses_are_a_camera_each(tmp_path):
+    poses = np.tile(np.eye(4), (3, 1, 1))
+    poses[:, 0, 3] = range(3)
+    np.savez(tmp_path / "scene.npz", intrinsics=np.tile(K_ALONE, (3, 1, 1)), poses=poses)
+    np.savez(tmp_path / "shared.npz", K=np.array(K_ALONE), extrinsics=np.linalg.inv(poses)[:, :3])
+    np.save(tmp_path / "poses.npy", poses)
+    options = Options(
+        size=(640, 480), pose="c2w_opencv", view_plane=Pinhole((0, 0, 0), (0, 1, 0), (0, 0, 1), 500, 640, 480).plane
+    )
+    for name, pose in (("scene.npz", "c2w_opencv"), ("shared.npz", None), ("poses.npy", "c2w_opencv")):
+        read_cameras = cameras.read(tmp_path / name, options=dataclasses.replace(options, pose=pose))
+        assert [camera.pinhole.eye for camera in read_cameras] == [(0, 0, 0), (1, 0, 0), (2, 0, 0)]
+    with pytest.raises(InputError, match="give --pose"):
+        cameras.read(tmp_path / "scene.npz", options=VGA)
+
+
+MAIN_JS = """// Copyright
+let cameras = [
+    {
+        id: 0,
+        img_name: '00001', // the first
+        width: 1959,
+        height: 1090,
+        position: [
+            -3, -0.5, 2e0,
+        ],
+        rotation: [
+            [1, 0, 0],
+            [0, 1, 0],
+            [0, 0, 1],
+        ],
+        fy: 1164.5,
+        fx: 1159.25,
+    },
+];
+let camera = cameras[0];
+"""
+PAGE = """<script type="module">
+  const viewer = new GaussianSplats3D.Viewer({
+    'cameraUp': [0, -1, 0],  // y is down
+    'initialCameraPosition': [-1, -4, 6],
+    'initialCameraLookAt': [0, 4, 0]
+  });
+"""
+LOOKAT = "Cam0 -D origin=1,2,3 -D target=1,2,2 -D up=0,1,0 -D fovy=60.5 -D clip=0.01,1000\n" * 2
+
+
+def test_cameras_of_splatting_viewers_are_those_that_they_show():
+    """By the formulas of their own sources; the angles are degrees of the picture's height, by hand."""
+    (camera,) = cameras.read(MAIN_JS)
+    pinhole = camera.pinhole
+    assert (pinhole.width, pinhole.height, pinhole.distance, pinhole.eye) == (1959, 1090, (1159.25, 1164.5), (-3, -0.5, 2))
+    assert pinhole.basis()[1] == pytest.approx((0, -1, 0)) and pinhole.basis()[2] == pytest.approx((0, 0, -1))
+    (camera,) = cameras.read(PAGE, options=VGA)
+    assert (camera.pinhole.eye, camera.pinhole.look_at, camera.pinhole.up) == ((-1, -4, 6), (0, 4, 0), (0, -1, 0))
+    assert camera.pinhole.distance[0] == pytest.approx(240 / math.tan(math.radians(25)))
+    read_cameras = cameras.read(LOOKAT, options=VGA)
+    assert len(read_cameras) == 2 and read_cameras[0].pinhole.look_at == (1, 2, 2)
+    assert read_cameras[0].pinhole.distance[1] == pytest.approx(240 / math.tan(math.radians(30.25)))
+    with pytest.raises(InputError, match="initialCameraPosition 0 times"):
+        read(PAGE.replace("[-1, -4, 6]", "config.position"))
+
+
+def test_json_with_a_comma_before_the_closing_bracket_in_the_next_line_is_read():
+    text = cameras.write([Camera("a", CAMERAS["shifted"])], "transforms").rstrip().removesuffix("}") + ",\n}\n"
+    (camera,) = cameras.read(text)
+    assert camera.pinhole == CAMERAS["shifted"]
