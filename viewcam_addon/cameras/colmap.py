@@ -12,9 +12,10 @@ binary model, in which COLMAP leaves no room, has these in a file of their own b
 binary one counts, as for COLMAP.
 
 **Rigs.** Where the pictures of several cameras are called alike from their last number on, and the cameras keep their places to
-one another, RIG_CONFIG beside the model says the rig, as `colmap rig_configurator` and pycolmap's apply_rig_config read it. rigs and frames, new in COLMAP 3.12, are not written: without them each image is a frame of
-its own. With them the images repeat the poses that they compose; COLMAP passes over those of the images, and all others over
-rigs and frames: where somebody has changed one of the two alone, it is refused.
+one another, RIG_CONFIG beside the model says the rig, as `colmap rig_configurator` and pycolmap's apply_rig_config read it.
+rigs and frames, new in COLMAP 3.12, are not written: without them each image is a frame of its own. With them the images repeat
+the poses that they compose; COLMAP passes over those of the images, and all others over rigs and frames: where somebody has
+changed one of the two alone, it is refused.
 
 Sources: COLMAP's doc/format.rst, doc/database.rst (pixel centers), src/colmap/sensor/models.h (the lenses) and
 src/colmap/scene/rig.cc (ReadRigConfig), reconstruction_io_text.cc and _binary.cc (what parts a line: a name ends at a space).
