@@ -523,6 +523,22 @@ def test_a_lens_of_another_model_is_none_of_opencvs_however_its_numbers_are_call
     text = ORB_SLAM.replace("p1", "k3").replace("p2", "k4").format("KannalaBrandt8")
     (camera,) = cameras.read(text)
     assert camera.lens.projection == "equidistant"
+    (camera,) = cameras.read(
+        VINS.replace("PINHOLE", "KANNALA_BRANDT")
+        .replace("fx", "mu")
+        .replace("fy", "mv")
+        .replace("cx", "u0")
+        .replace("cy", "v0")
+        .replace(
+            "distortion_parameters:\n   k1: -0.28340811\n   k2: 0.07395907\n   p1: 0.00019359\n   p2: 1.76187114e-05\n", ""
+        )
+        .replace("parameters:\n", "parameters:\n   k2: 0.01\n   k3: 0.02\n   k4: 0.03\n   k5: 0.04\n")
+    )
+    assert camera.lens == distortion.fisheye({"k1": 0.01, "k2": 0.02, "k3": 0.03, "k4": 0.04})
+    with pytest.raises(InputError, match="of the model MEI"):
+        cameras.read(
+            VINS.replace("PINHOLE", "MEI").replace("fx", "gamma1").replace("fy", "gamma2") + "mirror_parameters:\n   xi: 3.6\n"
+        )
     with pytest.raises(InputError, match="inverse_brown_conrady"):
         cameras.read(
             json.dumps({**BY_NAME, "ppx": 367, "ppy": 248, "model": "inverse_brown_conrady", "coeffs": [0.1, 0, 0, 0, 0]})
@@ -601,6 +617,9 @@ LOOKAT = "Cam0 -D origin=1,2,3 -D target=1,2,2 -D up=0,1,0 -D fovy=60.5 -D clip=
 
 def test_cameras_of_splatting_viewers_are_those_that_they_show():
     """By the formulas of their own sources; the angles are degrees of the picture's height, by hand."""
+    text = json.dumps({"id": 0, "img_name": "a", "width": 9, "height": 8, "position": [1, 2, 3], "fx": 5, "fy": 6,
+                       "rotation": np.eye(3).tolist()})  # fmt: skip
+    assert cameras.read(text)[0].pinhole.eye == (1, 2, 3)
     (camera,) = cameras.read(MAIN_JS)
     pinhole = camera.pinhole
     assert (pinhole.width, pinhole.height, pinhole.distance, pinhole.eye) == (1959, 1090, (1159.25, 1164.5), (-3, -0.5, 2))
@@ -613,6 +632,72 @@ def test_cameras_of_splatting_viewers_are_those_that_they_show():
     assert read_cameras[0].pinhole.distance[1] == pytest.approx(240 / math.tan(math.radians(30.25)))
     with pytest.raises(InputError, match="initialCameraPosition 0 times"):
         read(PAGE.replace("[-1, -4, 6]", "config.position"))
+
+
+def test_an_intrinsic_of_open3d_alone_has_its_columns_first():
+    text = json.dumps({"width": 640, "height": 480, "intrinsic_matrix": [525.5, 0, 0, 0, 526.5, 0, 319.5, 239.5, 1]})
+    (camera,) = cameras.read(text)
+    assert camera.pinhole.distance == (525.5, 526.5) and camera.pinhole.principal_point == (320, 240)
+    assert camera.pinhole.eye == (0, 0, 0) and camera.pinhole.basis()[1] == pytest.approx((0, -1, 0))
+
+
+def test_a_pointer_of_git_lfs_says_how_to_get_the_file():
+    with pytest.raises(InputError, match="git lfs pull"):
+        cameras.read("version https://git-lfs.github.com/spec/v1\noid sha256:997004fb\nsize 772721\n")
+
+
+TOOLBOX = """% Intrinsic and Extrinsic Camera Parameters
+%-- Focal length:
+fc = [ 657.395353340077460 ; 658.763142353886830 ];
+%-- Principal point:
+cc = [ 302.983766534402610 ; 242.616284123219370 ];
+%-- Skew coefficient:
+alpha_c = 0.000000000000000;
+%-- Distortion coefficients:
+kc = [ -0.255835686105780 ; 0.127572945483490 ; -0.000208182110586 ; 0.000033353463620 ; 0.000000000000000 ];
+fc_error = [ 0.3 ; 0.4 ];
+nx = 640;
+ny = 480;
+omc_1 = [ 1.654766e+00 ; 1.651927e+00 ; -6.699815e-01 ];
+Tc_1  = [ -1.778005e+02 ; -8.395097e+01 ; 8.528764e+02 ];
+omc_error_1 = [ 5.0e-04 ; 6.0e-04 ; 8.0e-04 ];
+omc_2 = [ NaN ; NaN ; NaN ];
+Tc_2  = [ NaN ; NaN ; NaN ];
+omc_3 = [ 1.849011e+00 ; 1.900554e+00 ; -3.970866e-01 ];
+Tc_3  = [ -1.549437e+02 ; -1.595167e+02 ; 7.575891e+02 ];
+"""
+
+
+def test_pictures_of_the_calibration_toolbox_for_matlab_are_where_opencv_projects_them():
+    cv2 = pytest.importorskip("cv2")
+    read_cameras = cameras.read(TOOLBOX.replace("\n", "\r\n"))
+    assert [camera.name for camera in read_cameras] == ["image 1", "image 3"]
+    k = np.array([[657.395353340077460, 0, 302.983766534402610], [0, 658.763142353886830, 242.616284123219370], [0, 0, 1]])
+    bent = np.array([-0.255835686105780, 0.127572945483490, -0.000208182110586, 0.000033353463620, 0.0])
+    turns = ([1.654766, 1.651927, -0.6699815], [1.849011, 1.900554, -0.3970866])
+    moved = ([-177.8005, -83.95097, 852.8764], [-154.9437, -159.5167, 757.5891])
+    points = np.array([[0.0, 0, 0], [100, 0, 0], [0, 120, 30]])
+    for camera, turn, at in zip(read_cameras, turns, moved, strict=True):
+        wanted, _ = cv2.projectPoints(points, np.array(turn), np.array(at), k, bent)
+        column, row, _ = distortion.project(camera.pinhole, camera.lens, points)
+        np.testing.assert_allclose(np.stack([column, 480 - row], axis=-1) - 0.5, wanted[:, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "Eigen::Matrix3d K; K << 600, 0, 320, 0, 601, 240, 0, 0, 1;\n"
+        "Eigen::Matrix4d T_cw = Eigen::Matrix4d::Identity();\nT_cw << 1,0,0,0, 0,1,0,0, 0,0,1,2, 0,0,0,1;",
+        "K <- matrix(c(600,0,320, 0,601,240, 0,0,1), nrow=3, byrow=TRUE)\nR <- diag(3)\nt <- c(0,0,2)\n",
+        "Camera matrix :\n [[6.00e+02 0.00e+00 3.20e+02]\n [0.00e+00 6.01e+02 2.40e+02]\n [0.00e+00 0.00e+00 1.00e+00]]\n"
+        "R:\n [[1. 0. 0.]\n [0. 1. 0.]\n [0. 0. 1.]]\nt:\n [0. 0. 2.]\n",
+    ],
+    ids=["Eigen", "R", "print"],
+)
+def test_matrices_that_are_made_before_they_are_filled_and_names_of_two_words_are_read(code):
+    camera = read(code)
+    assert camera.pinhole.distance == (600, 601) and camera.pinhole.principal_point == (320.5, 239.5)
+    assert camera.pinhole.eye == (0, 0, -2)
 
 
 def test_json_with_a_comma_before_the_closing_bracket_in_the_next_line_is_read():

@@ -56,9 +56,11 @@ def recognizes(source: Source) -> bool:
 
 
 def _pictures(source: Source) -> list[Any]:
-    """The list of pictures, of JSON or of JavaScript; empty where there is none."""
+    """The pictures, of JSON or of JavaScript; none where there is none."""
     if isinstance(source.json, list):
         return source.json
+    if source.document.keys() >= _KEYS:  # one of them alone
+        return [source.document]
     if TITLE not in source.parsed:
         source.parsed[TITLE] = []
         if not (source.is_folder or source.is_binary) and (begin := _LIST.search(source.text)):

@@ -47,7 +47,7 @@ _STEREO = (("1", "2"), ("left", "right"), ("l", "r"))
 _OF_ONE = ("m", *_K)
 _BESIDE = "extrinsics.yml", "extrinsics.yaml", "extrinsics.xml"
 _RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
-_T = ("t", "tvec", "translation", "translationvector", "trans", "tw2c")
+_T = ("t", "tvec", "tvecs", "translation", "translationvector", "trans", "tw2c")
 _EXTRINSIC = (
     "extrinsic", "extrinsics", "rt", "worldtocamera", "worldtocam", "world2camera", "world2cam", "w2c", "tcw",
     "extrinsicmatrix", "tcamworld", "tcameraworld",
@@ -216,7 +216,7 @@ def _cameras_in(source: Source):
     if pair := _stereo(by_name, source):
         yield from pair
         return
-    if _is_camera(by_name):
+    if _is_camera(by_name) or "mirrorparameters" in by_name:
         yield (source.path.stem if source.path else "camera"), by_name
         return
     shared = {name: value for name, value in by_name.items() if not isinstance(value, dict)}
@@ -228,9 +228,12 @@ def _cameras_in(source: Source):
 def _with_k(values: dict[str, Any]) -> dict[str, Any]:
     """The values, with K and distortion that stand number by number, or in an object of their own, at their usual names."""
     values = {_OF_CAMERA.sub("", name): value for name, value in values.items()}
-    for name in _INNER:
+    for name in (*_INNER, *_SIZE):
         if isinstance(inner := values.get(name), dict) and "data" not in inner:
             values = {**{key: value for key, value in values.items() if key != name}, **_by_name(inner)}
+    if "mu" in values and "mv" in values:  # VINS' name for OpenCV's fisheye, whose k1 … k4 are k2 … k5 there
+        names = {"mu": "fx", "mv": "fy", **{f"k{i + 1}": f"k{i}" for i in range(1, 5)}}
+        values = {names.get(key, key): value for key, value in values.items()}
     parts = [_first(values, names) for names in _PARTS_OF_K]
     if _first(values, _K) is None and all(isinstance(part, int | float) for part in parts):
         used = {name for names in _PARTS_OF_K for name in names}
@@ -477,6 +480,8 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     """
     what = f"camera {checks.quoted(name)}"
     is_fisheye = says_fisheye(values, what)
+    if "mirrorparameters" in values:  # VINS' MEI, whatever it calls it
+        not_a_pinhole(what, "of the model MEI")
     if {"t", "hw"} <= values.keys():
         return _of_infinigen(name, values, what, options)
     if (k := _first(values, _K)) is None:
