@@ -574,10 +574,17 @@ def test_arrays_of_poses_are_a_camera_each(tmp_path):
     np.savez(tmp_path / "scene.npz", intrinsics=np.tile(K_ALONE, (3, 1, 1)), poses=poses)
     np.savez(tmp_path / "shared.npz", K=np.array(K_ALONE), extrinsics=np.linalg.inv(poses)[:, :3])
     np.save(tmp_path / "poses.npy", poses)
+    vectors = {"rvecs": np.zeros((3, 3, 1)), "tvecs": -poses[:, :3, 3:]}
+    np.savez(tmp_path / "calibration.npz", mtx=np.array(K_ALONE), dist=np.zeros((1, 5)), **vectors)
     options = Options(
         size=(640, 480), pose="c2w_opencv", view_plane=Pinhole((0, 0, 0), (0, 1, 0), (0, 0, 1), 500, 640, 480).plane
     )
-    for name, pose in (("scene.npz", "c2w_opencv"), ("shared.npz", None), ("poses.npy", "c2w_opencv")):
+    for name, pose in (
+        ("scene.npz", "c2w_opencv"),
+        ("shared.npz", None),
+        ("poses.npy", "c2w_opencv"),
+        ("calibration.npz", None),
+    ):
         read_cameras = cameras.read(tmp_path / name, options=dataclasses.replace(options, pose=pose))
         assert [camera.pinhole.eye for camera in read_cameras] == [(0, 0, 0), (1, 0, 0), (2, 0, 0)]
     with pytest.raises(InputError, match="give --pose"):

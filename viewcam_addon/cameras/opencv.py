@@ -227,7 +227,8 @@ def _cameras_in(source: Source):
 
 def _with_k(values: dict[str, Any]) -> dict[str, Any]:
     """The values, with K and distortion that stand number by number, or in an object of their own, at their usual names."""
-    values = {_OF_CAMERA.sub("", name): value for name, value in values.items()}
+    unread = [name for name in (*_RVEC, *_T) if isinstance(values.get(name), list) and any(map(_is_text, values[name]))]
+    values = {_OF_CAMERA.sub("", name): value for name, value in values.items() if name not in unread}
     for name in (*_INNER, *_SIZE):
         if isinstance(inner := values.get(name), dict) and "data" not in inner:
             values = {**{key: value for key, value in values.items() if key != name}, **_by_name(inner)}
@@ -239,6 +240,11 @@ def _with_k(values: dict[str, Any]) -> dict[str, Any]:
         used = {name for names in _PARTS_OF_K for name in names}
         values = {**{key: value for key, value in values.items() if key not in used}, "k": parts}
     return values
+
+
+def _is_text(value: Any) -> bool:
+    """True for what YAML has of a matrix in a list, as of all rvecs of a calibration: its tag alone."""
+    return isinstance(value, str) and value.startswith("!!")
 
 
 def _stereo(values: dict[str, Any], source: Source) -> list[tuple[str, dict[str, Any]]]:
@@ -298,6 +304,13 @@ def _storage(source: Source) -> Mapping[str, Any]:
     return _xml(source) if source.text.lstrip()[:1] == "<" else source.yaml
 
 
+def _is_stack(array: np.ndarray, name: str) -> bool:
+    """True if there is one K, pose or part of a pose for each of several pictures, and not one alone."""
+    if name in (*_RVEC, *_T):
+        return array.ndim > 1 and array.size == 3 * len(array)
+    return array.ndim == 3 and (name in _K or is_of_pose(name))
+
+
 def _k_alone(source: Source) -> list[list[float]] | None:
     """The rows of K, which is all that the source holds, as an array, a list of JSON or three lines; else None."""
     try:
@@ -322,13 +335,10 @@ def _arrays(arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """The arrays by their names; where there is one for each of several pictures, a camera for each."""
     names = {name: plain(name) for name in arrays}
     names = {
-        name: each[:-1] if each[:-1] in (*_K, *_R, *_T, *_EXTRINSIC, *_OTHER_POSE) else each for name, each in names.items()
-    }
-    stacked = {
-        name: len(arrays[name])
+        name: each[:-1] if each[:-1] in (*_K, *_R, *_RVEC, *_T, *_EXTRINSIC, *_OTHER_POSE) else each
         for name, each in names.items()
-        if arrays[name].ndim == 3 - (each in _T) and (each in _K or is_of_pose(each))
     }
+    stacked = {name: len(arrays[name]) for name, each in names.items() if _is_stack(arrays[name], each)}
     if len({*stacked.values()}) != 1:
         return {name: array.tolist() for name, array in arrays.items()}
     (count,) = {*stacked.values()}
