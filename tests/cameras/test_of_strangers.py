@@ -535,7 +535,7 @@ def test_a_lens_of_another_model_is_none_of_opencvs_however_its_numbers_are_call
         .replace("parameters:\n", "parameters:\n   k2: 0.01\n   k3: 0.02\n   k4: 0.03\n   k5: 0.04\n")
     )
     assert camera.lens == distortion.fisheye({"k1": 0.01, "k2": 0.02, "k3": 0.03, "k4": 0.04})
-    with pytest.raises(InputError, match="of the model MEI"):
+    with pytest.raises(InputError, match="of the model 'MEI'"):
         cameras.read(
             VINS.replace("PINHOLE", "MEI").replace("fx", "gamma1").replace("fy", "gamma2") + "mirror_parameters:\n   xi: 3.6\n"
         )

@@ -216,7 +216,7 @@ def _cameras_in(source: Source):
     if pair := _stereo(by_name, source):
         yield from pair
         return
-    if _is_camera(by_name) or "mirrorparameters" in by_name:
+    if _is_camera(by_name) or "mirrorparameters" in by_name:  # of VINS' MEI, which is refused by its name
         yield (source.path.stem if source.path else "camera"), by_name
         return
     shared = {name: value for name, value in by_name.items() if not isinstance(value, dict)}
@@ -490,8 +490,6 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     """
     what = f"camera {checks.quoted(name)}"
     is_fisheye = says_fisheye(values, what)
-    if "mirrorparameters" in values:  # VINS' MEI, whatever it calls it
-        not_a_pinhole(what, "of the model MEI")
     if {"t", "hw"} <= values.keys():
         return _of_infinigen(name, values, what, options)
     if (k := _first(values, _K)) is None:
