@@ -40,7 +40,7 @@ SEVERAL = "a folder"
 _K = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", "cammatrix", "camk", "kmatrix")
 _R = ("r", "rot", "rotation", "rmat", "rotationmatrix", "rw2c")
 _SAYS_K = re.compile(r"(?:[km][12lr]?|matrix_?\w{0,5}|intrinsics?|mtx|fx)[\s_$\"'-]*:", re.IGNORECASE)  # each of these
-_PARTS_OF_K = (("fx",), ("fy",), ("cx", "ppx", "u0"), ("cy", "ppy", "v0"))
+_PARTS_OF_K = (("fx",), ("fy",), ("cx", "ppx", "u0", "px"), ("cy", "ppy", "v0", "py"))
 _OF_CAMERA = re.compile(r"^camera1?(?=(?:[fc][xy]|[kp]\d|width|height|type)$)")  # ORB-SLAM's
 _INNER = ("projectionparameters", "distortionparameters", "distortion", *_K)
 _STEREO = (("1", "2"), ("left", "right"), ("l", "r"))
