@@ -25,7 +25,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import InputError
-from ..pinhole import Pinhole
+from ..pinhole import Pinhole, Triple
 from . import axes, naming, own, texts
 from .camera import Camera, Options
 from .source import Record, Source
@@ -107,9 +107,15 @@ def _of_sibr(source: Source, options: Options) -> list[Camera]:
         width, height = options.size_or_refuse(source.name)
         fov = Record({"fov": line[6]}, record.place).number("fov", None, 1e-6, 180 - 1e-6)
         d = (height if line[5] else width) / 2 / math.tan(math.radians(fov) / 2)
-        pinhole = Pinhole(*(record.numbers(key, 3) for key in ("origin", "target", "up")), d, width, height)
+        eye, target, up = (_vector(record, key) for key in ("origin", "target", "up"))
+        pinhole = Pinhole(eye, target, up, d, width, height)
         cameras.append(Camera(name, pinhole, False))
     return cameras
+
+
+def _vector(record: Record, key: str) -> Triple:
+    x, y, z = record.numbers(key, 3)
+    return x, y, z
 
 
 def _first_view(source: Source, options: Options) -> Camera:
@@ -122,7 +128,7 @@ def _first_view(source: Source, options: Options) -> Camera:
         if len({*found}) > 1 or (not found and name in text):
             raise InputError(f"{source.name} says {name} {len(found)} times as three numbers: give a text that says it once")
         if found:
-            vectors[key] = Record({name: found[0].rstrip(", \n").split(",")}, source.name).numbers(name, 3)
+            vectors[key] = _vector(Record({name: found[0].rstrip(", \n").split(",")}, source.name), name)
     d = height / 2 / math.tan(math.radians(_FOV) / 2)
     note = f"GaussianSplats3D shows {_FOV:g}° of the picture's height"
     return Camera("view", Pinhole(vectors["eye"], vectors["look_at"], vectors["up"], d, width, height), False, (note,))

@@ -102,8 +102,9 @@ def _of_array(array: np.ndarray) -> list[tuple[float, ...]]:
     """The numbers of each pose of an array, (…, 3 or 4, 4); none if one of them is none."""
     if array.ndim not in (2, 3) or array.shape[-2:] not in ((3, 4), (4, 4)):
         return []
-    poses = [_pose(rows.astype(np.float64)) for rows in array.reshape(-1, *array.shape[-2:])]
-    return [] if None in poses else poses
+    every = [_pose(rows.astype(np.float64)) for rows in array.reshape(-1, *array.shape[-2:])]
+    poses = [pose for pose in every if pose is not None]
+    return poses if len(poses) == len(every) else []
 
 
 def _pose(rows: np.ndarray) -> tuple[float, ...] | None:
