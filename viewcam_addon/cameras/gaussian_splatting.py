@@ -124,11 +124,11 @@ def _first_view(source: Source, options: Options) -> Camera:
     text = texts.without(_COMMENT, source.text)
     vectors = dict(_USUAL_VIEW)
     for key, name in _VIEWS.items():
-        found = [match[1] for match in re.finditer(rf"\b{name}\b[\"']?\s*[:=]\s*\[([^\]]*)\]", text)]
-        if len({*found}) > 1 or (not found and name in text):
-            raise InputError(f"{source.name} says {name} {len(found)} times as three numbers: give a text that says it once")
-        if found:
-            vectors[key] = _vector(Record({name: found[0].rstrip(", \n").split(",")}, source.name), name)
+        listed = [match[1] for match in re.finditer(rf"\b{name}\b[\"']?\s*[:=]\s*\[([^\]]*)\]", text)]
+        if len({*listed}) > 1 or (not listed and name in text):
+            raise InputError(f"{source.name} says {name} {len(listed)} times as three numbers: give a text that says it once")
+        if listed:
+            vectors[key] = _vector(Record({name: listed[0].rstrip(", \n").split(",")}, source.name), name)
     d = height / 2 / math.tan(math.radians(_FOV) / 2)
     note = f"GaussianSplats3D shows {_FOV:g}° of the picture's height"
     return Camera("view", Pinhole(vectors["eye"], vectors["look_at"], vectors["up"], d, width, height), False, (note,))
