@@ -7,6 +7,7 @@ import ast
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import unicodedata
@@ -254,7 +255,7 @@ def test_each_event_is_a_line_of_json_with_its_time_and_nothing_else_is_on_stand
     assert [event["event"] for event in (started, message, finished)] == ["started", "message", "finished"]
     shares = [event["share"] for event in events_read if event["event"] == "progress"]
     assert shares[0] == 0 and shares[-1] == 1 and shares == sorted(set(shares)), shares
-    assert started["command"] == "render" and "out.exr --log-json" in started["words"]
+    assert started["command"] == "render" and shlex.split(started["words"])[-2:] == [str(tmp_path / "out.exr"), "--log-json"]
     assert message["text"].startswith("traced 64 × 48 pixels in ")
     assert finished["exit_status"] == 0 and 0 < finished["seconds"] < 600
     assert started["time"] <= message["time"] <= finished["time"] and started["time"].endswith("+00:00")
@@ -266,7 +267,7 @@ def test_an_error_is_an_event_and_a_sentence(tmp_path, capfd):
     output = capfd.readouterr()
     _, error, finished = lines_of(output.out)
     assert error["event"] == "error" and finished["exit_status"] == 2
-    assert output.err == f"viewcam render: {error['text']}\n" and "none.json" in error["text"]
+    assert output.err.splitlines() == [f"viewcam render: {error['text']}"] and "none.json" in error["text"]
 
 
 @pytest.mark.parametrize(
@@ -284,7 +285,7 @@ def test_wrong_usage_is_an_event_and_a_sentence_too(capfd, words, command, sente
     assert (started["event"], started["command"]) == ("started", command) and "--log-json" in started["words"]
     assert (error["event"], error["command"]) == ("error", command) and sentence in error["text"], error
     assert (finished["event"], finished["command"], finished["exit_status"]) == ("finished", command, 2)
-    assert output.err == f"{'viewcam ' + command if command else 'viewcam'}: {error['text']}\n"
+    assert output.err.splitlines() == [f"{'viewcam ' + command if command else 'viewcam'}: {error['text']}"]
     assert main(words) == 2
     assert capfd.readouterr() == ("", output.err), "the sentence is the same without JSON"
 

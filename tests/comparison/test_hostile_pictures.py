@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from viewcam_addon import checks
-from viewcam_addon.comparison import difference, light_report, radiance, report
+from viewcam_addon.comparison import difference, radiance, report
 from viewcam_addon.comparison.geometry import compare
 from viewcam_addon.errors import InputError
 from viewcam_addon.image import BACKGROUND_DEPTH, Image
@@ -63,7 +63,7 @@ def test_geometry_that_holds_a_hostile_number_is_not_the_same(paper_scene, name,
     seen = harmed(test, name, value)
     comparison = compare(reference, seen, scene.pinhole)
     assert not comparison.passed, comparison.lines()
-    assert_told(comparison, report.write_report, reference, seen, tmp_path)
+    assert_told(comparison, report.write_geometry, reference, seen, tmp_path)
     if not np.isfinite(value) or name == "Position" or (name == "Depth" and value < BACKGROUND_DEPTH):
         words = "contradicts itself in" if np.isfinite(value) else f"no finite number in its pass '{name}'"
         with pytest.raises(InputError, match=f"{words}.*: trace it again"):
@@ -72,7 +72,7 @@ def test_geometry_that_holds_a_hostile_number_is_not_the_same(paper_scene, name,
     expected = harmed(reference, name, value)
     comparison = compare(expected, test, scene.pinhole)
     assert not comparison.passed, comparison.lines()
-    assert_told(comparison, report.write_report, expected, test, tmp_path)
+    assert_told(comparison, report.write_geometry, expected, test, tmp_path)
 
 
 @pytest.mark.parametrize("value", HOSTILE, ids=map(str, range(len(HOSTILE))))
@@ -83,7 +83,7 @@ def test_light_that_holds_a_hostile_number_is_not_the_same(name, value, tmp_path
     for expected, seen in ((reference, [harmed(tests[0], name, value), tests[1]]), (harmed(reference, name, value), tests)):
         comparison = radiance.compare(expected, seen, PINHOLE)
         assert not comparison.passed, comparison.lines()
-        assert_told(comparison, light_report.write_report, expected, seen, tmp_path)
+        assert_told(comparison, report.write_light, expected, seen, tmp_path)
 
 
 @pytest.mark.parametrize("name", ["Magnitude", "Facing"])
@@ -96,7 +96,7 @@ def test_what_only_the_reference_tells_may_be_hostile_too(paper_scene, name, tmp
                 compare(reference, test, scene.pinhole)
             continue
         comparison = compare(reference, test, scene.pinhole)
-        assert_told(comparison, report.write_report, reference, test, tmp_path)
+        assert_told(comparison, report.write_geometry, reference, test, tmp_path)
 
 
 def test_a_reference_that_its_scene_does_not_show_is_refused_before_its_rays_are_traced(paper_scene):

@@ -10,10 +10,10 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from viewcam_addon.comparison import light_report, pictures, radiance
-from viewcam_addon.comparison.far_from_origin import FarFromOrigin
+from viewcam_addon.comparison import pictures, radiance, report
 from viewcam_addon.comparison.geometry import compare
-from viewcam_addon.comparison.report import write_report
+from viewcam_addon.comparison.light_verdict import change_text
+from viewcam_addon.comparison.verdict import FarFromOrigin, percent
 from viewcam_addon.errors import InputError
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
@@ -71,7 +71,7 @@ def compared(far_scene):
 
 
 def written(tmp_path, comparison, reference, test, **more):
-    path = write_report(comparison, reference, test, tmp_path / "report", **more)
+    path = report.write_geometry(comparison, reference, test, tmp_path / "report", **more)
     assert path == tmp_path / "report" / "index.html"
     text = path.read_text(encoding="utf-8")
     return text, Page(text)
@@ -165,16 +165,16 @@ def test_combined_is_shown_where_the_renderer_made_one(compared, tmp_path):
 def test_a_folder_that_is_a_file_is_refused(compared, tmp_path):
     (tmp_path / "taken").write_text("here")
     with pytest.raises(InputError, match="taken is a file"):
-        write_report(*compared, tmp_path / "taken")
+        report.write_geometry(*compared, tmp_path / "taken")
 
 
 def test_the_report_tells_what_mends_it_and_where_its_origin_is(compared, tmp_path):
     comparison, reference, test = compared
     far = FarFromOrigin(1.2, True, 6.4e6)
-    path = write_report(replace(comparison, far_from_origin=far), reference, test, tmp_path / "far")
+    path = report.write_geometry(replace(comparison, far_from_origin=far), reference, test, tmp_path / "far")
     page = Page(path.read_text(encoding="utf-8"))
     assert "Cycles is 1.2 px off here, because the camera stands 6.4·10⁶ from the origin: check with --recenter." in page.text
-    path = write_report(replace(comparison, origin=(4600000.25, 0.0, -1.0)), reference, test, tmp_path / "recentered")
+    path = report.write_geometry(replace(comparison, origin=(4600000.25, 0.0, -1.0)), reference, test, tmp_path / "recentered")
     page = Page(path.read_text(encoding="utf-8"))
     assert "origin 4600000.25 0 -1" in page.text and "--recenter" not in page.text
 
@@ -199,7 +199,7 @@ def noisy(factor, samples, seeds=8):
 
 def written_light(folder, reference, tests, **more):
     comparison = radiance.compare(reference, tests, PINHOLE)
-    path = light_report.write_report(comparison, reference, tests, folder / "report", **more)
+    path = report.write_light(comparison, reference, tests, folder / "report", **more)
     assert [path] == list((folder / "report").iterdir())
     text = path.read_text(encoding="utf-8")
     return comparison, text, Page(text)
@@ -278,3 +278,13 @@ def test_a_reduced_map_keeps_what_is_farthest_from_zero():
     levels = pictures.signed(values, 5.0)
     assert levels.shape[1] <= 1920
     assert (levels == 1).sum() == 1 and (levels > pictures.LEVELS * 0.8).sum() == 1
+
+
+@pytest.mark.parametrize(("share", "words"), [(0.87, "87%"), (12.04, "12 times"), (1683.2, "1,680 times"), (np.inf, "∞ times")])
+def test_how_much_of_a_tolerance_is_used_has_no_powers_of_ten(share, words):
+    assert percent(share) == words
+
+
+def test_how_much_brighter_something_is_has_no_powers_of_ten():
+    assert change_text(1e-4, 2.0) == "20,000 times as bright"
+    assert change_text(2.0, 1e-4) == "0.00005 times as bright"

@@ -258,7 +258,7 @@ def shots() -> Feed:
     """Lists of shots, in every format."""
     from viewcam_addon.errors import InputError
     from viewcam_addon.jobs import lists
-    from viewcam_addon.jobs.settings import settings_hash
+    from viewcam_addon.jobs.folder import settings_hash
 
     lines = b"".join(json.dumps(shot).encode() + b"\n" for shot in SHOTS["shots"])
 
@@ -287,9 +287,8 @@ def sidecar() -> Feed:
     from viewcam_addon.cameras.sidecar import record
     from viewcam_addon.errors import InputError, message_of
     from viewcam_addon.jobs import dataset, one, run
-    from viewcam_addon.jobs.folder import Folder, Outputs
+    from viewcam_addon.jobs.folder import Folder, Outputs, settings_hash
     from viewcam_addon.jobs.job import Job
-    from viewcam_addon.jobs.settings import settings_hash
     from viewcam_addon.pinhole import Pinhole
 
     class Painter(painting.Painter):

@@ -18,11 +18,10 @@ sys.path[:0] = [str(TESTS), str(TESTS.parent)]
 from batch_folders import assert_same, contents
 
 from viewcam_addon.jobs import one
-from viewcam_addon.jobs.folder import Folder, Outputs
+from viewcam_addon.jobs.folder import Folder, Outputs, settings_hash
 from viewcam_addon.jobs.interruption import Interruption
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.run import run as run_batch
-from viewcam_addon.jobs.settings import settings_hash
 
 __all__ = ["assert_same", "contents"]
 

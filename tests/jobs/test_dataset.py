@@ -51,7 +51,7 @@ def finish(folder):
 
 
 def written(folder):
-    return sorted(str(path.relative_to(folder.path)) for path in folder.path.rglob("*") if path.suffix == ".txt") + [
+    return sorted(path.relative_to(folder.path).as_posix() for path in folder.path.rglob("*") if path.suffix == ".txt") + [
         path.name for path in folder.path.glob("transforms*")
     ]
 

@@ -20,10 +20,10 @@ from viewcam_addon.cameras.calibration import Calibration
 from viewcam_addon.cameras.distortion import opencv
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import job, names
+from viewcam_addon.jobs.folder import settings_hash
 from viewcam_addon.jobs.job import FIELDS, Job
+from viewcam_addon.jobs.plan import shard
 from viewcam_addon.jobs.problems import ShotsError
-from viewcam_addon.jobs.settings import settings_hash
-from viewcam_addon.jobs.shards import shard
 from viewcam_addon.pinhole import ViewPlane
 
 FOUR = {"eye": (1.0, 2.0, 3.0), "look_at": (0.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0), "d": 400.0}
@@ -193,7 +193,7 @@ def test_the_hash_is_the_same_on_every_machine_and_in_every_version():
 
 
 def test_the_hash_is_the_same_in_another_process_with_other_hashes_of_texts():
-    imports = "from viewcam_addon.jobs.settings import settings_hash; from viewcam_addon.jobs.job import Job"
+    imports = "from viewcam_addon.jobs.folder import settings_hash; from viewcam_addon.jobs.job import Job"
     program = f"{imports}\nprint(settings_hash({SHOT!r}, {MADE_FROM!r}))"
     command = [sys.executable, "-X", "utf8", "-c", program]
     root, seed = Path(__file__).parents[2], os.environ | {"PYTHONHASHSEED": "7"}

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
-from viewcam_addon.jobs import lists, rows
+from viewcam_addon.jobs import lists
+from viewcam_addon.jobs.lists import COLUMNS
 from viewcam_addon.jobs.problems import MOST_SHOWN, ShotsError
-from viewcam_addon.jobs.rows import COLUMNS
 
 pytestmark = pytest.mark.slow
 
@@ -341,9 +341,9 @@ def test_json_lines_name_the_line_and_each_is_read_whatever_the_others_are(tmp_p
 def test_unknown_cameras_are_guessed_at_for_the_problems_that_are_shown_and_no_others(tmp_path, monkeypatch):
     """A guess looks at every camera: 20,000 unknown names in a file of many cameras took 25 s, four times as long for twice."""
     looked_at = []
-    guess = rows.difflib.get_close_matches
+    guess = lists.difflib.get_close_matches
     monkeypatch.setattr(
-        rows.difflib, "get_close_matches", lambda name, names: looked_at.append(len(names)) or guess(name, names)
+        lists.difflib, "get_close_matches", lambda name, names: looked_at.append(len(names)) or guess(name, names)
     )
 
     class Names(tuple):

@@ -16,8 +16,24 @@ import bpy
 import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
-from hands_in_a_window import NOWHERE, click, open_the_panels, press, region, start, window
-from tour_hands import VIEWPORT, call, find, photograph, push_undo, redo, settle, undo, until
+from hands import (
+    NOWHERE,
+    VIEWPORT,
+    call,
+    click,
+    find,
+    open_the_panels,
+    photograph,
+    press,
+    push_undo,
+    redo,
+    region,
+    settle,
+    start,
+    undo,
+    until,
+    window,
+)
 
 FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
 PBRT = """Film "rgb" "integer xresolution" [960] "integer yresolution" [540]

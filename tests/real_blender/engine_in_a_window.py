@@ -20,9 +20,8 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 sys.path.append(str(Path(__file__).parent))
-from hands_in_a_window import ROW, move, region, start, window
+from hands import ROW, SCREEN_HEIGHT, move, region, start, window
 from mathutils import Euler
-from tour_hands import SCREEN_HEIGHT
 
 PART, FILE, OUT = sys.argv[sys.argv.index("--") + 1 :]
 TRACED_FOR = 2.0  # seconds that a heavy render goes on before it is canceled

@@ -2,7 +2,7 @@
 
 blender --enable-event-simulate -p 0 0 1000 700 --addons … --python handles_in_a_window.py
 
-A timer takes one step at a time, as in hands_in_a_window.py. The window is small, since it is drawn in software.
+A timer takes one step at a time, as in hands.py. The window is small, since it is drawn in software.
 Leaves with status 0, or 5 and a traceback.
 """
 
@@ -17,7 +17,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 sys.path.append(str(Path(__file__).parent))
-from hands_in_a_window import NOWHERE, camera, is_at_its_values, move, press, region, start, state, values, window
+from hands import NOWHERE, camera, is_at_its_values, move, press, region, start, state, values, window
 
 ADDON = "bl_ext.user_default.virtual_pinhole"
 NAMES = ("eye", "look_at", "up")

@@ -13,7 +13,7 @@ import bpy
 
 sys.path += [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 import leftovers
-from hands_in_a_window import camera, move, region, start, window
+from hands import camera, move, region, start, window
 
 EXTENSION = leftovers.EXTENSION
 ROUNDS = 4

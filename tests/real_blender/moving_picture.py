@@ -13,8 +13,7 @@ import bpy
 
 sys.path.append(str(Path(__file__).parent))
 import tour_step
-from hands_in_a_window import move, region, show_the_panel, start, window
-from tour_hands import VIEWPORT, begin, call, find, on_screen, photograph
+from hands import VIEWPORT, begin, call, find, move, on_screen, photograph, region, show_the_panel, start, window
 
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
 WIDTH = 1310  # of the viewport and its sidebar

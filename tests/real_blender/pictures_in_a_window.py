@@ -15,8 +15,22 @@ from pathlib import Path
 import bpy
 
 sys.path.append(str(Path(__file__).parent))
-from hands_in_a_window import NOWHERE, press, region, start, window
-from tour_hands import SIDEBAR, VIEWPORT, call, hide_the_sidebar, match_photo, photograph, seen, settle, until
+from hands import (
+    NOWHERE,
+    SIDEBAR,
+    VIEWPORT,
+    call,
+    hide_the_sidebar,
+    match_photo,
+    photograph,
+    press,
+    region,
+    seen,
+    settle,
+    start,
+    until,
+    window,
+)
 from tour_step import room
 
 FOLDER, PHOTO, *PARTS = sys.argv[sys.argv.index("--") + 1 :]

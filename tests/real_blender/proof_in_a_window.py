@@ -19,8 +19,7 @@ from pathlib import Path
 import bpy
 
 sys.path.append(str(Path(__file__).parent))
-from hands_in_a_window import NOWHERE, WAITING, click, move, press, region, start, unfold, window
-from tour_hands import SIDEBAR, look, photograph
+from hands import NOWHERE, SIDEBAR, WAITING, click, keep_open, look, move, photograph, press, region, start, window
 
 FILE, FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
 ADDON = "bl_ext.user_default.virtual_pinhole"
@@ -245,7 +244,7 @@ def turn_the_add_on_off_while_it_runs():
 def write_the_labels():
     """By its button: Blender's timer looks after what that began, until the files are there, and the panel says where."""
     labels = importlib.import_module(LABELS)
-    unfold(labels.VIEWCAM_PT_sidebar_labels)
+    keep_open(labels.VIEWCAM_PT_sidebar_labels)
     settings = bpy.context.window_manager.virtual_pinhole_labels
     settings.folder = str(FOLDER)
     yield

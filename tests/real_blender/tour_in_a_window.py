@@ -17,8 +17,22 @@ sys.path.append(str(Path(__file__).parent))
 import tour
 import tour_step
 from bpy_extras.view3d_utils import location_3d_to_region_2d
-from hands_in_a_window import move, region, start, window
-from tour_hands import SIDEBAR, VIEWPORT, begin, beside, lowest_button, photograph, push_undo, redo, survey_anew, undo
+from hands import (
+    SIDEBAR,
+    VIEWPORT,
+    begin,
+    beside,
+    lowest_button,
+    move,
+    photograph,
+    push_undo,
+    redo,
+    region,
+    start,
+    survey_anew,
+    undo,
+    window,
+)
 
 FOLDER, *WANTED = sys.argv[sys.argv.index("--") + 1 :] or [None]
 FOLDER = FOLDER and Path(FOLDER)

@@ -71,6 +71,15 @@ def drivers(block: bpy.types.ID) -> list[bpy.types.FCurve]:
     return list(block.animation_data.drivers) if block.animation_data else []
 
 
+def all_curves(block: bpy.types.ID) -> list[bpy.types.FCurve]:
+    """The curves that animate a datablock, and its drivers."""
+    data = block.animation_data
+    if not data:
+        return []
+    strips = strip_curves(block) if data.nla_tracks else ()
+    return [*_curves_of(data), *strips, *data.drivers]
+
+
 def animation_curves(block: bpy.types.ID) -> list[bpy.types.FCurve]:
     """The curves that animate a datablock: those of its action and of the actions on its NLA tracks that are not muted."""
     return [*action_curves(block), *strip_curves(block)]
@@ -96,14 +105,14 @@ def _curves_of(source: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.type
 
 
 def _collections_of(source: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.types.bpy_prop_collection]:
-    if not source.action:
+    action = source.action
+    if not action:
         return []
     # Actions have slots since 4.4. What 4.4 and 4.5 still call action.fcurves are the curves of the first slot only.
     if bpy.app.version < (4, 4):
-        return [source.action.fcurves]
-    bags = [
-        strip.channelbag(source.action_slot) for layer in source.action.layers for strip in layer.strips if source.action_slot
-    ]
+        return [action.fcurves]
+    slot = source.action_slot
+    bags = [strip.channelbag(slot) for layer in action.layers for strip in layer.strips] if slot else []
     return [bag.fcurves for bag in bags if bag]
 
 

@@ -18,14 +18,12 @@ from ..errors import InputError
 from ..events import Events
 from ..jobs import cluster, dataset, one, render_client
 from ..jobs import run as running
-from ..jobs.folder import Folder
+from ..jobs.folder import Folder, settings_hash
 from ..jobs.interruption import Interruption
 from ..jobs.job import Job
 from ..jobs.names import one_file
-from ..jobs.plan import Plan
+from ..jobs.plan import Plan, shard
 from ..jobs.problems import ShotsError
-from ..jobs.settings import settings_hash
-from ..jobs.shards import shard
 from ..jobs.summary import Summary
 from ..terminal import say, silent_libraries
 from . import blender_room

@@ -35,7 +35,7 @@ class Lane(NamedTuple):
     end: float
 
 
-def histogram(roundings: NDArray[np.float64]) -> str:
+def histogram(roundings: NDArray[np.floating]) -> str:
     """A chart of the positions' errors, in roundings of float32, with the tolerances.
 
     roundings : (n,) error of each pixel over what one rounding causes there.

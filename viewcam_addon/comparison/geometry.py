@@ -16,7 +16,6 @@ from ..image import Image
 from ..pinhole import Pinhole
 from . import tolerances
 from .cameras import conversion_error, systematic_error
-from .far_from_origin import far_from_origin
 from .mismatches import (
     KINDS,
     NOWHERE,
@@ -35,7 +34,7 @@ from .mismatches import (
 from .renderers import CYCLES, Renderer, completed
 from .statistics import PassErrors, measure
 from .tolerances import Array, Seen, in_float32
-from .verdict import GeometryComparison, allowed_unexplained
+from .verdict import GeometryComparison, allowed_unexplained, far_from_origin
 
 # Which of the passes both pictures must have.
 _NEEDED = ("Depth", "Position", "Object Index")

@@ -2,7 +2,7 @@
 alike.
 
 `FIELDS` has the check of each value alone, `conflicts` what values can't be together. A Job raises the first problem; a list
-of jobs (rows.py) asks both for all problems there are, with the place of each. To JSON and back is here and nowhere else.
+of jobs (lists.py) asks both for all problems there are, with the place of each. To JSON and back is here and nowhere else.
 """
 
 import argparse

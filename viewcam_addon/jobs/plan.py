@@ -5,10 +5,13 @@ What another process is to do stands in a file (`write`, `read`): its jobs, and 
 
 import dataclasses
 import json
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
+from .. import checks
+from ..errors import InputError
 from ..files import written_whole
 from .folder import Outputs
 from .job import Job
@@ -90,3 +93,26 @@ def read(path: Path) -> tuple[list[Job], Plan | None, dict[str, str]]:
 def result_of(path: Path) -> Path:
     """The path of the result of a check that was to be done by this file."""
     return path.with_name("result.json")
+
+
+Item = TypeVar("Item")
+
+_SHARD = re.compile(r"(\d{1,9})/(\d{1,9})", re.ASCII)
+
+
+def shard(items: Sequence[Item], text: str) -> list[Item]:
+    """The items of shard "I/N": every N-th from the I-th on, in their order. All N together have each exactly once, and no two
+    differ by more than one in number: so several machines share a batch without any word between them.
+
+    Neighbors go to different shards, since neighbors cost alike. A shard may be empty.
+
+    Raises
+    ------
+    InputError
+        if the text is none with 1 ≤ I ≤ N.
+    """
+    match = _SHARD.fullmatch(text.strip())
+    if not match or not 1 <= int(match[1]) <= int(match[2]):
+        raise InputError(f"shard {checks.quoted(text)} is none: write 1/8 to 8/8 for the parts of eight")
+    number, count = int(match[1]), int(match[2])
+    return list(items[number - 1 :: count])

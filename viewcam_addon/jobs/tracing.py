@@ -364,7 +364,7 @@ def _to_json(
     whole: "Image | None" = None,
 ) -> dict[str, Any]:
     """The answer about a comparison, once its files are written."""
-    from ..comparison import difference, light_report, report
+    from ..comparison import difference, report
     from ..comparison.light_verdict import RadianceComparison
     from ..tracer.scene import with_pairs
 
@@ -373,10 +373,10 @@ def _to_json(
     about = (written.report or "", ledger, written.command)
     if isinstance(comparison, RadianceComparison):
         figures = _light_figures(result)
-        page = light_report.write_report(comparison, reference, tests, *about) if written.report else None
+        page = report.write_light(comparison, reference, tests, *about) if written.report else None
     else:
         figures = _geometry_figures(comparison)
-        page = report.write_report(comparison, reference, tests[0], *about) if written.report else None
+        page = report.write_geometry(comparison, reference, tests[0], *about) if written.report else None
     lines += [f"report: {page}"] if page else []
     result["ledger"] = [dataclasses.asdict(entry) for entry in ledger]
     if written.difference:

@@ -1,9 +1,9 @@
 """Ground truth of a scene's picture, from exact hits at the pixels' centers.
 
-surfaces.py: which instance, primitive and point each pixel shows, and what follows from that; motion.py: where those points
-are in another frame; masks.py: run lengths and boxes; coverage.py: shares of pixels; scene_labels.py: all labels of one frame;
-files.py: how they are written; surface_points.py: which pictures see a point; coco.py, yolo.py, bop.py, colmap.py,
-kitti.py, stereo.py, tracks.py: those of many pictures as a dataset.
+surfaces.py: which instance, primitive and point each pixel shows, and what follows from that; masks.py: run lengths and boxes;
+coverage.py: shares of pixels; scene_labels.py: all labels of one frame, and motion to another; files.py: how they are written;
+surface_points.py: which pictures see a point; coco.py, yolo.py, bop.py, colmap.py, kitti.py, stereo.py, tracks.py: those of
+many pictures as a dataset.
 
 A label is what lies at the center of its pixel: nothing but coverage is averaged over a pixel, and two labels of one pixel are
 of the same point. Rejected: labels made of the passes that a renderer writes (float32, indices shared by instances, no

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..image import GEOMETRY_PASSES, LIGHT_PASSES
 from ..pinhole import Pinhole
-from .scene import Mesh, Object, Scene, Spheres, ies, placing
+from .scene import Mesh, Object, Scene, Spheres, fields, ies
 from .scene.colors import TEXELS, WHITE
 from .scene.film import FILTERS
 from .scene.lamps import RAYS, Lamp, World
@@ -683,7 +683,7 @@ def kinds(names: frozenset[str]) -> int:
 def _described_world(world: World, images: Mapping[str, int]) -> _World:
     described = _World(image=-1 if world.image is None else images[world.image], closest=world.closest)
     described.radiance[:] = world.radiance
-    described.to_image[:] = tuple(np.column_stack([placing.rotated(world.rotation), np.zeros(3)]).ravel())
+    described.to_image[:] = tuple(np.column_stack([fields.rotated(world.rotation), np.zeros(3)]).ravel())
     return described
 
 

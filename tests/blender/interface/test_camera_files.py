@@ -167,7 +167,7 @@ def test_a_flight_shows_the_picture_of_each_frame(scene, tmp_path, first, start)
 def test_pictures_that_a_flight_can_not_show_are_told(scene, tmp_path, capfd, names, lens, sentence):
     assert not flight(tmp_path, names, lens).data.background_images
     assert sentence in capfd.readouterr().out
-    assert not [image for image in bpy.data.images if image.source == "SEQUENCE"]
+    assert not [image for image in bpy.data.images if image.source == "SEQUENCE"] and not bpy.data.movieclips
 
 
 def test_no_file_makes_blender_open_a_picture_that_is_elsewhere(scene, tmp_path):
@@ -320,48 +320,127 @@ def test_a_dropped_file_goes_to_the_import(registered_addon):
     assert not {".glb", ".gltf", ".usd"} & {*handler.bl_file_extensions.split(";")}
 
 
-def test_a_photograph_is_shown_without_its_lens_and_fits_the_scene_to_its_corners(scene, tmp_path):
-    """Known points, drawn as blobs where the lens shows them: in the background they lie where the pinhole has them."""
-    lens = "640 360 500 510 310 190 -0.12 0.03 0.002 -0.003"
-    (tmp_path / "cameras.txt").write_text(f"1 OPENCV {lens}\n")
-    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 photo_0001.png\n\n")
-    (camera,) = formats.read(tmp_path)
-    pinhole = camera.pinhole
-    column, row = (each.ravel() for each in np.meshgrid(np.linspace(25, 615, 7), np.linspace(25, 335, 5)))
-    points = np.stack([(column - 310) / 500, (row - 190) / 510], axis=-1)
-    places = camera.lens.distort(points) * [500, 510] + [310, 190]
-    assert np.abs(places - np.stack([column, row], axis=-1)).max() > 5, "a lens that nobody sees"
+COLUMNS, ROWS = (each.ravel() for each in np.meshgrid(np.linspace(25, 615, 7), np.linspace(25, 335, 5)))
+"""Places in a picture of 640 × 360 at which known points are, from its upper left corner."""
+
+
+def write_photographs(folder, names):
+    """A COLMAP model of photographs with a lens, which show a blob of light at each of the points; its cameras.
+
+    Each is brighter in green by a tenth than the one before.
+    """
+    (folder / "cameras.txt").write_text("1 OPENCV 640 360 500 510 310 190 -0.12 0.03 0.002 -0.003\n")
+    lines = [f"{i} 1 0 0 0 {i} 0 0 1 {name}\n\n" for i, name in enumerate(names, 1)]
+    (folder / "images.txt").write_text("".join(lines))
+    lens = formats.read(folder)[0].lens
+    points = np.stack([(COLUMNS - 310) / 500, (ROWS - 190) / 510], axis=-1)
+    places = lens.distort(points) * [500, 510] + [310, 190]
+    assert np.abs(places - np.stack([COLUMNS, ROWS], axis=-1)).max() > 5, "a lens that nobody sees"
     across, down = np.meshgrid(np.arange(640) + 0.5, np.arange(360) + 0.5)
     blobs = sum(np.exp(-((across - x) ** 2 + (down - y) ** 2) / 18) for x, y in places)
-    image = bpy.data.images.new("made", 640, 360, float_buffer=True)
-    image.colorspace_settings.name = "Non-Color"
-    image.pixels.foreach_set(np.repeat(blobs[::-1, :, None], 4, axis=2).astype(np.float32).ravel())
-    image.filepath_raw, image.file_format = str(tmp_path / "photo_0001.exr"), "OPEN_EXR"
-    image.save()
-    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 photo_0001.exr\n\n")
+    for i, name in enumerate(names):
+        image = bpy.data.images.new("made", 640, 360, float_buffer=True)
+        image.colorspace_settings.name = "Non-Color"
+        pixels = np.repeat(blobs[::-1, :, None], 4, axis=2)
+        pixels[..., 1], pixels[..., 3] = 0.1 * i, 1
+        image.pixels.foreach_set(pixels.astype(np.float32).ravel())
+        image.filepath_raw, image.file_format = str(folder / name), "OPEN_EXR"
+        image.save()
+        bpy.data.images.remove(image)
+    return formats.read(folder)
+
+
+def pixels_of(image):
+    """The colors, rows from the top."""
+    width, height = image.size
+    return np.array(image.pixels[:]).reshape(height, width, 4)[::-1]
+
+
+def worst_of_blobs(pixels):
+    """The distance from its point of the blob that is farthest from it, in pixels of 640 × 360."""
+    height, width = pixels.shape
+    across, down = np.meshgrid((np.arange(width) + 0.5) * 640 / width, (np.arange(height) + 0.5) * 360 / height)
+    errors = []
+    for x, y in zip(COLUMNS, ROWS, strict=True):
+        weight = pixels * (np.hypot(across - x, down - y) < 12)
+        errors.append(math.hypot((weight * across).sum() / weight.sum() - x, (weight * down).sum() / weight.sum() - y))
+    return max(errors)
+
+
+def test_a_photograph_is_shown_without_its_lens_and_fits_the_scene_to_its_corners(scene, tmp_path):
+    """Known points, drawn as blobs where the lens shows them: in the background they lie where the pinhole has them."""
+    (camera,) = write_photographs(tmp_path, ["photo_0001.exr"])
     assert import_(tmp_path, set_size=True) == {"FINISHED"}
     (block,) = bpy.data.collections[tmp_path.name].objects
     (background,) = block.data.background_images
-    background_image = background.image
-    width, height = background_image.size
-    assert width / height == pytest.approx(640 / 360, rel=1e-4) and background_image.packed_file
-    pixels = np.array(background_image.pixels[:]).reshape(height, width, 4)[::-1, :, 0]
-    across, down = np.meshgrid((np.arange(width) + 0.5) * 640 / width, (np.arange(height) + 0.5) * 360 / height)
-    errors = []
-    for x, y in zip(column, row, strict=True):
-        weight = pixels * (np.hypot(across - x, down - y) < 12)
-        errors.append(math.hypot((weight * across).sum() / weight.sum() - x, (weight * down).sum() / weight.sum() - y))
-    assert max(errors) < 0.1, f"{max(errors):.3f} pixels, of which the blobs' own distortion is a part"
-    assert_same(cameras.read(block, scene), pinhole, ((0, 0, 4), (1, 2, 8), (-2, 1, 8)))
+    width, height = background.image.size
+    assert width / height == pytest.approx(640 / 360, rel=1e-4) and background.image.packed_file
+    worst = worst_of_blobs(pixels_of(background.image)[..., 0])
+    assert worst < 0.1, f"{worst:.3f} pixels, of which the blobs' own distortion is a part"
+    assert_same(cameras.read(block, scene), camera.pinhole, ((0, 0, 4), (1, 2, 8), (-2, 1, 8)))
 
 
-def test_a_photograph_of_another_size_than_its_lens_is_not_shown_and_told(scene, tmp_path, capfd):
+@pytest.fixture
+def undistorted_frame(scene, tmp_path):
+    """A function of a movie clip and a frame: the colors that a strip of it shows, undistorted as behind a camera."""
+
+    def frame_of(clip, number):
+        editor = scene.sequence_editor_create()
+        strips = editor.strips if hasattr(editor, "strips") else editor.sequences
+        for strip in list(strips):
+            strips.remove(strip)
+        strips.new_clip("clip", clip, 1, clip.frame_start).undistort = True
+        scene.frame_set(number)
+        scene.view_settings.view_transform, scene.render.image_settings.file_format = "Raw", "OPEN_EXR"
+        scene.render.filepath = str(tmp_path / f"shown_{number}.exr")
+        bpy.ops.render.render(write_still=True)
+        return pixels_of(bpy.data.images.load(scene.render.filepath))
+
+    return frame_of
+
+
+def test_a_flight_shows_the_photograph_of_each_frame_without_its_lens(scene, tmp_path, undistorted_frame):
+    write_photographs(tmp_path, [f"photo_{number:04}.exr" for number in (7, 8, 9)])
+    scene.frame_start = 101
+    assert import_(tmp_path, set_size=True, import_as="FLIGHT") == {"FINISHED"}
+    (block,) = imported(tmp_path.name)
+    (background,) = block.data.background_images
+    assert background.source == "MOVIE_CLIP" and background.clip_user.use_render_undistorted
+    assert block.data.show_background_images and background.clip.frame_start == 101
+    greens = []
+    for frame in (101, 103):
+        pixels = undistorted_frame(background.clip, frame)
+        worst = worst_of_blobs(pixels[..., 0])
+        assert worst < 0.1, f"{worst:.3f} pixels, of which Blender's own 0.04 are a part"
+        greens.append(pixels[180, 320, 1])
+    assert greens[0] < 0.01 and greens[1] > 0.1
+    background.clip.tracking.camera.brown_p1 *= -1
+    clip = background.clip.copy()  # the other's frames are kept
+    assert worst_of_blobs(undistorted_frame(clip, 101)[..., 0]) > 0.1
+
+
+@pytest.mark.parametrize(
+    "other", ["OPENCV_FISHEYE 640 360 500 510 310 190 0.1 0 0 0", "OPENCV 640 360 501 510 310 190 -0.1 0 0 0"]
+)
+def test_a_flight_whose_lens_blender_has_not_is_told(scene, tmp_path, capfd, other):
+    names = [f"photo_{number:04}.exr" for number in (7, 8)]
+    write_photographs(tmp_path, names)
+    lens = "1 OPENCV 640 360 500 510 310 190 -0.1 0 0 0\n"
+    (tmp_path / "cameras.txt").write_text(lens + f"2 {other}\n")
+    (tmp_path / "images.txt").write_text("".join(f"{i} 1 0 0 0 {i} 0 0 {3 - i} {name}\n\n" for i, name in enumerate(names, 1)))
+    assert import_(tmp_path, set_size=True, import_as="FLIGHT") == {"FINISHED"}
+    assert not imported(tmp_path.name)[0].data.background_images and not bpy.data.movieclips
+    assert "viewcam camera --undistort" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("import_as", ["EACH", "FLIGHT"])
+def test_a_photograph_of_another_size_than_its_lens_is_not_shown_and_told(scene, tmp_path, capfd, import_as):
     (tmp_path / "cameras.txt").write_text("1 SIMPLE_RADIAL 640 360 500 310 190 -0.1\n")
-    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n")
-    write_picture(tmp_path / "a.png")
-    assert import_(tmp_path, set_size=True) == {"FINISHED"}
-    (block,) = bpy.data.collections[tmp_path.name].objects
-    assert not block.data.background_images
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a_1.png\n\n")
+    write_picture(tmp_path / "a_1.png")
+    assert import_(tmp_path, set_size=True, import_as=import_as) == {"FINISHED"}
+    (block,) = imported(tmp_path.name)
+    assert not block.data.background_images and not bpy.data.movieclips
     assert "8 × 4" in capfd.readouterr().out
 
 

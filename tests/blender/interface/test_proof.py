@@ -194,7 +194,7 @@ def test_the_first_line_says_it_in_words(result, words):
 @pytest.mark.parametrize("width", [150, 202, 260, 600])
 def test_the_green_line_is_read_whole_in_a_sidebar_of_any_width(posed_camera, monkeypatch, width):
     """At the mean width of a character, by which all sentences of the panel are wrapped."""
-    monkeypatch.setattr(proof.icons, "mark", lambda answer: 7)
+    monkeypatch.setattr(proof, "mark", lambda answer: 7)
     layout, column = MagicMock(), MagicMock()
     layout.column.return_value = column
     context = SimpleNamespace(

@@ -17,9 +17,8 @@ pytest.importorskip("distributed")
 
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
 from viewcam_addon.jobs import cluster, one, run
-from viewcam_addon.jobs.folder import Folder, Outputs
+from viewcam_addon.jobs.folder import Folder, Outputs, settings_hash
 from viewcam_addon.jobs.job import Job
-from viewcam_addon.jobs.settings import settings_hash
 
 pytestmark = [
     pytest.mark.exhaustive,

@@ -13,7 +13,7 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon import image
 from viewcam_addon.blender import versions
 from viewcam_addon.blender.jobs import renderer as jobs
-from viewcam_addon.blender.rendering import tracing
+from viewcam_addon.blender.rendering import engine
 from viewcam_addon.image import SETTINGS
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render as renders
@@ -269,7 +269,7 @@ def test_stereoscopy_is_one_sentence_and_no_file(lit, write):
 
 @pytest.mark.parametrize("after", [0, 1])
 def test_a_bug_is_one_sentence_and_no_file_even_when_part_of_the_picture_is_there(lit, write, monkeypatch, capfd, after):
-    real = tracing.bands
+    real = engine.bands
 
     def broken(*arguments):
         bands = real(*arguments)
@@ -277,7 +277,7 @@ def test_a_bug_is_one_sentence_and_no_file_even_when_part_of_the_picture_is_ther
             yield next(bands)
         raise KeyError("gone")
 
-    monkeypatch.setattr(tracing, "bands", broken)
+    monkeypatch.setattr(engine, "bands", broken)
     fails(write, "this is a bug, please report it (KeyError at test_engine.py:")
     assert "Traceback" not in "".join(capfd.readouterr())
 

@@ -19,7 +19,7 @@ from .. import datablocks
 from . import panel_rows
 from .background import Background, Cancels, StartsForCamera
 from .background_batch import BackgroundBatch, shot
-from .panel_places import BelowProperties, BelowSidebar, SubPanel
+from .panel_rows import BelowProperties, BelowSidebar, SubPanel
 
 _SUMMARY = "summary.json"
 

@@ -24,7 +24,7 @@ from ...pinhole import Pinhole, Triple
 from .. import camera as cameras
 from .. import datablocks, preferences
 from . import panel_rows
-from .panel_places import BelowProperties, BelowSidebar, SubPanel
+from .panel_rows import BelowProperties, BelowSidebar, SubPanel
 
 _NAMES = ("u", "v", "w")
 _LETTER_SIZE = 16  # points

@@ -20,7 +20,7 @@ from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import causes, datablocks, findings, hold, preferences, targets
 from . import baking, clipboard, converting, dragging, panel_rows, presets, readouts, scene_cameras
-from .panel_places import BelowProperties, BelowSidebar, CameraPanel, InProperties, InSidebar, SubPanel
+from .panel_rows import BelowProperties, BelowSidebar, CameraPanel, InProperties, InSidebar, SubPanel
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,48 @@
-"""Rows of a panel: a name beside what it names, or above it where an artist has made the panel too narrow for both."""
+"""The places that panels share, of which a camera's panel has two, among its data's properties and in the sidebar; and rows,
+a name beside what it names, or above it where an artist has made the panel too narrow for both."""
+
+from typing import ClassVar
 
 import bpy
 
+from .. import datablocks
 from . import readouts
+
+
+class CameraPanel:
+    """A panel that is there while there is a camera that it can be about."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return datablocks.camera_in(context) is not None
+
+
+class SubPanel(CameraPanel):
+    """One that is closed at first, below the panel Virtual Pinhole."""
+
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+    bl_order = 1  # after Proof, which is open
+
+
+class InProperties:
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+
+
+class InSidebar:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Pinhole"
+
+
+class BelowProperties(InProperties):
+    bl_parent_id = "VIEWCAM_PT_data"
+
+
+class BelowSidebar(InSidebar):
+    bl_parent_id = "VIEWCAM_PT_sidebar"
+
 
 _NARROW = 250  # pixels
 _LABEL = 0.4  # of a row, as Blender splits it
@@ -141,7 +181,7 @@ def described(
 
 
 def sentence(column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str | int = "NONE") -> None:
-    """A sentence in lines that fit, never translated here. icon : one of Blender's by its name, or one of icons.py."""
+    """A sentence in lines that fit, never translated here. icon : one of Blender's by its name, or one of proof.mark."""
     below = {} if icon == "NONE" else {"icon": "BLANK1"}
     first = {"icon_value": icon} if isinstance(icon, int) else {"icon": icon}
     for i, line in enumerate(readouts.wrapped(text, _width(context) - _BESIDE_TEXT)):

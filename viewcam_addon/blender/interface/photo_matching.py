@@ -25,7 +25,7 @@ from .. import camera as cameras
 from .. import datablocks, targets
 from . import kept, overlay, panel_rows, readouts
 from .operators import CameraOperator
-from .panel_places import BelowSidebar, SubPanel
+from .panel_rows import BelowSidebar, SubPanel
 
 EDGES, RECTANGLE, POINTS = "EDGES", "RECTANGLE", "POINTS"
 _AXES = "XYZ"

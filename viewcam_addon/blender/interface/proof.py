@@ -5,18 +5,68 @@ Blender: nothing of it is in the file but, while an Image Editor shows it, its p
 playback), Cancel, another file, turning the add-on off and leaving Blender end a comparison without a trace.
 """
 
+import itertools
 from pathlib import Path
 
 import bpy
+import bpy.utils.previews
+import numpy as np
 
-from ...comparison.answer import DIFFERENT, SAME
+from ...comparison.answer import DIFFERENT, SAME, SAME_BUT
 from ...errors import InputError
 from .. import datablocks, preferences
 from ..render_settings import LEVELS
-from . import icons, panel_rows, proof_image, swipe
+from . import panel_rows, proof_image, swipe
 from .background import Background, Cancels, StartsForCamera
 from .comparing import Outcome, RunningComparison
-from .panel_places import BelowProperties, BelowSidebar, CameraPanel
+from .panel_rows import BelowProperties, BelowSidebar, CameraPanel
+
+_SIZE = 32
+_THICK = 2.6
+_WAVE = [(5.0 + 2.0 * i, 3.0 * float(np.sin(i * np.pi / 5.5))) for i in range(12)]
+# The color of each answer, and its strokes: corners in pixels from the lower left.
+_MARKS = {
+    SAME: ((0.24, 0.78, 0.36), [[(5.0, 16.0), (12.5, 8.5), (27.0, 24.0)]]),
+    SAME_BUT: ((0.95, 0.65, 0.15), [[(x, y + middle) for x, y in _WAVE] for middle in (11.0, 21.0)]),
+    DIFFERENT: ((0.93, 0.30, 0.26), [[(7.0, 7.0), (25.0, 25.0)], [(7.0, 25.0), (25.0, 7.0)]]),
+}
+
+_previews = None
+
+
+def mark(answer: str) -> int:
+    """The number of an answer's icon, for `icon_value`: a tick, waves or a cross, in colors that Blender's icons lack."""
+    global _previews
+    if _previews is None:
+        _previews = bpy.utils.previews.new()
+    if answer not in _previews:
+        preview = _previews.new(answer)
+        preview.icon_size = _SIZE, _SIZE
+        preview.icon_pixels_float.foreach_set(_drawn(*_MARKS[answer]).ravel())
+    return _previews[answer].icon_id
+
+
+def forget_marks() -> None:
+    """Give them back to Blender."""
+    global _previews
+    if _previews is not None:
+        bpy.utils.previews.remove(_previews)
+    _previews = None
+
+
+def _drawn(color: tuple[float, float, float], strokes: list[list[tuple[float, float]]]) -> np.ndarray:
+    """(size, size, 4) float32, with soft edges."""
+    pixels = np.stack(np.meshgrid(np.arange(_SIZE), np.arange(_SIZE)), axis=-1) + 0.5
+    distance = np.full((_SIZE, _SIZE), np.inf)
+    for start, end in (pair for corners in strokes for pair in itertools.pairwise(corners)):
+        along = np.subtract(end, start)
+        share = np.clip((pixels - start) @ along / (along @ along), 0.0, 1.0)
+        distance = np.minimum(distance, np.linalg.norm(pixels - start - share[..., None] * along, axis=-1))
+    drawn = np.empty((_SIZE, _SIZE, 4), np.float32)
+    drawn[..., 3] = np.clip(_THICK + 0.5 - distance, 0.0, 1.0)
+    drawn[..., :3] = np.array(color) * drawn[..., 3:]  # as Blender has it where a picture is see-through
+    return drawn
+
 
 _SECONDS = 0.2  # between two looks
 _MOST_LACKING = 4  # objects that the panel names
@@ -250,7 +300,7 @@ def _draw_progress(layout: bpy.types.UILayout, timed: bool = True) -> None:
 def _draw_outcome(
     layout: bpy.types.UILayout, outcome: Outcome, camera_object: bpy.types.Object, context: bpy.types.Context
 ) -> None:
-    lines = [(outcome.headline or outcome.verdict, icons.mark(outcome.answer) if outcome.answer else "ERROR")]
+    lines = [(outcome.headline or outcome.verdict, mark(outcome.answer) if outcome.answer else "ERROR")]
     if outcome.answer == DIFFERENT:
         rest = outcome.verdict.partition(": ")[2]
         lines.append((rest[:1].upper() + rest[1:], "BLANK1"))
@@ -337,7 +387,7 @@ def register() -> None:
 def unregister() -> None:
     background.unregister()
     proof_image.unregister()
-    icons.forget()
+    forget_marks()
     _stop_timer()  # Blender takes a modal operator that is unregistered away without its cancel()
     bpy.types.STATUSBAR_HT_header.remove(_draw_status_bar)
     bpy.types.TOPBAR_MT_render.remove(_draw_render_menu)

@@ -13,7 +13,7 @@ from ...errors import InputError
 from .. import camera as cameras
 from .. import datablocks, own_picture, preferences, storage
 from . import file_menu, panel_rows, viewport
-from .panel_places import BelowProperties, BelowSidebar, SubPanel
+from .panel_rows import BelowProperties, BelowSidebar, SubPanel
 
 _NAME = "Virtual Pinhole"
 _FROM = (7.0, -7.0, 5.0)  # a new camera's eye, from the point that it looks at

@@ -10,8 +10,8 @@ The photograph of a camera with a lens is shown without it: as an undistorted co
 Rejected: a movie clip with Blender's own tracking camera, which undistorts to 0.03 pixels, but has no fisheyes, and takes the
 number in a file's name for a frame: at another frame of the scene it shows another camera's photograph.
 
-The pictures of a flight are shown frame by frame, if their numbers go with its frames; none is copied, so that those of a lens
-are not shown.
+The pictures of a flight are shown frame by frame, if their numbers go with its frames; none is copied. Those of one lens are
+such a movie clip, if Blender's tracking camera has the lens.
 
 A flight is plain keyframes of location, rotation and lens, as Bake writes them. Rejected: curves of the four values, which hold
 eye and look-at in float32 each, and the direction between them in fewer digits.
@@ -29,8 +29,10 @@ import numpy as np
 
 from ... import intrinsics, rotation
 from ...cameras import Camera, undistortion
+from ...cameras.distortion import Lens
 from ...cameras.naming import picture_of
 from ...errors import InputError
+from ...pinhole import ViewPlane
 from .. import camera as cameras
 from .. import datablocks, picture, pose, versions
 from ..temporary_settings import Overrides
@@ -200,15 +202,12 @@ class _CameraImport:
             image = self._undistorted(camera, image)
         if image is None:
             return False
-        self._put_behind(block, camera, image)
+        self._put_behind(block, camera).image = image
         return True
 
     def _show_sequence(self, block: bpy.types.Object, cameras: Sequence[Camera], at: Sequence[float], folder: Path) -> int:
         """Give a camera that flies all pictures as one background; returns how many these are."""
         named = [camera for camera in cameras if camera.image is not None]
-        if any(camera.lens is not None for camera in named):
-            self._note(["A flight does not show pictures with a lens: import what viewcam camera --undistort writes of them"])
-            return 0
         paths = [path for camera in named if (path := picture_of(camera, folder)) is not None]
         self._note_missing(len(named) - len(paths), len(named))
         if len(paths) < len(cameras):
@@ -223,19 +222,49 @@ class _CameraImport:
                 ["The numbers of the pictures do not go with the frames, so that they are not shown: import a camera each"]
             )
             return 0
+        if any(camera.lens is not None for camera in named):
+            return len(paths) if self._show_clip(block, cameras, int(frames[0]), paths[0]) else 0
         try:
             image = bpy.data.images.load(str(paths[0]))
         except RuntimeError:  # no picture by its content
             return 0
         self._overrides.afterwards(bpy.data.batch_remove, [image])
         image.source = "SEQUENCE"
-        user = self._put_behind(block, cameras[0], image).image_user
+        background = self._put_behind(block, cameras[0])
+        background.image, user = image, background.image_user
         user.frame_start, user.frame_offset, user.frame_duration = int(frames[0]), numbers[0] - 1, numbers[-1] - numbers[0] + 1
         return len(paths)
 
-    def _put_behind(self, block: bpy.types.Object, camera: Camera, image: bpy.types.Image) -> bpy.types.CameraBackgroundImage:
+    def _show_clip(self, block: bpy.types.Object, cameras: Sequence[Camera], start: int, path: Path) -> bool:
+        """Put the sequence behind a camera that flies, undistorted by Blender, where its lens is one that Blender has."""
+        lens, plane = cameras[0].lens, cameras[0].pinhole.plane
+        values = None if lens is None else _of_tracking(lens, plane)
+        if values is None or any((camera.lens, camera.pinhole.plane) != (lens, plane) for camera in cameras):
+            self._note(
+                [
+                    "A flight shows pictures with a lens if it is one lens, k1 … k4, p1 and p2, at one focal length: "
+                    "import what viewcam camera --undistort writes of them"
+                ]
+            )
+            return False
+        try:
+            clip = bpy.data.movieclips.load(str(path))
+        except RuntimeError:  # no picture by its content
+            return False
+        if tuple(clip.size) != (plane.width, plane.height):
+            self._note([_of_another_size(cameras[0].name, clip.size, plane)])
+            bpy.data.movieclips.remove(clip)
+            return False
+        self._overrides.afterwards(bpy.data.batch_remove, [clip])
+        clip.frame_start = start
+        for name, value in values.items():
+            setattr(clip.tracking.camera, name, value)
+        background = self._put_behind(block, cameras[0])
+        background.source, background.clip, background.clip_user.use_render_undistorted = "MOVIE_CLIP", clip, True
+        return True
+
+    def _put_behind(self, block: bpy.types.Object, camera: Camera) -> bpy.types.CameraBackgroundImage:
         background = block.data.background_images.new()
-        background.image = image
         # As wide as the view, as the camera is (picture.py); what is higher is cut off in the middle.
         width, height = datablocks.frame_of(self._scene).size
         aspect = camera.pinhole.distance[1] / camera.pinhole.distance[0]
@@ -249,10 +278,7 @@ class _CameraImport:
         """A copy of the photograph as the pinhole sees it; None where it is of another size than its camera."""
         plane, lens = camera.pinhole.plane, camera.lens
         if tuple(photograph.size) != (plane.width, plane.height):
-            size = " × ".join(map(str, photograph.size))
-            self._note(
-                [f"{camera.name}: its picture has {size} pixels and its camera {plane.width} × {plane.height}: it is not shown"]
-            )
+            self._note([_of_another_size(camera.name, photograph.size, plane)])
             return None
         pixels = np.empty((plane.height, plane.width, 4), np.float32)
         photograph.pixels.foreach_get(pixels.ravel())
@@ -284,3 +310,28 @@ class _CameraImport:
         if image not in known:
             self._overrides.afterwards(bpy.data.batch_remove, [image])
         return image
+
+
+def _of_another_size(name: str, size: Sequence[int], plane: ViewPlane) -> str:
+    pixels = " × ".join(map(str, size))
+    return f"{name}: its picture has {pixels} pixels and its camera {plane.width} × {plane.height}: it is not shown"
+
+
+def _of_tracking(lens: Lens, plane: ViewPlane) -> dict[str, str | float | tuple[float, float]] | None:
+    """The values of Blender's tracking camera with this lens, in the order in which they are set; None where it has no such.
+
+    Its y points up, and it counts from the center of the first pixel. Measured: what it undistorts is within 0.04 pixels.
+    """
+    if lens != Lens(lens.terms, radial=lens.radial, tangential=lens.tangential) or len(lens.radial) > 4:
+        return None
+    (p1, p2), (d_x, d_y), (c_x, c_y) = lens.tangential, plane.distance, plane.principal_point
+    return {
+        "units": "PIXELS",
+        "pixel_aspect": d_y / d_x,
+        "focal_length_pixels": d_x,
+        "principal_point_pixels": (c_x - 0.5, c_y - 0.5),
+        "distortion_model": "BROWN",
+        **{f"brown_k{i}": k for i, k in enumerate(lens.radial, 1)},
+        "brown_p1": p2,
+        "brown_p2": -p1,
+    }

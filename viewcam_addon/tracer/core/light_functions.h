@@ -1,6 +1,6 @@
 // What stands behind the part of the C interface that is about light.
 #pragma once
-#include "capi_light.h"
+#include "capi.h"
 #include "integrators/adaptive.h"
 
 namespace viewcam::VIEWCAM_ISA {

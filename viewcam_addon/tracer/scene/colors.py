@@ -27,7 +27,7 @@ def radiance(name: str, values: object) -> tuple[float, float, float]:
 
 RGBE = np.dtype(np.uint32)
 TEXELS = (*map(np.dtype, (np.float32, np.float16, np.uint8, np.uint16)), RGBE)
-"""The types of a `Picture`'s pixels, as the core counts it (capi_light.h)."""
+"""The types of a `Picture`'s pixels, as the core counts it (capi.h)."""
 _ROWS = 1 << 20  # numbers that are looked at together: larger arrays would not stay in a processor's cache
 
 

@@ -16,7 +16,6 @@
 #include "shadow_terminator.h"
 #include "sheen.h"
 #include "specular.h"
-#include "translucent.h"
 
 namespace viewcam::VIEWCAM_ISA {
 

@@ -14,7 +14,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "../capi_light.h"
+#include "../capi.h"
 #include "../math/simd.h"
 
 namespace viewcam::VIEWCAM_ISA {

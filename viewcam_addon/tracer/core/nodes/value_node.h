@@ -7,14 +7,13 @@
 #include <concepts>
 #include <variant>
 
-#include "bump.h"
 #include "color.h"
 #include "curves.h"
 #include "geometry.h"
 #include "ies.h"
 #include "image.h"
 #include "light_path.h"
-#include "normal_map.h"
+#include "normals.h"
 #include "procedural.h"
 #include "spectrum.h"
 #include "voronoi.h"
