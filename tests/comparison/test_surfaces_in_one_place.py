@@ -180,7 +180,7 @@ def one_of(where):
 
 
 def through_another_camera():
-    """What a marker's camera sees that stands a hundredth of a unit aside."""
+    """The picture of a marker's camera that stands a hundredth of a unit aside."""
     return rendered(Tracer(replace(a_scene(), camera=replace(CAMERA, eye=(0.31, -4.0, 3.1))), 1))
 
 
