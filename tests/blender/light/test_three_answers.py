@@ -51,7 +51,7 @@ def subsurface():
 
 
 def glow_below_a_coat():
-    """Which Cycles dims where a path goes on, and does not where it ends."""
+    """A glow that Cycles dims where a path goes on, and does not where it ends."""
     shader = bpy.data.materials["Skin"].node_tree.nodes["Principled BSDF"]
     shader.inputs["Emission Strength"].default_value, shader.inputs["Sheen Weight"].default_value = 5.0, 1.0
     shader.inputs["Coat Weight"].default_value = 1.0
