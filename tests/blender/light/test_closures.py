@@ -218,7 +218,7 @@ def test_what_is_lit_from_behind_is_cycles(patches):
 
 
 def test_what_shines_below_a_coat_is_cycles(patches, monkeypatch):
-    """The camera's view of it: what it lights has a stand-in. Without the sun, since Cycles would ask it or the glow by chance."""
+    """The camera's view of it: what it lights has a stand-in. Without the sun, since Cycles would ask either by chance."""
     monkeypatch.setattr(Tree, "_with_glow_on_top", lambda _tree, _output, shader: shader)
     shining = {"Base Color": COLOR, "Emission Color": COLOR, "Emission Strength": 0.7}
     shaders = [
