@@ -17,7 +17,7 @@ Source: OpenCV's modules/core/src/persistence_yml.cpp and calib3d's projectPoint
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -137,7 +137,8 @@ def rotation_vector(turn: Sequence[Sequence[float]]) -> tuple[float, float, floa
     w, *axis = axes.quaternion(turn)
     sine = math.hypot(*axis)
     angle = 2 * math.atan2(sine, w)
-    return tuple(angle * part / sine if sine else 0.0 for part in axis)
+    x, y, z = (angle * part / sine if sine else 0.0 for part in axis)
+    return x, y, z
 
 
 def of_rotation_vector(vector: Sequence[float], what: str) -> np.ndarray:
@@ -194,7 +195,7 @@ def _is_camera(values: Mapping[str, Any]) -> bool:
         return False
 
 
-def _cameras_in(source: Source):
+def _cameras_in(source: Source) -> Iterator[tuple[str, dict[str, Any]]]:
     """(name, values by plain name) of each camera in the file."""
     document = _document(source)
     by_name = _by_name(document)
@@ -448,7 +449,8 @@ def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple
         numbers = _numbers(f"the size of {what}", both)
         if len(numbers) != 2:
             raise InputError(f"the size of {what} has {len(numbers)} numbers: give the width and the height")
-        return tuple(pixels(f"the size of {what}", number) for number in numbers), True
+        across, up = (pixels(f"the size of {what}", number) for number in numbers)
+        return (across, up), True
     return options.size_or_refuse(what), False
 
 

@@ -240,7 +240,8 @@ def _contour_errors(sides: Sides, rounding: Array, shift: float, across: Sequenc
 def _mean_at(values: Array, places: Sequence[tuple[int, int]]) -> Array:
     """(height − 4, width − 4, channels): of each inner pixel, the mean of the values at so many rows and columns from it."""
     height, width = values.shape[:2]
-    return sum(values[2 + i : height - 2 + i, 2 + j : width - 2 + j] for i, j in places) / len(places)
+    total: Array = np.sum([values[2 + i : height - 2 + i, 2 + j : width - 2 + j] for i, j in places], axis=0)
+    return total / len(places)
 
 
 def _errors(differences: Array, variances: Array) -> Array:
@@ -260,14 +261,14 @@ def _hypothesis_test(sides: Sides, size: int, errors: Array, allowed: Array, fin
         _extent(length, max(size, WHOLE), i) for length, i in zip(sides.reference.shape[:2], (row, column), strict=True)
     )
     there = (slice(bottom, top + 1), slice(left, right + 1), channel)
-    means = (float(side[there].mean()) for side in (sides.reference, sides.test))
+    reference, test = (float(side[there].mean()) for side in (sides.reference, sides.test))
     name = CHANNEL_NAMES[channel] if errors.shape[2] == len(CHANNEL_NAMES) else ""
     return HypothesisTest(
         size,
         errors,
         allowed,
         float(allowed[index]),
-        Place((left, right), (bottom, top), name, *means, float(errors[index])),
+        Place((left, right), (bottom, top), name, reference, test, float(errors[index])),
         findable,
     )
 

@@ -12,7 +12,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +87,7 @@ class Field:
             self.fail(f"is {_quoted(self.value)}: give a whole number of at least {least}")
         return self.value
 
-    def vector(self, count: int) -> tuple[float, ...]:
+    def vector(self, count: int) -> tuple[Any, ...]:
         if not isinstance(self.value, list) or len(self.value) != count or not all(map(_is_number, self.value)):
             self.fail(f"is {_quoted(self.value)}: give a list of {count} finite numbers")
         return tuple(map(float, self.value))
