@@ -24,6 +24,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -98,7 +99,7 @@ class KnownEdge:
 
 
 def from_edges(
-    edges: Sequence[tuple[str, ArrayLike, ArrayLike]],
+    edges: Sequence[tuple[str, Any, Any]],
     like: Pinhole,
     precision: float = 1.0,
     distance: float | None = None,
@@ -151,7 +152,7 @@ def _known_distance(distance: float | None) -> float | None:
     return distance
 
 
-def _eye_of(known: KnownEdge, edges: Sequence[tuple[str, ArrayLike, ArrayLike]], solution: Solution, like: Pinhole) -> Array:
+def _eye_of(known: KnownEdge, edges: Sequence[tuple[str, Any, Any]], solution: Solution, like: Pinhole) -> Array:
     """The eye of the camera that sees an edge of known length begin in a known place."""
     length = checks.number("length", known.length)
     if length <= 0:
@@ -219,10 +220,10 @@ def from_rectangle(
     """
     if len(axes) != 2 or any(axis not in _AXES for axis in axes) or axes[0] == axes[1]:
         raise InputError(f"a rectangle's sides run along {axes!r}: name two axes, such as XY")
-    sides = checks.vector("sides", sides, 2)
-    if min(sides) <= 0.0:
-        raise InputError(f"a rectangle has sides of {sides[0]:g} and {sides[1]:g}: give lengths above 0")
-    first, second = (length * np.eye(3)[_AXES.index(axis)] for length, axis in zip(sides, axes, strict=True))
+    lengths = checks.vector("sides", sides, 2)
+    if min(lengths) <= 0.0:
+        raise InputError(f"a rectangle has sides of {lengths[0]:g} and {lengths[1]:g}: give lengths above 0")
+    first, second = (length * np.eye(3)[_AXES.index(axis)] for length, axis in zip(lengths, axes, strict=True))
     places = np.array(checks.vector("origin", origin, 3)) + np.array([0 * first, first, first + second, second])
     return from_points(places, corners, like, precision, distance)
 

@@ -186,7 +186,7 @@ def _statistics(
         square = np.maximum(square, noise.tile_sums(np.broadcast_to(sides.shared, difference.shape), size))
         errors = _errors(_beyond(total, allowance), square)
         critical = np.full(errors.shape, noise.sign_critical(noise.sidak(level, errors.size)))
-        own = noise.tile_sums(light**2, size)
+        own = noise.tile_sums(np.square(light), size)
         yield size, errors, critical, findable(noise.tile_sums(light, size), allowance, square, critical, own)
 
 

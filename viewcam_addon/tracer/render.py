@@ -210,7 +210,9 @@ class Tracer:
         objects = self._scene.objects
         owners = np.repeat([placed.name for placed in objects], [len(placed.matrices) for placed in objects])
         there = [name for name in names if name in owners]
-        instances = self.hits()[1] if there else None
+        if not there:
+            return {}
+        instances = self.hits()[1]
         return {name: np.isin(instances, np.flatnonzero(owners == name)) for name in there}
 
     def closest(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray, NDArray, NDArray]:

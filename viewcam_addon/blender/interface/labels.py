@@ -131,7 +131,6 @@ class VIEWCAM_OT_cancel_labels(Cancels, bpy.types.Operator):
 
 
 class _LabelsPanel(SubPanel):
-    layout: bpy.types.UILayout
     bl_label = "Labels"
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -186,12 +186,13 @@ class _CameraImport:
         start = self._scene.frame_start
         if any(camera.time is None for camera in cameras):
             return [*cameras], [start + i for i in range(len(cameras))]
-        cameras = sorted(cameras, key=lambda camera: camera.time)
+        cameras = sorted(cameras, key=lambda camera: camera.time or 0.0)
         twice = next((camera for before, camera in itertools.pairwise(cameras) if camera.time == before.time), None)
         if twice is not None:
             raise InputError(f"two cameras have the time {twice.time!r}, {twice.name!r} one of them: import a camera each")
         render = self._scene.render
-        return cameras, [start + (camera.time - cameras[0].time) * render.fps / render.fps_base for camera in cameras]
+        times = [camera.time or 0.0 for camera in cameras]
+        return cameras, [start + (time - times[0]) * render.fps / render.fps_base for time in times]
 
     # --- Pictures
 

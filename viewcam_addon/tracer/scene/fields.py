@@ -31,7 +31,7 @@ _COPIES = 2
 class Field:
     """A value, its name as a sentence says it ("eye of the camera") and the file that it comes from."""
 
-    def __init__(self, value: object, name: str, file: str) -> None:
+    def __init__(self, value: Any, name: str, file: str) -> None:
         self.value, self.name, self.file = value, name, file
 
     def fail(self, problem: str) -> NoReturn:
@@ -93,7 +93,7 @@ class Field:
         return tuple(map(float, self.value))
 
     def array(
-        self, arrays: "Arrays | None", dtype: type, shape: tuple[int | None, ...], kept: Sequence[np.dtype] = ()
+        self, arrays: "Arrays | None", dtype: Any, shape: tuple[int | None, ...], kept: Sequence[np.dtype] = ()
     ) -> NDArray:
         """A list of lists of numbers, or {"npz": key} where `arrays` are given; None in the shape stands for any number.
 
@@ -180,7 +180,7 @@ class Arrays:
             together = size + sum(array.nbytes for array in self._taken.values())
             machine.check(f"the arrays of {self._file}", _COPIES * together, "make the scene smaller")
             with self._archive.open(member) as file:
-                return np.lib.format.read_array(file, allow_pickle=False)
+                return np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
         except (
             OSError,
             ValueError,
