@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import checks
 from .errors import InputError
-from .pinhole import Pair, Pinhole, Triple, check_distance
+from .pinhole import Pinhole, Triple, check_distance
 
 Array = NDArray[np.float64]
 
@@ -62,9 +62,9 @@ class Match:
     pinhole: Pinhole
     precision: float
     error: float
-    distance_between: Pair
+    distance_between: tuple[float, float]
     eye_error: Triple | None
-    principal_point_error: Pair | None
+    principal_point_error: tuple[float, float] | None
     pixels: dict[str, float]
 
 
@@ -200,7 +200,7 @@ def from_points(
 
 def from_rectangle(
     corners: ArrayLike,
-    sides: Pair,
+    sides: tuple[float, float],
     like: Pinhole,
     precision: float = 1.0,
     origin: Triple = (0.0, 0.0, 0.0),

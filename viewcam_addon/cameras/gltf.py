@@ -113,10 +113,12 @@ class _Worlds:
     def above(self, index: int) -> list[int]:
         """The node's parents, nearest first."""
         result: list[int] = []
-        while (index := self._parents.get(index)) is not None:
+        parent = self._parents.get(index)
+        while parent is not None:
             if len(result) > len(self._nodes):
-                raise InputError(f"node {index} is its own parent: correct its children")
-            result.append(index)
+                raise InputError(f"node {parent} is its own parent: correct its children")
+            result.append(parent)
+            parent = self._parents.get(parent)
         return result
 
     def of(self, index: int) -> np.ndarray:
@@ -178,7 +180,8 @@ def _camera(name: str, camera: Record, matrix: np.ndarray, options: Options) -> 
     width, height = size
     slope = math.tan(angle / 2)
     d_y = height / 2 / slope
-    d_x, notes = d_y / options.pixel_aspect, ()
+    d_x = d_y / options.pixel_aspect
+    notes: tuple[str, ...] = ()
     if "aspectRatio" in lens:
         aspect = lens.number("aspectRatio", least=1e-9)
         across = width / 2 / (aspect * slope)

@@ -138,7 +138,7 @@ def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Job]:
     """
     problems = Problems("the cameras")
     files: dict[str, str] = {}
-    shots = []
+    shots: list[Job] = []
     for camera, pinhole in pinholes:
         name = names.made_fit(camera)
         other = files.setdefault(names.one_file(name), camera)

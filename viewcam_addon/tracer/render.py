@@ -275,6 +275,7 @@ class Tracer:
             corners = mesh.vertices[mesh.triangles[triangle]] @ matrix[:, :3, :3].transpose(0, 2, 1) + matrix[:, None, :3, 3]
             weights = barycentric(eye + depth[here, None] * directions[here], corners)
             turned = np.stack([np.cross(matrix[:, :3, (i + 1) % 3], matrix[:, :3, (i + 2) % 3]) for i in range(3)], axis=-1)
+            assert mesh.corner_normals is not None  # else it is not smooth
             between = (weights[..., None] * mesh.corner_normals[triangle]).sum(axis=1)
             length = np.linalg.norm((turned @ between[..., None])[..., 0], axis=-1)
             most = np.linalg.norm(turned, ord=2, axis=(1, 2))

@@ -107,10 +107,10 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, file_menu.IntoScene, bpy.types.O
             else f"{len(read_cameras)} cameras"
         )
         pictures = f", {imported.pictures} with pictures" if imported.pictures else ""
-        told = f"; {len(notes)} notes" if len(notes) > 1 else "; 1 note" if notes else ""
+        noted = f"; {len(notes)} notes" if len(notes) > 1 else "; 1 note" if notes else ""
         for note in notes[:_MOST_NOTES]:
             self.report({"WARNING"}, file_menu.text(note))
-        self.report({"INFO"}, file_menu.text(f"{paths[0].name}: {what}{pictures} ({title}){more_notes}"))
+        self.report({"INFO"}, file_menu.text(f"{paths[0].name}: {what}{pictures} ({title}){noted}"))
         if notes and not bpy.app.background:
             file_menu.show(file_menu.lines_of([(note, "INFO") for note in notes]), "Imported Cameras", context)
         return {"FINISHED"}

@@ -201,7 +201,7 @@ class _MovePanel(SubPanel):
 
 _STEP = math.radians(15)  # as Blender's own view orbits by Numpad 4, 6, 8 and 2
 # The rows: label → (operator, how its button looks, the operator's properties) from left to right.
-_MOVES = {
+_MOVES: dict[str, tuple[tuple[str, dict[str, Any], dict[str, Any]], ...]] = {
     "From": (("viewcam.adopt_view", {"text": "Current View"}, {}),),
     "Look At": (
         ("viewcam.look_at_selection", {"text": "Selection"}, {}),

@@ -169,6 +169,7 @@ class Arrays:
     def _read(self, name: str) -> NDArray:
         damaged = f"{self._file}: the array {checks.quoted(name)} is damaged: export the scene again"
         member = self._members[name]
+        assert self._archive is not None and self._archive.fp is not None
         try:
             with self._archive.open(member) as file:
                 dtype, size = npy.header(file)
