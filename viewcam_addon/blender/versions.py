@@ -21,8 +21,6 @@ _LINEAR = 1  # an enum's number, as foreach_set takes it
 DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
 # Whether Cycles has one normal a vertex, and splits those at sharp edges (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
 CYCLES_HAS_VERTEX_NORMALS = bpy.app.version < (5, 1)
-# Whether meshes can keep custom normals as they are given; before, as two angles of 16 bits. Measured: 4.2, 4.5, 5.0 and 5.2.
-MESHES_KEEP_NORMALS = bpy.app.version >= (4, 5)
 
 # Whether nodes whose links go in a circle are black; before, Cycles left these links out. Measured: 4.2, 5.0 and 5.2.
 CIRCLES_ARE_BLACK = bpy.app.version >= (5, 0)
