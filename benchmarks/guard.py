@@ -45,8 +45,8 @@ _SUN = Sun("Sun", towards=(-0.8, -0.3, 0.52), irradiance=(3.0, 3.0, 3.0))
 
 
 def _ground(triangles: int, size: tuple[int, int], lamps: Sequence[Lamp] = (_SUN,)) -> Scene:
-    """A hilly ground under a low sun: the square from −1 to 1 in one mesh of about so many triangles, seen from its border, with
-    normals and UVs as artists' meshes have them. size : pixels across and down.
+    """A hilly ground under a low sun: the square from −1 to 1 in one mesh of about so many triangles, seen from its border,
+    with normals and UVs as artists' meshes have them. size : pixels across and down.
     """
     cells = max(1, round(math.sqrt(triangles / 2)))
     camera = Pinhole((0.3, -2.6, 1.9), (0, -0.05, 0), (0, 0, 1), 1.35 * size[0], *size)
