@@ -41,7 +41,7 @@ _SHORTEST, _LONGEST = 0.02, 200.0  # d of a start, of half the picture's larger 
 _LARGEST_ERROR = math.log(2.0)  # of d, as a factor: what is less certain than that is no answer
 _LARGEST_SHIFT = 0.5  # of the principal point's error, of half the picture's larger side: what is less certain is no answer
 _OPEN = 1e-13  # an eigenvalue of 7 by 7 numbers near 1 that is less than this is rounding
-# Of the coordinates' spread: what lies nearer to a plane than this is in it.
+# The share of the coordinates' spread within which a point is in a plane.
 _FLAT = 1e-6
 
 

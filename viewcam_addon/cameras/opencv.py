@@ -48,7 +48,7 @@ _DISTORTION = (
 _OTHER_DISTORTION = re.compile(r"dist(?!ance)|radial|tangential|^kc$|^[kp][1-6]$")
 _FISHEYE = re.compile(r"^(?:opencv_?)?fisheye|equidistant|kannala|^kb4?$")
 _OTHER_LENS = re.compile(r"fisheye|omni|mei|u?cm$|kb\d|spherical|ortho|fov|division|double|^ds$|theta|equirect|panoram|cylind")
-# Of what may be a pose in words that nobody knows; Kalibr's T_cam_imu is none.
+# Parts of names that may mean a pose in words that nobody knows; Kalibr's T_cam_imu is none.
 _MAY_BE_POSE = re.compile(r"pose|extrin|rotation|rot$|transf|transl|2cam|2world|toworld|tocam|w2|c2|rvec|tvec|position|quat")
 _NO_POSE = ("tcamimu", "timushift", "rectificationmatrix", "projectionmatrix", "p")
 _BLENDERS = ("matrixworld",)

@@ -38,9 +38,9 @@ SIZES = (PIXELS, 8, BLOCKS, CONTOURS, WHOLE)
 """Sides of the tiles, in pixels; 0 is one tile over all, and so is −1, of what is along contours."""
 
 _NEARLY_ALL = tolerances.ROUNDINGS[tolerances.PERCENTILES.index(99.0)]
-# Of the default filter width of 1.5 px; twice the shift, for what the table does beside shifting.
+# The errors of the default filter, 1.5 px wide; twice the shift, for what the table does beside shifting.
 _FILTER_SHIFT, _FILTER_CONTRAST = 2 * 4.9e-4, 0.0021
-# Of a bias that is told to be found: that of 99 cases in 100, a normal distribution's, since it is a tail that is not far out.
+# The power to find the bias that is told: 99 cases in 100, by a normal distribution, since this tail is not far out.
 POWER = 0.99
 _POWER_ERRORS = 2.3263
 # Standard errors of what has no noise at all: beyond any limit, and a number still.

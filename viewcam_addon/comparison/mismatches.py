@@ -32,7 +32,7 @@ from .tolerances import Array, Seen
 # "UV Slope", "Normal Slope" and "Normal Enlargement". A ray that meets nothing has one entry, too. As Tracer.surfaces_at.
 SurfacesAt = Callable[[NDArray, NDArray, Array | float, Array | float], tuple[NDArray, NDArray, Seen]]
 
-# Of n pixels: the error, what one rounding causes, and what storage and the filter's bias cause, which may be one number.
+# The error of n pixels, what one rounding causes, and what storage and the filter's bias cause, which may be one number.
 Errors = tuple[Array, Array, Array | float]
 
 KINDS = ("not a number", "coverage", "object index", "material index", "surface")

@@ -60,7 +60,7 @@ def world_of(
         if pictures is not None:
             pictures |= rendered.pictures
         return replace(rendered.world, hidden_from=hidden_from), rendered.suns
-    # Of an image, even of one that is missing, Cycles samples light, which no constant world needs.
+    # Cycles samples the light of an image, even of one that is missing, which no constant world needs.
     is_constant = wrapped is None and (backdrop, wrapped_there) == (radiance, None)
     if reasons or (missing and is_constant):
         ledger.call_for_cycles(original, _make_constant, radiance)
