@@ -17,12 +17,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import checks, intrinsics
 from . import roll as rolls
 from .errors import InputError
 from .intrinsics import Frame
-from .pinhole import Pinhole, Triple, ViewPlane
+from .pinhole import Pinhole, Triple, ViewPlane, basis, make_views
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 PIXELS, FIELD_OF_VIEW = "PIXELS", "FIELD_OF_VIEW"
 CANONICAL, HOLD = "CANONICAL", "HOLD"
@@ -141,7 +145,11 @@ class CameraValues:
 
     def seeing(self, distance: float, frame: Frame, sensor_fit: str) -> "CameraValues":
         """This view by another lens; the zoom stays. distance : the effective one in the picture of `frame` at 100 %."""
-        return replace(self, distance=distance / self.growth(frame, sensor_fit) / self.zoom)
+        return replace(self, distance=self.stored_distance(distance, frame, sensor_fit))
+
+    def stored_distance(self, distance: float, frame: Frame, sensor_fit: str) -> float:
+        """The value that makes an effective distance in the picture of `frame` at 100 %."""
+        return distance / self.growth(frame, sensor_fit) / self.zoom
 
     def rolled(self, angle: float, up_axis: Triple, held: float) -> "CameraValues":
         """This view with the roll that `roll_from` says: another up, or where it is held another held roll.
@@ -201,6 +209,28 @@ class CameraValues:
             as `view` does.
         """
         return rolls.angle_from(up, rolls.turned(self.view(), held))
+
+
+def moved_poses(
+    poses: Array, is_moved: Flags, is_turned: Flags, eyes: Array, axes: Array, up_axis: Triple, rounding: float
+) -> Array:
+    """The poses of n cameras that were moved, each as `CameraValues.moved_to` has it where nothing is bound and no roll held.
+
+    poses : (n, 3, 3), eye, look-at and up of each. is_moved, is_turned : (n,), whose eye and whose view has changed.
+    eyes : (n, 3). axes : (n, 3, 3), u, v and w as columns. up_axis, rounding : as there.
+    """
+    after, reach = poses.copy(), [math.dist(eye, look_at) for eye, look_at, _ in poses.tolist()]
+    after[is_moved, 0] = eyes[is_moved]
+    after[:, 1] += after[:, 0] - poses[:, 0]
+    after[is_turned, 1] = (after[:, 0] - np.array(reach)[:, None] * axes[:, :, 2])[is_turned]
+    turned = np.flatnonzero(is_turned & make_views(*after.swapaxes(0, 1)))
+    for up in (None, up_axis):
+        if len(turned):
+            after[turned, 2] = after[turned, 2] if up is None else up
+            v = basis(*after[turned].swapaxes(0, 1))[1]
+            turned = turned[np.abs(v - axes[turned, :, 1]).max(axis=-1) > rounding]
+    after[turned, 2] = axes[turned, :, 1]
+    return after
 
 
 def without_border(frame: Frame) -> Frame:

@@ -6,8 +6,8 @@ high + low, each product as the pair of its rounded value and its error, and the
 
 Beside them stand quotients beyond float64's range, as fraction · 2^exponent, for cameras and points of any size.
 
-Every function takes floats or float64 arrays and runs the same formulas on both. Vectors are triples of such numbers, so that a
-single pose costs no array at all.
+Every function takes floats or float64 arrays and runs the same formulas on both. A vector is a triple of floats, so that a
+single pose costs no array at all, or one array of (3, n), so that few vectors cost few calls of NumPy.
 
 Sources: two_sum is Knuth's (TAOCP 2, 4.2.2), two_product Dekker's (Numer. Math. 18, 1971), the array sum is Kahan's
 distillation as analyzed by Ogita, Rump and Oishi (SIAM J. Sci. Comput. 26, 2005). math.fma would replace Dekker's
@@ -24,8 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Number = float | NDArray[np.float64]
-Vector = tuple[Number, Number, Number]
+Vector = tuple[float, float, float] | NDArray[np.float64]
 Exponent = int | NDArray[np.intc]
+Index = int | NDArray[np.intp]
 
 # Terms of a sum settle in as many passes as there are terms or fewer; what has not settled by then is reported.
 _DISTILLATION_PASSES = 12
@@ -34,6 +35,9 @@ _SPLITTER = 2.0**27 + 1
 SMALLEST_FACTOR = 2.0**-400
 # The difference of two numbers below this can't overflow, nor can the splitting of its parts.
 LARGEST_PART = 2.0**1000
+# The axes that make each component of a cross product: of single vectors one by one, of arrays at once.
+_NEXT, _AFTER_NEXT = np.array([1, 2, 0]), np.array([2, 0, 1])
+_EACH = tuple(zip(_NEXT.tolist(), _AFTER_NEXT.tolist(), strict=True))
 
 
 def two_sum(a: Number, b: Number) -> tuple[Number, Number]:
@@ -81,6 +85,8 @@ def _misrounded(high: NDArray[np.float64], low: NDArray[np.float64], rest: NDArr
 
 def difference(a: Vector, b: Vector) -> tuple[Vector, Vector]:
     """a − b as a pair of vectors high + low, exactly, unless it overflows."""
+    if not isinstance(a[0], float):
+        return two_sum(a, -b)
     pairs = [two_sum(x, -y) for x, y in zip(a, b, strict=True)]
     return tuple(high for high, _ in pairs), tuple(low for _, low in pairs)
 
@@ -95,20 +101,22 @@ def cross(a: Vector, b_high: Vector, b_low: Vector) -> tuple[Vector, Vector, boo
         i = zeros.index(False)
         if np.all(np.abs(a[i]) == 0.5):  # as of an up that is an axis: no product rounds
             return _along_axis(i, a[i], b_high), _along_axis(i, a[i], b_low), True
-    high, low, settled = zip(
-        *(sum_terms(_cross_terms(a, b_high, b_low, j, k)) for j, k in ((1, 2), (2, 0), (0, 1))), strict=True
-    )
-    return high, low, settled[0] & settled[1] & settled[2]
+    if not isinstance(a[0], float):
+        high, low, settled = sum_terms(_cross_terms(a, b_high, b_low, _NEXT, _AFTER_NEXT))
+        return high, low, settled.all(0)
+    high, low, settled = zip(*(sum_terms(_cross_terms(a, b_high, b_low, j, k)) for j, k in _EACH), strict=True)
+    return high, low, all(settled)
 
 
 def _along_axis(i: int, size: Number, b: Vector) -> Vector:
     """a × b for an a of that size along axis i, without −0."""
     j, k, zero = (i + 1) % 3, (i + 2) % 3, size - size
     components = {i: zero + 0.0 * b[i], j: zero - size * b[k], k: zero + size * b[j]}
-    return components[0], components[1], components[2]
+    vector = components[0], components[1], components[2]
+    return vector if isinstance(size, float) else np.array(vector)
 
 
-def _cross_terms(a: Vector, b_high: Vector, b_low: Vector, j: int, k: int) -> list[Number]:
+def _cross_terms(a: Vector, b_high: Vector, b_low: Vector, j: Index, k: Index) -> list[Number]:
     return [
         *two_product(a[j], b_high[k]),
         *two_product(a[j], b_low[k]),
@@ -123,25 +131,28 @@ def cross_of_perpendicular(a_high: Vector, a_low: Vector, b_high: Vector, b_low:
     Two perpendicular vectors lose nothing in their product as a whole, so the second-order terms need no care.
     """
 
-    def component(j: int, k: int) -> Number:
+    def component(j: Index, k: Index) -> Number:
         first, first_error = two_product(a_high[j], b_high[k])
         second, second_error = two_product(a_high[k], b_high[j])
         total, total_error = two_sum(first, -second)
         mixed = a_high[j] * b_low[k] + a_low[j] * b_high[k] - a_high[k] * b_low[j] - a_low[k] * b_high[j]
         return total + (total_error + (first_error - second_error) + mixed)
 
-    return component(1, 2), component(2, 0), component(0, 1)
+    if not isinstance(a_high[0], float):
+        return component(_NEXT, _AFTER_NEXT)
+    return tuple(component(j, k) for j, k in _EACH)
 
 
 def length(a: Vector) -> Number:
     """|a| to within one unit in the last place, of a vector whose largest component is about 1 (see `scaled_to_one`)."""
-    squares = [two_product(component, component) for component in a]
-    total, error = squares[0]
-    for square, square_error in squares[1:]:
+    is_single = isinstance(a[0], float)
+    squares = map(two_product, a, a) if is_single else zip(*two_product(a, a), strict=True)
+    total, error = next(squares)
+    for square, square_error in squares:
         total, sum_error = two_sum(total, square)
         error = error + (sum_error + square_error)
     total = total + error
-    return math.sqrt(total) if isinstance(total, float) else np.sqrt(total)
+    return math.sqrt(total) if is_single else np.sqrt(total)
 
 
 def scaled_to_one(*vectors: Vector) -> list[Vector]:
@@ -150,20 +161,21 @@ def scaled_to_one(*vectors: Vector) -> list[Vector]:
         exponent = math.frexp(max(map(abs, vectors[0])))[1]
         return [tuple(math.ldexp(component, -exponent) for component in vector) for vector in vectors]
     exponent = np.frexp(largest_component(vectors[0]))[1]
-    return [tuple(np.ldexp(component, -exponent) for component in vector) for vector in vectors]
+    return [np.ldexp(vector, -exponent) for vector in vectors]
 
 
 def largest_component(a: Vector) -> Number:
     """max |aᵢ|, elementwise."""
     if isinstance(a[0], float):
         return max(map(abs, a))
-    return np.maximum(np.maximum(np.abs(a[0]), np.abs(a[1])), np.abs(a[2]))
+    return np.abs(a).max(axis=0)
 
 
 def are_factors(vector: Vector, scaled: Vector) -> bool | NDArray[np.bool_]:
     """True where every component of `scaled`, which was `vector` before, is 0 or large enough for `cross`."""
-    x, y, z = ((before == 0) | (abs(after) >= SMALLEST_FACTOR) for before, after in zip(vector, scaled, strict=True))
-    return x & y & z
+    if not isinstance(vector[0], float):
+        return ((vector == 0) | (np.abs(scaled) >= SMALLEST_FACTOR)).all(axis=0)
+    return all(before == 0 or abs(after) >= SMALLEST_FACTOR for before, after in zip(vector, scaled, strict=True))
 
 
 def quotient(a: Number, b: float, divisor: float) -> tuple[Number, Exponent]:

@@ -27,7 +27,7 @@ LENS_UNITS = ("MILLIMETERS", "HORIZONTAL", "VERTICAL", "DIAGONAL", "PIXELS")
 _LENGTHS = ("MILLIMETERS", "PIXELS")
 # Every number of a Blender camera is a float32, and within its range nothing below leaves float64's. A smaller relative
 # difference can't be stored.
-_SMALLEST, _LARGEST = 2.0**-149, (2.0 - 2.0**-23) * 2.0**127
+_SMALLEST, LARGEST_FLOAT32 = 2.0**-149, (2.0 - 2.0**-23) * 2.0**127
 _FLOAT32_STEP = 2.0**-23
 
 
@@ -50,9 +50,9 @@ class CameraData:
 
     def __post_init__(self) -> None:
         for name in ("lens", "sensor_width", "sensor_height"):
-            _set(self, name, checks.number(name, getattr(self, name), _SMALLEST, _LARGEST))
+            _set(self, name, checks.number(name, getattr(self, name), _SMALLEST, LARGEST_FLOAT32))
         for name in ("shift_x", "shift_y"):
-            _set(self, name, checks.number(name, getattr(self, name), -_LARGEST, _LARGEST))
+            _set(self, name, checks.number(name, getattr(self, name), -LARGEST_FLOAT32, LARGEST_FLOAT32))
         if not isinstance(self.sensor_fit, str) or self.sensor_fit not in FITS:
             raise InputError(f"sensor_fit is {checks.quoted(self.sensor_fit)}: give one of {', '.join(FITS)}")
 
@@ -84,7 +84,7 @@ class Frame:
         for name in ("resolution_x", "resolution_y", "percentage"):
             _set(self, name, checks.whole(name, getattr(self, name)))
         for name in ("pixel_aspect_x", "pixel_aspect_y"):
-            _set(self, name, checks.number(name, getattr(self, name), _SMALLEST, _LARGEST))
+            _set(self, name, checks.number(name, getattr(self, name), _SMALLEST, LARGEST_FLOAT32))
         _set(self, "crop", checks.truth("crop", self.crop))
         if self.border is not None:
             _set(self, "border", checks.vector("border", self.border, 4))
@@ -172,18 +172,18 @@ def camera_data(plane: ViewPlane, frame: Frame, sensor_width: float, sensor_heig
             "set the scene's pixel aspect"
         )
     lens = magnification * _fitted_sensor(sensor)
-    if not _SMALLEST <= lens <= _LARGEST:
+    if not _SMALLEST <= lens <= LARGEST_FLOAT32:
         raise InputError(_beyond_blender("distance", plane.distance[0], "lens", lens))
     with np.errstate(under="ignore"):
         stored = float(np.float32(lens))  # as Blender will round it
     growth = 2.0 ** max(0, math.ceil(math.log2(SHORTEST_LENS / stored)))
     largest_sensor = max(sensor.sensor_width, sensor.sensor_height) * growth
-    if largest_sensor > _LARGEST:
+    if largest_sensor > LARGEST_FLOAT32:
         raise InputError(_beyond_blender("distance", plane.distance[0], "sensor", largest_sensor))
     shift_x = (width / 2 - plane.principal_point[0] - column) / fitted_x
     shift_y = (height / 2 - plane.principal_point[1] - row) / fitted_y
     for place, shift in zip(plane.principal_point, (shift_x, shift_y), strict=True):
-        if abs(shift) > _LARGEST:
+        if abs(shift) > LARGEST_FLOAT32:
             raise InputError(_beyond_blender("principal point", place, "shift", shift))
     return replace(
         sensor,
@@ -267,7 +267,7 @@ def lens_and_sensor(data: CameraData, own: tuple[float, float]) -> dict[str, flo
 def check_storable(camera: str, **numbers: tuple[float, ...]) -> None:
     """Raise InputError, by the camera's name, unless float32 holds all numbers."""
     for name, values in numbers.items():
-        if not all(abs(value) <= _LARGEST for value in values):
+        if not all(abs(value) <= LARGEST_FLOAT32 for value in values):
             largest = max(values, key=abs)
             raise InputError(f"the {name} of camera {camera!r} needs {largest:g}, beyond Blender's numbers: choose another")
 

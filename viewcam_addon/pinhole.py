@@ -373,7 +373,7 @@ def basis(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike) -> tuple[Array, Arr
     axes, safe = np.empty((3, *e.shape)), np.empty(len(e), bool)
     with np.errstate(all="ignore"):  # what leaves float64's range here is done again, one by one, below
         for batch in (slice(first, first + _AT_ONCE) for first in range(0, len(e), _AT_ONCE)):
-            poses = (tuple(vector[batch].T.copy()) for vector in (e, l, up))
+            poses = (vector[batch].T.copy() for vector in (e, l, up))
             axes[:, batch].swapaxes(1, 2)[:], safe[batch] = _basis_of_many(*poses)
     for i in np.flatnonzero(~safe):
         pose = [tuple(vector[i].tolist()) for vector in (e, l, up)]
@@ -433,14 +433,14 @@ def _view_of_one(e: Triple, l: Triple, up: Triple) -> tuple[Pair, Pair, Triple, 
     return apart, tuple(exact.scaled_to_one(*across)) if largest else across, unit_up, largest
 
 
-def _basis_of_many(e: tuple, l: tuple, up: tuple) -> tuple[tuple, Array]:
-    """(u, v, w), each a triple of (n,) arrays, and (n,) bool: where they can be relied on."""
+def _basis_of_many(e: Array, l: Array, up: Array) -> tuple[tuple, Array]:
+    """(u, v, w) of (3, n) arrays, each such an array, and (n,) bool: where they can be relied on."""
     _, apart, across, safe = _view(e, l, up)
     across = tuple(exact.scaled_to_one(*across))
     return _orthonormal(apart, across), _is_moderate(e, l) & safe & (exact.largest_component(across[0]) > 0)
 
 
-def _view(e: tuple, l: tuple, up: tuple) -> tuple[tuple, Pair, Pair, bool | Array]:
+def _view(e: exact.Vector, l: exact.Vector, up: exact.Vector) -> tuple[exact.Vector, Pair, Pair, bool | Array]:
     """up and e − l scaled to a largest component of about 1, up × (e − l), and whether the product is exact to its rounding."""
     high, low = exact.difference(e, l)
     apart = tuple(exact.scaled_to_one(high, low))
@@ -450,20 +450,23 @@ def _view(e: tuple, l: tuple, up: tuple) -> tuple[tuple, Pair, Pair, bool | Arra
     return unit_up, apart, tuple(across), safe & settled
 
 
-def _is_moderate(e: tuple, l: tuple) -> bool | Array:
+def _is_moderate(e: exact.Vector, l: exact.Vector) -> bool | Array:
     """True where e − l can't overflow."""
     return (exact.largest_component(e) < exact.LARGEST_PART) & (exact.largest_component(l) < exact.LARGEST_PART)
 
 
-def _orthonormal(apart: Pair, across: Pair) -> tuple[tuple, tuple, tuple]:
+def _orthonormal(apart: Pair, across: Pair) -> tuple[exact.Vector, exact.Vector, exact.Vector]:
     """(u, v, w) from e − l and up × (e − l); v is their product, and not w × u, which would carry the rounding of both."""
     upward = exact.cross_of_perpendicular(*apart, *across)
-    return _normalized(across[0]), _normalized(upward), _normalized(apart[0])
+    if isinstance(upward, tuple):
+        return _normalized(across[0]), _normalized(upward), _normalized(apart[0])
+    axes = np.array([across[0], upward, apart[0]]).swapaxes(0, 1)  # of all three axes at once
+    return tuple((axes / exact.length(axes)).swapaxes(0, 1))
 
 
-def _normalized(vector: tuple) -> tuple:
+def _normalized(vector: Triple) -> Triple:
     size = exact.length(vector)
-    return tuple(component / size for component in vector)
+    return tuple([component / size for component in vector])
 
 
 def _check_pose(e: Triple, l: Triple, up: Triple) -> None:

@@ -155,15 +155,26 @@ def neighbors(rounded: NDArray[np.float32]) -> Iterator[tuple[float, ...]]:
 
 
 def nearest(matrix: Array) -> Array:
-    """The orthonormal matrix nearest to `matrix` (the polar decomposition's), a mirroring one if `matrix` mirrors."""
+    """The orthonormal matrices nearest to (..., 3, 3) ones (the polar decomposition's), mirroring where those mirror."""
     left, _, right = np.linalg.svd(matrix)
     return left @ right
 
 
-def skew(matrix: Array) -> float:
-    """The largest |cosine| between two columns: 0 if they are perpendicular."""
-    columns = matrix / np.linalg.norm(matrix, axis=0)
-    return float(np.abs((columns.T @ columns)[[0, 0, 1], [1, 2, 2]]).max())
+def skew(matrix: Array) -> Array:
+    """The largest |cosine| between two columns of (..., 3, 3) matrices: 0 if they are perpendicular. Returns (...)."""
+    columns = matrix / np.linalg.norm(matrix, axis=-2, keepdims=True)
+    return np.abs((columns.swapaxes(-2, -1) @ columns)[..., [0, 0, 1], [1, 2, 2]]).max(axis=-1)
+
+
+def axes_of(matrices: Array) -> tuple[Array, Array, Array]:
+    """The axes of (..., 4, 4) matrices, of length one; their volume; and their skew: (..., 3, 3), (...) and (...).
+
+    The volume is −1 where they mirror, about 0 where they are flat, and nan where one has no length or is not finite.
+    """
+    with np.errstate(all="ignore"):
+        axes = matrices[..., :3, :3] / np.linalg.norm(matrices[..., :3, :3], axis=-2, keepdims=True)
+        volumes = np.where(np.isfinite(matrices).all(axis=(-2, -1)), np.linalg.det(axes), np.nan)
+        return axes, volumes, skew(axes)
 
 
 def largest_error(matrices: Array, axes: Array) -> Array:

@@ -2,7 +2,8 @@
 
 The lens in any unit, and the roll, take keyframes and drivers: what is kept is d and up, which follow at every frame.
 
-Keyed cameras that a frame carries in one pass stand where each by itself would, to the bit.
+Keyed cameras that a frame carries in one pass stand where each by itself would, to the bit; and the values of those that have
+keyframes of their own follow them in one.
 """
 
 import itertools
@@ -13,9 +14,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon import intrinsics
+from viewcam_addon import intrinsics, rotation
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import conversion, datablocks, findings, storage, versions
+from viewcam_addon.blender import conversion, datablocks, findings, pose, storage, versions
 from viewcam_addon.blender.camera import CameraSync
 from viewcam_addon.blender.interface import panel
 from viewcam_addon.blender.scenes import depsgraph
@@ -427,3 +428,105 @@ def test_a_camera_that_was_moved_by_hand_is_brought_back_by_the_next_frame(crowd
     crowd[0].location.x += 1
     scene.frame_set(FRAMES[0])
     assert states(crowd)[0][0] == expected[0][0]
+
+
+@pytest.fixture
+def flock(add_camera, scene):
+    """Cameras in use in each rotation mode, with keyframes of their own; some of them with more that moves or holds them."""
+    result = []
+    for i, mode in enumerate(MODES * 2):
+        camera_object = add_camera(f"Camera {i}")
+        camera_object.rotation_mode = mode
+        channel = pose.rotation_channel(camera_object)
+        for frame in (1, 60):
+            camera_object.location = (7 - i, frame / 20 - 3, 5 + i / 3)
+            turn = rotation.from_euler((1 + frame / 90, i % 3 * frame / 200, frame / 40 + i), "XYZ")
+            setattr(camera_object, channel, rotation.numbers(turn, mode, getattr(camera_object, channel)[:]))
+            camera_object.keyframe_insert("location", frame=frame)
+            camera_object.keyframe_insert(channel, frame=frame)
+            if i % 4 == 3:
+                camera_object.data.lens = 30 + frame / 3
+                camera_object.data.keyframe_insert("lens", frame=frame)
+        camera_object.virtual_pinhole.enabled = True
+        result.append(camera_object)
+    result[1].delta_location = (1, 2, 3)
+    result[2].scale = (-1, 1, 1)
+    result[4].parent = result[0]
+    result[5].virtual_pinhole.pole = "HOLD"
+    result[6].virtual_pinhole.keyframe_insert("look_at", frame=1)  # which stays, so that the camera turns to it
+    result[8].scale = (3, 2, 1)
+    scene.frame_set(1)
+    return result
+
+
+def numbers_of(flock):
+    return np.array([(*v.eye, *v.look_at, *v.up, v.distance) for v in map(storage.load, flock)])
+
+
+def test_the_values_of_many_keyed_cameras_are_true_at_each_frame_and_no_bit_of_a_camera_changes(flock, scene):
+    for frame in FRAMES:
+        scene.frame_set(frame)
+        for each in flock:
+            findings_of = cameras.check(each, cameras.stated(each, scene), scene)
+            assert not any(finding.words or finding.differing for finding in findings_of), f"frame {frame}, {each.name}"
+    in_use = [conversion.state_of(each) for each in flock]
+    for each in flock:
+        each.virtual_pinhole.enabled = False
+    scene.frame_set(1)
+    scene.frame_set(FRAMES[-1])
+    for i, each in enumerate(flock):
+        assert i == 6 or conversion.state_of(each) == in_use[i], each.name
+
+
+def test_the_values_of_many_keyed_cameras_are_those_that_each_by_itself_would_have(flock, scene, monkeypatch):
+    """But for what one of them takes for rounding and the other adopts."""
+    together = [scene.frame_set(frame) or numbers_of(flock) for frame in FRAMES]
+    assert storage.load(flock[0]).precision == 2.0**-53, "they have all of their digits"
+    assert CameraSync.of(flock[0])._raw == storage.raw(flock[0]), "what was written, without a look at it"
+    scene.frame_set(1)
+    cameras.forget_all()
+    monkeypatch.setattr(CameraSync, "carry", lambda cameras, _scene, _depsgraph: [sync for sync, _ in cameras])
+    alone = [scene.frame_set(frame) or numbers_of(flock) for frame in FRAMES]
+    size = 1 + np.abs(alone).max(axis=(0, 2), keepdims=True)
+    assert np.abs((np.array(together) - alone) / size).max() <= 2 * findings.LARGEST_TURN
+
+
+def test_most_keyed_cameras_are_followed_together(flock, scene, monkeypatch):
+    left, carry = [], CameraSync.carry
+    monkeypatch.setattr(CameraSync, "carry", lambda *arguments: left.append(carry(*arguments)) or left[-1])
+    scene.frame_set(2)
+    scene.frame_set(3)
+    assert {sync.camera_object.name for sync in left[-1]} == {f"Camera {i}" for i in (1, 2, 4, 5, 6)}
+
+
+def test_a_view_that_did_not_follow_its_camera_would_be_noticed(flock, scene, monkeypatch):
+    monkeypatch.setattr(cameras, "moved_poses", lambda poses, *_: poses)
+    scene.frame_set(2)
+    scene.frame_set(30)
+    assert cameras.check(flock[0], cameras.stated(flock[0], scene), scene)
+
+
+def test_what_a_driver_reads_of_a_followed_camera_is_that_of_the_frame(flock, scene, empty):
+    reader = empty("Reader")
+    driver = reader.driver_add("location", 0).driver
+    variable = driver.variables.new()
+    variable.targets[0].id, variable.targets[0].data_path = flock[0], "virtual_pinhole.look_at[2]"
+    driver.expression = variable.name
+    for frame in (10, 20):
+        scene.frame_set(frame)
+        assert reader.matrix_world.translation.x == flock[0].virtual_pinhole.look_at[2]
+
+
+def test_a_camera_that_is_keyed_straight_down_keeps_its_up(add_camera, scene):
+    flock = [add_camera(f"Camera {i}") for i in range(4)]
+    for i, each in enumerate(flock):
+        for frame in (1, 60):
+            each.location = (i, frame / 10, 9)
+            each.keyframe_insert("location", frame=frame)
+        each.rotation_euler = (0, 0, -math.pi / 2)  # as the canonical axes are
+        each.virtual_pinhole.enabled = True
+    before = storage.load(flock[0])
+    for frame in (2, 30, 60):
+        scene.frame_set(frame)
+        assert storage.load(flock[0]).up == before.up
+        assert storage.load(flock[0]).look_at[1] == pytest.approx(frame / 10, abs=0.2)

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from .. import intrinsics, rotation
 from .. import roll as rolls
-from ..camera_values import HOLD, CameraValues, without_border
+from ..camera_values import HOLD, CameraValues, moved_poses, without_border
 from ..errors import InputError
 from ..pinhole import Pinhole, Triple, basis, make_views
 from . import causes, conversion, datablocks, findings, hold, pose, preferences, storage, targets
@@ -86,6 +86,7 @@ class CameraSync:
         # The camera's state and its stored values as they were last seen to agree; None where nobody has looked.
         self._state: Any = None  # a tuple, and CameraValues; None until it is first seen
         self._values: Any = None
+        self._raw: tuple | None = None  # as Blender holds these values, once a frame has looked
         # The picture in which they decide all of the camera, each by itself, so that `carry` may bring it; None in no picture.
         self._carried_in: intrinsics.Frame | None = None
         # Both as they were before each of the last moves since the values were edited: a move that is canceled gives the
@@ -247,41 +248,117 @@ class CameraSync:
         scene: bpy.types.Scene,
         depsgraph: bpy.types.Depsgraph,
     ) -> list["CameraSync"]:
-        """Bring those cameras, in one pass, of which a frame has changed the values and nothing else.
+        """Bring those cameras, in one pass, of which a frame has changed the values alone, and to those that it has moved the
+        values.
 
         cameras : enabled ones, with their objects as Blender has evaluated them. Returns those that are left to `at_frame`.
         """
         if depsgraph.mode == "RENDER" or len(cameras) < _MANY:
             return [sync for sync, _ in cameras]
-        left, moved = [], []
+        left, stated, moved = [], [], []
         try:
             picture = without_border(datablocks.frame_of(scene))
         except InputError:  # no picture at all
             return [sync for sync, _ in cameras]
         for sync, evaluated in cameras:
-            values = sync._animated(evaluated, picture)
-            if values is None:
+            camera_object, raw = sync.camera_object, None
+            if sync._carried_in == picture and not camera_object.parent and not camera_object.constraints:
+                raw = storage.raw(evaluated)
+            if raw is None:
                 left.append(sync)
-            elif values is not sync._values:
-                moved.append((sync, values))
-        poses = np.array([(*each.eye, *each.look_at, *each.up) for _, each in moved]).reshape(-1, 3, 3)
+                continue
+            values = sync._values if raw == sync._raw else storage.animated(sync._values, raw)
+            is_stated, state = values is not sync._values, conversion.state_of(camera_object)
+            if state == sync._state:
+                if is_stated:
+                    stated.append((sync, values, raw))
+            elif not is_stated and sync._is_free(state):
+                moved.append((sync, evaluated, state))
+            else:
+                left.append(sync)
+        if moved:
+            left += cls._follow(moved, picture)
+        poses = _poses_of([values for _, values, _ in stated])
         valid = make_views(*poses.swapaxes(0, 1))
         if not valid.all():
-            left += [sync for (sync, _), is_valid in zip(moved, valid, strict=True) if not is_valid]
-            moved, poses = [each for each, is_valid in zip(moved, valid, strict=True) if is_valid], poses[valid]
-        if moved:
+            left += [sync for (sync, *_), is_valid in zip(stated, valid, strict=True) if not is_valid]
+            stated, poses = [each for each, is_valid in zip(stated, valid, strict=True) if is_valid], poses[valid]
+        if stated:
             axes = np.stack(basis(*poses.swapaxes(0, 1)), axis=-1)
             locations = poses[:, 0].astype(np.float32)
-            modes = np.array([sync._state[0].mode for sync, _ in moved])
+            modes = np.array([sync._state[0].mode for sync, *_ in stated])
             for mode in set(modes.tolist()):
                 of_mode = np.flatnonzero(modes == mode)
-                left += cls._bring([moved[i] for i in of_mode], mode, locations[of_mode], axes[of_mode], scene)
+                left += cls._bring([stated[i] for i in of_mode], mode, locations[of_mode], axes[of_mode], scene)
         return left
+
+    @classmethod
+    def _follow(
+        cls, moved: list[tuple["CameraSync", bpy.types.Object, tuple]], picture: intrinsics.Frame
+    ) -> list["CameraSync"]:
+        """State in the values of cameras where a frame has moved them, as `_adopt_move` does one by one.
+
+        moved : cameras that nothing carries and of which no value decides a part, with their evaluated objects and states.
+        Returns those that are left to it.
+        """
+        before = _poses_of([sync._values for sync, *_ in moved])
+        matrices = rotation.float64([evaluated.matrix_world for _, evaluated, _ in moved])
+        axes, volumes, skews = rotation.axes_of(matrices)
+        valid = (volumes > pose.LARGEST_SKEW) & (skews <= pose.LARGEST_SKEW) & make_views(*before.swapaxes(0, 1))
+        if not valid.all():
+            left = [sync for (sync, *_), is_valid in zip(moved, valid, strict=True) if not is_valid]
+            moved = [each for each, is_valid in zip(moved, valid, strict=True) if is_valid]
+            return left + (cls._follow(moved, picture) if moved else [])
+        channels = [(sync._state[0], state[0]) for sync, _, state in moved]
+        is_moved = np.array([here.location != there.location for here, there in channels])
+        is_turned = np.array([here[:3:2] != there[:3:2] for here, there in channels])  # in its mode or its rotation
+        rounding, eyes = findings.LARGEST_TURN, matrices[:, :3, 3]
+        after = moved_poses(before, is_moved, is_turned, eyes, rotation.nearest(axes), preferences.up_axis(), rounding)
+        is_view = make_views(*after.swapaxes(0, 1)) & (np.abs(after) <= intrinsics.LARGEST_FLOAT32).all(axis=(-2, -1))
+        left = []
+        for (sync, _, state), is_valid, is_changed, pose_after, vectors in zip(
+            moved,
+            is_view.tolist(),
+            (is_moved | is_turned).tolist(),
+            after.tolist(),
+            storage.zeroed(after).tolist(),
+            strict=True,
+        ):
+            values = sync._values
+            distance = values.distance if state[2:] == sync._state[2:] else sync._distance_of_lens(picture)
+            if not is_valid or distance is None:
+                left.append(sync)
+                continue
+            if is_changed or distance != values.distance:
+                eye, look_at, up = map(tuple, pose_after)
+                sync._values = values.animated(eye, look_at, up, distance, values.zoom, 2.0**-53)
+                sync._raw = storage.follow(sync.camera_object, sync._values, vectors)
+            sync._state, sync._rests, sync._is_moving, sync._placed = state, (), False, ()
+        return left
+
+    def _distance_of_lens(self, picture: intrinsics.Frame) -> float | None:
+        """The distance that the lens makes, or the value itself where they differ by rounding; None where there is none."""
+        values, fit = self._values, self.camera_object.data.sensor_fit
+        try:
+            wanted = values.distances(picture, fit)
+            seen = datablocks.view_plane(datablocks.camera_data_of(self.camera_object), picture).distance
+        except InputError:
+            return None
+        if all(abs(a - b) <= findings.LARGEST_ZOOM * a for a, b in zip(wanted, seen, strict=True)):
+            return values.distance
+        distance = values.stored_distance(seen[0] * (picture.resolution_x / picture.size[0]), picture, fit)
+        return distance if 0 < distance <= intrinsics.LARGEST_FLOAT32 else None
+
+    def _is_free(self, state: tuple) -> bool:
+        """True if no value decides where the camera is that Blender has moved, and nothing keeps its values from following."""
+        camera_object, (channels, kind, *_) = self.camera_object, state
+        is_linked = camera_object.library or camera_object.data.library
+        return channels.is_plain and kind == "PERSP" and not is_linked and not datablocks.is_animated(camera_object)
 
     @classmethod
     def _bring(
         cls,
-        moved: list[tuple["CameraSync", CameraValues]],
+        stated: list[tuple["CameraSync", CameraValues, tuple]],
         mode: str,
         locations: NDArray[np.float32],
         axes: Array,
@@ -292,16 +369,16 @@ class CameraSync:
         mode : of their rotations. locations : (n, 3). axes : (n, 3, 3), u, v and w as columns. Returns those that have no such
         lens.
         """
-        left, cameras = [], [sync.camera_object for sync, _ in moved]
+        left, cameras = [], [sync.camera_object for sync, *_ in stated]
         turns = pose.set_rotations(cameras, mode, rotation.numbers(axes, mode), axes)
-        for (sync, values), location, turn in zip(moved, map(tuple, locations.tolist()), turns.tolist(), strict=True):
+        for (sync, values, raw), location, turn in zip(stated, map(tuple, locations.tolist()), turns.tolist(), strict=True):
             camera_object, (channels, *lens), before = sync.camera_object, sync._state, sync._values
             if location != channels.location:
                 camera_object.location = location
             if storage.is_focused_on_look_at(camera_object):
                 conversion.store(camera_object.data.dof, focus_distance=math.dist(values.eye, values.look_at))
             sync._state = (rotation.Channels(mode, location, tuple(turn), *channels[3:]), *lens)
-            sync._values, sync._rests, sync._is_moving, sync._placed = values, (), False, ()
+            sync._values, sync._raw, sync._rests, sync._is_moving, sync._placed = values, raw, (), False, ()
             if (values.distance, values.zoom) != (before.distance, before.zoom):
                 try:
                     sync.resized(scene)
@@ -309,15 +386,6 @@ class CameraSync:
                 except InputError:
                     left.append(sync)
         return left
-
-    def _animated(self, evaluated: bpy.types.Object, picture: intrinsics.Frame) -> CameraValues | None:
-        """The values at a frame that can have changed nothing else of the camera, and which no curve asks for in another way.
-
-        Nothing carries the camera, and it stands where its values were last seen to agree with it. None of any other.
-        """
-        if (self._carried_in is not picture and self._carried_in != picture) or not self.is_untouched(by_values=True):
-            return None
-        return storage.animated(evaluated, self._values)
 
     def at_frame(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         """Blender has evaluated an enabled camera at another frame: what the values decide there places it, the rest follows.
@@ -506,9 +574,14 @@ class CameraSync:
         """Take note that the camera is where its values say."""
         self._state = channels, kind, *_ = conversion.state_of(self.camera_object)
         self._values = values = storage.load(self.camera_object)
-        self._rests, self._is_moving = rests, is_moving
+        self._raw, self._rests, self._is_moving = None, rests, is_moving
         is_simple = values.pole != HOLD and not values.follows and values.set_for == values.counted_in
         self._carried_in = values.set_for if is_simple and channels.is_plain and kind == "PERSP" else None
+
+
+def _poses_of(values: list[CameraValues]) -> Array:
+    """(n, 3, 3): eye, look-at and up of each."""
+    return np.array([(*each.eye, *each.look_at, *each.up) for each in values]).reshape(-1, 3, 3)
 
 
 def forget_all() -> None:

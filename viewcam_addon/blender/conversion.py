@@ -145,15 +145,12 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
             "enable it and its collection in the viewport, or make it the scene's camera"
         )
     matrix = rotation.float64(camera.matrix_world)
-    sizes = np.linalg.norm(matrix[:3, :3], axis=0)
-    if not np.isfinite(matrix).all() or not sizes.all():
+    axes, volume, skew = rotation.axes_of(matrix)
+    if not abs(volume) > pose.LARGEST_SKEW:  # flat, but for rounding
         raise pose.no_size(camera_object)
-    axes = matrix[:3, :3] / sizes
-    if abs(np.linalg.det(axes)) <= pose.LARGEST_SKEW:  # flat, but for rounding
-        raise pose.no_size(camera_object)
-    if rotation.skew(axes) > pose.LARGEST_SKEW:
+    if skew > pose.LARGEST_SKEW:
         raise InputError(f"camera {camera_object.name!r} is oblique, {pose.who_shears(camera_object)}")
-    mirrored = bool(np.linalg.det(axes) < 0)
+    mirrored = bool(volume < 0)
     _, v, w = rotation.nearest(axes).T
     eye = matrix[:3, 3]
     # As far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.

@@ -40,7 +40,7 @@ def _no_perspective(camera_object: bpy.types.Object) -> InputError:
     return InputError(f"camera {camera_object.name!r} is {kind}, no pinhole: set its lens type to Perspective")
 
 
-_VALUES = "virtual_pinhole"
+_VALUES, _OWN = "virtual_pinhole", "virtual_pinhole."
 # Properties that are another look at a value, which is what is kept → that value. They can be animated like any other.
 LENSES = {
     "focal_length": "MILLIMETERS",
@@ -53,8 +53,7 @@ LOOKS = dict.fromkeys(LENSES, "distance") | {"roll": "up"}
 
 def is_animated(camera_object: bpy.types.Object) -> bool:
     """True if a keyframe, an NLA strip or a driver changes one of the values of the Virtual Pinhole, or a target does."""
-    curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
-    return any(curve.data_path.startswith(f"{_VALUES}.") for curve in curves)
+    return any([path.startswith(_OWN) for path in [curve.data_path for curve in versions.all_curves(camera_object)]])
 
 
 def animated_values(camera_object: bpy.types.Object) -> set[str]:
@@ -63,7 +62,7 @@ def animated_values(camera_object: bpy.types.Object) -> set[str]:
     A point that follows a target is one of them.
     """
     names = set()
-    for curve in (*versions.animation_curves(camera_object), *versions.drivers(camera_object)):
+    for curve in versions.all_curves(camera_object):
         owner, _, name = curve.data_path.partition(".")
         if owner == _VALUES and not versions.is_muted(curve):
             names.add(("eye", "look_at")[curve.array_index] if name == "followed" else LOOKS.get(name, name))

@@ -22,8 +22,8 @@ _FLOAT32 = 2.0**-24  # the relative error of storing a number as float32
 LARGEST_TURN = 17 * _FLOAT32
 # A location is rounded once, then multiplied by the parent's matrices, twice four roundings.
 _LOCATION_ROUNDINGS = 9
-# Lens, sensor and pixel aspect.
-_LENS_ROUNDINGS = 3
+# Of a distance: lens, sensor and pixel aspect.
+LARGEST_ZOOM = 3 * _FLOAT32
 # The shift, and its product with the size.
 _SHIFT_ROUNDINGS = 2
 
@@ -96,7 +96,7 @@ def differences(
     elif np.abs(turn).max() > LARGEST_TURN:
         angle = 2 * math.asin(min(1.0, float(np.linalg.norm(turn)) / math.sqrt(8)))
         result[VIEW] = f"the view is turned by {math.degrees(angle):.3g}°"
-    if any(abs(a - b) > _LENS_ROUNDINGS * _FLOAT32 * a for a, b in zip(wanted.distance, read_back.distance, strict=True)):
+    if any(abs(a - b) > LARGEST_ZOOM * a for a, b in zip(wanted.distance, read_back.distance, strict=True)):
         result[DISTANCE] = f"the view plane is {read_back.distance[0]:.6g} px away and not {wanted.distance[0]:.6g}"
     allowed = _SHIFT_ROUNDINGS * _FLOAT32 * (max(wanted.width, wanted.height) + max(map(abs, wanted.principal_point)))
     off_center = math.dist(wanted.principal_point, read_back.principal_point)

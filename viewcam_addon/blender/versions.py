@@ -69,6 +69,15 @@ def drivers(block: bpy.types.ID) -> list[bpy.types.FCurve]:
     return list(block.animation_data.drivers) if block.animation_data else []
 
 
+def all_curves(block: bpy.types.ID) -> list[bpy.types.FCurve]:
+    """The curves that animate a datablock, and its drivers."""
+    data = block.animation_data
+    if not data:
+        return []
+    strips = strip_curves(block) if data.nla_tracks else ()
+    return [*_curves_of(data), *strips, *data.drivers]
+
+
 def animation_curves(block: bpy.types.ID) -> list[bpy.types.FCurve]:
     """The curves that animate a datablock: those of its action and of the actions on its NLA tracks that are not muted."""
     return [*action_curves(block), *strip_curves(block)]
