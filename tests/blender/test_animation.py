@@ -483,6 +483,7 @@ def test_the_values_of_many_keyed_cameras_are_those_that_each_by_itself_would_ha
     together = [scene.frame_set(frame) or numbers_of(flock) for frame in FRAMES]
     assert storage.load(flock[0]).precision == 2.0**-53, "they have all of their digits"
     assert CameraSync.of(flock[0])._raw == storage.raw(flock[0]), "what was written, without a look at it"
+    assert all(CameraSync.of(each)._values == storage.load(each) for each in flock)
     scene.frame_set(1)
     cameras.forget_all()
     monkeypatch.setattr(CameraSync, "carry", lambda cameras, _scene, _depsgraph: [sync for sync, _ in cameras])

@@ -12,7 +12,8 @@ import pytest
 
 from viewcam_addon.comparison import pictures, radiance, report
 from viewcam_addon.comparison.geometry import compare
-from viewcam_addon.comparison.verdict import FarFromOrigin
+from viewcam_addon.comparison.light_verdict import change_text
+from viewcam_addon.comparison.verdict import FarFromOrigin, percent
 from viewcam_addon.errors import InputError
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
@@ -277,3 +278,13 @@ def test_a_reduced_map_keeps_what_is_farthest_from_zero():
     levels = pictures.signed(values, 5.0)
     assert levels.shape[1] <= 1920
     assert (levels == 1).sum() == 1 and (levels > pictures.LEVELS * 0.8).sum() == 1
+
+
+@pytest.mark.parametrize(("share", "words"), [(0.87, "87%"), (12.04, "12 times"), (1683.2, "1,680 times"), (np.inf, "∞ times")])
+def test_how_much_of_a_tolerance_is_used_has_no_powers_of_ten(share, words):
+    assert percent(share) == words
+
+
+def test_how_much_brighter_something_is_has_no_powers_of_ten():
+    assert change_text(1e-4, 2.0) == "20,000 times as bright"
+    assert change_text(2.0, 1e-4) == "0.00005 times as bright"

@@ -8,6 +8,7 @@ import fcntl
 import os
 import platform
 import re
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -53,25 +54,34 @@ class Host:
         size: tuple[int, int] = (1600, 1000),
         scale: float = 1,
         simulated: bool = True,
+        patience: float = 1200,
     ) -> subprocess.CompletedProcess:
         """Run a script (hands.py) in the real Blender's window on a virtual screen, and keep what it says.
 
         size : of the window, pixels at scale 1. scale : of Blender's interface and of the window.
-        simulated : mouse and keys are the script's.
+        simulated : mouse and keys are the script's. patience : seconds, many times what it takes, on a busy machine too.
         """
         corner = ("-p", "0", "0", *(str(int(scale * pixels)) for pixels in size))
         events = ["--enable-event-simulate"] if simulated else []
-        return subprocess.run(
+        started = subprocess.Popen(
             [
                 *(ROOT / ".ci" / "blender-window", "--factory-startup", "--addons", "bl_ext.user_default.virtual_pinhole"),
                 *(*events, *corner, "--python", script, "--", *arguments),
             ],
             env={**os.environ, "BLENDER_USER_RESOURCES": str(self.user_folder), "VIEWCAM_UI_SCALE": str(scale)},
             cwd=ROOT,
-            capture_output=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             text=True,
-            timeout=1200,  # many times what it takes, on a busy machine too
+            start_new_session=True,
         )
+        try:
+            output = started.communicate(timeout=patience)
+        except BaseException:
+            os.killpg(started.pid, signal.SIGKILL)  # Blender and its screen, too, which else go on for hours
+            started.communicate()
+            raise
+        return subprocess.CompletedProcess(started.args, started.returncode, *output)
 
     def run_inside(self, *arguments: str | Path) -> str:
         """Run inside_blender.py with these arguments; what it printed. Fails the test if that fails."""

@@ -35,7 +35,7 @@ def assert_it_went_through(outcome):
 def take_the_pictures(real_blender, scratch, folder):
     """The tour's, the README's moving one, and those of docs/artists.md that no step of the tour takes."""
     images = folder.parent
-    assert_it_went_through(real_blender.run_in_a_window(SCRIPT, folder, size=TALL))
+    assert_it_went_through(real_blender.run_in_a_window(SCRIPT, folder, size=TALL, patience=3 * 3600))  # drawn finely
     make_the_moving_picture(real_blender, scratch / "frames", images / "moving.webp")
     photo = scratch / "photo.png"
     subprocess.run([sys.executable, PHOTO, photo], check=True)

@@ -103,14 +103,14 @@ def _curves_of(source: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.type
 
 
 def _collections_of(source: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.types.bpy_prop_collection]:
-    if not source.action:
+    action = source.action
+    if not action:
         return []
     # Actions have slots since 4.4. What 4.4 and 4.5 still call action.fcurves are the curves of the first slot only.
     if bpy.app.version < (4, 4):
-        return [source.action.fcurves]
-    bags = [
-        strip.channelbag(source.action_slot) for layer in source.action.layers for strip in layer.strips if source.action_slot
-    ]
+        return [action.fcurves]
+    slot = source.action_slot
+    bags = [strip.channelbag(slot) for layer in action.layers for strip in layer.strips] if slot else []
     return [bag.fcurves for bag in bags if bag]
 
 

@@ -271,7 +271,7 @@ def change_text(reference: float, test: float) -> str:
         return f"{test:.3g} instead of {reference:.3g}"
     ratio = test / reference
     if not 0.5 < ratio < 2.0:
-        return f"{ratio:.4g} times as bright"
+        return f"{plain(ratio, 4)} times as bright"
     return f"{abs(ratio - 1.0):.2%} {'brighter' if ratio > 1.0 else 'darker'}".replace("%", " %")
 
 
@@ -337,7 +337,7 @@ def _difference(row: LightRow) -> str:
         if not edges.ok:
             return f"{row.name} differs by more than float32 allows: {edge_text(edges)}"
         percentile, share = noise_free.worst
-        return f"{row.name} is off by {share:.3g} times its tolerance at {percentile_name(percentile)}"
+        return f"{row.name} is off by {plain(share, 3)} times its tolerance at {percentile_name(percentile)}"
     place = test.worst
     failing, of = int(test.failing.sum()), test.failing.size
     many = f" and {failing - 1:,} more of {of:,}" if failing > 1 else ""

@@ -69,11 +69,12 @@ def measure(name: str, unit: str, errors: Array, one_rounding: Array, floor: Arr
     return PassErrors(name, unit, len(errors), *(tuple(float(x) for x in figures) for figures in (values, tolerances, shares)))
 
 
-def plain(value: float | None) -> str:
-    """Two significant digits without powers of ten: 0.000052. None : what JSON can't hold."""
+def plain(value: float | None, digits: int = 2) -> str:
+    """A few significant digits without powers of ten: 0.000052; 1,700. None : what JSON can't hold."""
     if value is None or not math.isfinite(value):
         return "∞"
-    return np.format_float_positional(float(f"{value:.1e}"), trim="-")
+    rounded = float(f"{value:.{digits - 1}e}")
+    return f"{rounded:,.0f}" if abs(rounded) >= 1000 else np.format_float_positional(rounded, trim="-")
 
 
 def percentile_name(percentile: float) -> str:

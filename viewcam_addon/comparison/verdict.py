@@ -12,7 +12,7 @@ from . import tolerances
 from .answer import NOTHING, Answer, NotModeled, answered
 from .cameras import ConversionError, Systematic
 from .mismatches import KINDS, NOWHERE, PIXELS_PER_UNEXPLAINED, InOnePlace, Mismatches
-from .statistics import PassErrors, percentile_name
+from .statistics import PassErrors, percentile_name, plain
 from .tolerances import PERCENTILES, ROUNDINGS, Array, Seen
 
 
@@ -272,7 +272,7 @@ def _faults(comparison: GeometryComparison) -> list[str]:
     elif position.count and not (position.ok and (comparison.systematic is None or comparison.systematic.ok)):
         i = PERCENTILES.index(position.worst[0])
         faults.append(
-            f"positions are {position.values[i]:.2g} px off at {percentile_name(PERCENTILES[i])}, "
+            f"positions are {plain(position.values[i])} px off at {percentile_name(PERCENTILES[i])}, "
             f"{_share(position.shares[i])} their tolerance, and {_cause(comparison)}"
         )
     mismatches = comparison.mismatches
@@ -286,13 +286,13 @@ def _faults(comparison: GeometryComparison) -> list[str]:
             percentile, share = row.worst
             value = row.values[PERCENTILES.index(percentile)]
             faults.append(
-                f"{row.name} is {value:.2g} {row.unit} off at {percentile_name(percentile)}, {_share(share)} its tolerance"
+                f"{row.name} is {plain(value)} {row.unit} off at {percentile_name(percentile)}, {_share(share)} its tolerance"
             )
     if not position.count:
         faults.append("no pixel shows the same object in both")
     if comparison.conversion and not comparison.conversion.ok:
         c = comparison.conversion
-        faults.append(f"the camera in Blender is {c.largest:.2g} px from the stated one ({c.tolerance:.1e} px allowed)")
+        faults.append(f"the camera in Blender is {plain(c.largest)} px from the stated one ({plain(c.tolerance)} px allowed)")
     return faults
 
 
@@ -332,8 +332,8 @@ def _why_unexplained(comparison: GeometryComparison) -> str:
 
 
 def percent(share: float) -> str:
-    """87%; 12 times."""
-    return f"{share:.0%}" if share < 10 else f"{share:.3g} times"
+    """87%; 12 times; 1,680 times."""
+    return f"{share:.0%}" if share < 10 else f"{plain(share, 3)} times"
 
 
 def _share(share: float) -> str:

@@ -24,7 +24,7 @@ _POPUP_WIDTH = 480
 
 class VIEWCAM_OT_export_scene(ExportHelper, bpy.types.Operator):
     bl_idname = "viewcam.export_scene"
-    bl_label = "Export Virtual Pinhole Scene"
+    bl_label = "Export Scene"  # on its button, which is narrow
     bl_description = "Write the scene at the current frame, through the scene's camera, as the reference tracer reads it"
 
     filename_ext = _SUFFIX
