@@ -138,12 +138,11 @@ class Source:
         text = self.text.strip()
         if text[:1] not in ("{", "["):
             return None, ""
-        attempts = (text, _without_comments(text)) if "//" in text or "/*" in text or ",]" in text or ",}" in text else (text,)
         problem = ""
-        for attempt in attempts:
+        for attempt in (lambda: text, lambda: _without_comments(text)):
             try:
                 whole: Any = checks.whole_of_json  # floats of many digits, too
-                document = json.loads(attempt, object_pairs_hook=_unique, parse_int=whole, parse_constant=_not_finite)
+                document = json.loads(attempt(), object_pairs_hook=_unique, parse_int=whole, parse_constant=_not_finite)
                 return document, ""
             except json.JSONDecodeError as error:
                 problem = f"line {error.lineno}, column {error.colno}: {error.msg}"
@@ -191,6 +190,16 @@ class Source:
     def yaml(self) -> dict[str, Any]:
         """The keys of the part of YAML in which cameras are written."""
         return yaml.read(self.text)
+
+    @cached_property
+    def npy(self) -> np.ndarray | None:
+        """The array of an NPY; None if this is none of numbers."""
+        if not self.data.startswith(b"\x93NUMPY"):
+            return None
+        try:
+            return npy.read(self.data)
+        except ValueError:
+            return None
 
     @cached_property
     def npz(self) -> dict[str, np.ndarray]:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 Picture = NDArray[np.float32]
 
 _GEOMETRY = LEVELS[0]
-_SECONDS = 1 / 30  # between two looks whether there is another picture
+_SECONDS = 1 / 60  # between two looks whether there is another picture
 
 
 class LiveView:
