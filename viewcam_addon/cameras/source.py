@@ -14,7 +14,7 @@ import struct
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -139,7 +139,8 @@ class Source:
         if text[:1] not in ("{", "["):
             return None, ""
         problem = ""
-        for attempt in (lambda: text, lambda: _without_comments(text)):
+        attempts: tuple[Callable[[], str], ...] = (lambda: text, lambda: _without_comments(text))
+        for attempt in attempts:
             try:
                 whole: Any = checks.whole_of_json  # floats of many digits, too
                 document = json.loads(attempt(), object_pairs_hook=_unique, parse_int=whole, parse_constant=_not_finite)
