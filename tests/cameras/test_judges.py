@@ -1,6 +1,7 @@
 """Each format judged by a library that nobody here wrote, both ways: what we write it projects as we do, and what it writes we
 read as the same camera. With mirrored, shifted, stretched, upright, long, and far cameras."""
 
+import dataclasses
 import json
 import math
 
@@ -10,6 +11,7 @@ import pytest
 from viewcam_addon import cameras
 from viewcam_addon.cameras import Camera, Options, axes
 from viewcam_addon.errors import InputError
+from viewcam_addon.pinhole import Pinhole
 
 from .conftest import CAMERAS, allowed, picture_error, points_before
 
@@ -308,3 +310,50 @@ def test_a_panorama_of_colmap_is_refused_by_its_name(tmp_path):
     (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n")
     with pytest.raises(InputError, match="EQUIRECTANGULAR"):
         cameras.read(tmp_path, options=Options(without_distortion=True))
+
+
+def rig_of(shift=0.0):
+    """Two cameras that go along together, the right one of another size; shift : by which it is aside in the last moment."""
+    result = []
+    for i in range(3):
+        angle = 0.4 * i
+        across, ahead = np.array([math.cos(angle), math.sin(angle), 0]), np.array([-math.sin(angle), math.cos(angle), -0.2])
+        for name, aside, turned, width in (("left", 0.0, 0.0, 320), ("right", 0.12 + shift * (i == 2), 0.1, 300)):
+            eye = np.array([i, -5, 2.0]) + aside * across
+            pinhole = Pinhole(eye.tolist(), (eye + ahead + turned * across).tolist(), (0, 0, 1), 300, width, 180)
+            result.append(Camera(f"{name}_{i}", pinhole, image=f"{name}/{i:04}.png"))
+    return result
+
+
+def test_a_rig_of_cameras_is_written_as_pycolmap_reads_it_and_leaves_all_poses_where_they_are(tmp_path):
+    pycolmap = pytest.importorskip("pycolmap")
+    cameras.save(rig_of(), tmp_path / "model", "colmap")
+    model = pycolmap.Reconstruction(tmp_path / "model")
+    before = {image.name: image.cam_from_world().matrix() for image in model.images.values()}
+    database = pycolmap.Database.open(":memory:")
+    for camera in model.cameras.values():
+        database.write_camera(camera, use_camera_id=True)
+    for image in model.images.values():
+        named = pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=image.image_id)
+        database.write_image(named, use_image_id=True)
+    pycolmap.apply_rig_config(pycolmap.read_rig_config(tmp_path / "model" / "rig_config.json"), database, model)
+    assert (len(model.rigs), len(model.frames)) == (1, 3)
+    for image in model.images.values():
+        np.testing.assert_allclose(image.cam_from_world().matrix(), before[image.name], atol=1e-14)
+    for camera, wanted in zip(cameras.read(tmp_path / "model"), rig_of(), strict=True):
+        assert camera.pinhole.eye == pytest.approx(wanted.pinhole.eye, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "others",
+    [
+        rig_of(shift=1e-3),  # it moves on the rig
+        rig_of()[:-1],  # a moment without the right one
+        rig_of()[::2],  # the left one alone
+        rig_of()[:2],  # a moment is no rig
+        [dataclasses.replace(camera, image=camera.image.replace("right/", "left/0")) for camera in rig_of()],
+        [dataclasses.replace(camera, image=f"{camera.name.partition('_')[0]}.png") for camera in rig_of()[:2]],
+    ],
+)
+def test_cameras_that_are_no_rig_have_no_file_of_it(others):
+    assert "rig_config.json" not in cameras.write(others, "colmap")

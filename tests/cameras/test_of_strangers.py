@@ -5,6 +5,7 @@ Each text is the least that shows what was read wrongly, or refused without need
 Files with several cameras, one of which is no pinhole: the others are read, and that one is named.
 """
 
+import dataclasses
 import json
 import math
 import re
@@ -15,8 +16,9 @@ import numpy as np
 import pytest
 
 from viewcam_addon import cameras
-from viewcam_addon.cameras import Camera, Options
+from viewcam_addon.cameras import Camera, Options, distortion
 from viewcam_addon.errors import InputError
+from viewcam_addon.pinhole import Pinhole
 
 from . import test_read_only_formats as files
 from .conftest import CAMERAS
@@ -368,3 +370,344 @@ def test_a_model_is_found_above_its_folder_0(tmp_path):
     (tmp_path / "sparse" / "1").mkdir()
     with pytest.raises(InputError, match="2 models"):
         cameras.read(tmp_path / "sparse")
+
+
+def storage(path, **values):
+    """OpenCV's own file of matrices and numbers; their order stays."""
+    cv2 = pytest.importorskip("cv2")
+    file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    for name, value in values.items():
+        file.write(name, value)
+    file.release()
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "M1 D1 M2 D2",
+        "K1 D1 K2 D2",
+        "cameraMatrix1 distCoeffs1 cameraMatrix2 distCoeffs2",
+        "cameraMatrixL distCoeffsL cameraMatrixR distCoeffsR",
+        "left_K left_D right_K right_D",
+    ],
+)
+@pytest.mark.parametrize("beside", ["", "extrinsics.yml"])
+def test_a_stereo_pair_of_opencv_is_two_cameras_in_the_places_that_its_r_and_t_say(tmp_path, names, beside):
+    cv2 = pytest.importorskip("cv2")
+    k = [np.array([[f, 0, 320.5], [0, f + 1, 240.25], [0, 0, 1.0]]) for f in (600, 620)]
+    d = [np.array([[-0.2, 0.05, 0.001, -0.002, 0.01]]), np.array([[-0.1, 0.02, 0, 0.001, 0.0]])]
+    turn, shift = cv2.Rodrigues(np.array([0.02, -0.05, 0.01]))[0], np.array([[-0.12], [0.003], [0.01]])
+    pair = dict(zip(names.split(), (k[0], d[0], k[1], d[1]), strict=True))
+    between = {"R": turn, "T": shift, "R1": np.eye(3), "R2": np.eye(3), "P1": np.eye(3, 4), "P2": np.eye(3, 4), "Q": np.eye(4)}
+    if beside:
+        storage(tmp_path / "intrinsics.yml", **pair)
+        storage(tmp_path / beside, **between)
+        with pytest.raises(InputError, match="has R and T and no K"):
+            cameras.read(tmp_path / beside, options=VGA)
+    else:
+        storage(tmp_path / "intrinsics.yml", **pair, **between)
+    read_cameras = cameras.read(tmp_path / "intrinsics.yml", options=VGA)
+    points = np.array([[0.3, -0.2, 4], [-1, 0.5, 6], [0.1, 0.8, 3.0]])
+    for camera, k_of, d_of, pose in zip(read_cameras, k, d, ((np.eye(3), np.zeros(3)), (turn, shift)), strict=True):
+        wanted, _ = cv2.projectPoints(points, *pose, k_of, d_of)
+        column, row, _ = distortion.project(camera.pinhole, camera.lens, points)
+        np.testing.assert_allclose(np.stack([column, 480 - row], axis=-1) - 0.5, wanted[:, 0], atol=1e-9)
+
+
+ORB_SLAM = """%YAML:1.0
+
+# Camera calibration and distortion parameters (OpenCV)
+Camera.type: "{}"
+Camera.fx: 458.654
+Camera.fy: 457.296
+Camera.cx: 367.215
+Camera.cy: 248.375
+
+Camera.k1: -0.28340811
+Camera.k2: 0.07395907
+Camera.p1: 0.00019359
+Camera.p2: 1.76187114e-05
+
+Camera.width: 752
+Camera.height: 480
+Camera.fps: 20.0
+Camera.RGB: 1
+ORBextractor.nFeatures: 1000
+"""
+VINS = """%YAML:1.0
+---
+model_type: PINHOLE
+camera_name: camera
+image_width: 752
+image_height: 480
+distortion_parameters:
+   k1: -0.28340811
+   k2: 0.07395907
+   p1: 0.00019359
+   p2: 1.76187114e-05
+projection_parameters:
+   fx: 458.654
+   fy: 457.296
+   cx: 367.215
+   cy: 248.375
+"""
+BY_NAME = {"fx": 458.654, "fy": 457.296, "width": 752, "height": 480}
+OF_PYTHON = """camera_matrix:
+- - 458.654
+  - 0.0
+  - 367.215
+- - 0.0
+  - 457.296
+  - 248.375
+- - 0.0
+  - 0.0
+  - 1.0
+dist_coeff:
+- - -0.28340811
+  - 0.07395907
+  - 0.00019359
+  - 1.76187114e-05
+  - 0.0
+image_size:
+- 752
+- 480
+"""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ORB_SLAM.format("PinHole"),
+        ORB_SLAM.replace("Camera.", "Camera1.").format("PinHole").replace("\n", "\r\n"),
+        VINS,
+        OF_PYTHON,
+        json.dumps(
+            {
+                "color": {
+                    **BY_NAME,
+                    "ppx": 367.215,
+                    "ppy": 248.375,
+                    "coeffs": [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0],
+                }
+            }
+        ),
+        json.dumps(
+            {
+                **BY_NAME,
+                "px": 367.215,
+                "py": 248.375,
+                "k1": -0.28340811,
+                "k2": 0.07395907,
+                "p1": 0.00019359,
+                "p2": 1.76187114e-05,
+            }
+        ),
+        json.dumps(
+            {
+                "intrinsics": {**BY_NAME, "cx": 367.215, "cy": 248.375},
+                "distortion": {"k1": -0.28340811, "k2": 0.07395907, "p1": 0.00019359, "p2": 1.76187114e-05},
+            }
+        ),
+    ],
+    ids=["ORB-SLAM2", "ORB-SLAM3", "VINS", "yaml.dump", "RealSense", "by name", "objects"],
+)
+def test_k_and_distortion_number_by_number_and_in_blocks_are_those_of_opencv(text):
+    (camera,) = cameras.read(text)
+    pinhole = camera.pinhole
+    assert (pinhole.width, pinhole.height, pinhole.distance) == (752, 480, (458.654, 457.296))
+    assert pinhole.principal_point == pytest.approx((367.715, 231.125), abs=1e-12)
+    assert camera.lens == distortion.opencv({"k1": -0.28340811, "k2": 0.07395907, "p1": 0.00019359, "p2": 1.76187114e-05})
+
+
+def test_a_lens_of_another_model_is_none_of_opencvs_however_its_numbers_are_called():
+    text = ORB_SLAM.replace("p1", "k3").replace("p2", "k4").format("KannalaBrandt8")
+    (camera,) = cameras.read(text)
+    assert camera.lens.projection == "equidistant"
+    (camera,) = cameras.read(
+        VINS.replace("PINHOLE", "KANNALA_BRANDT")
+        .replace("fx", "mu")
+        .replace("fy", "mv")
+        .replace("cx", "u0")
+        .replace("cy", "v0")
+        .replace(
+            "distortion_parameters:\n   k1: -0.28340811\n   k2: 0.07395907\n   p1: 0.00019359\n   p2: 1.76187114e-05\n", ""
+        )
+        .replace("parameters:\n", "parameters:\n   k2: 0.01\n   k3: 0.02\n   k4: 0.03\n   k5: 0.04\n")
+    )
+    assert camera.lens == distortion.fisheye({"k1": 0.01, "k2": 0.02, "k3": 0.03, "k4": 0.04})
+    with pytest.raises(InputError, match="of the model 'MEI'"):
+        cameras.read(
+            VINS.replace("PINHOLE", "MEI").replace("fx", "gamma1").replace("fy", "gamma2") + "mirror_parameters:\n   xi: 3.6\n"
+        )
+    with pytest.raises(InputError, match="inverse_brown_conrady"):
+        cameras.read(
+            json.dumps({**BY_NAME, "ppx": 367, "ppy": 248, "model": "inverse_brown_conrady", "coeffs": [0.1, 0, 0, 0, 0]})
+        )
+    (camera,) = cameras.read(
+        json.dumps({**BY_NAME, "ppx": 367, "ppy": 248, "model": "inverse_brown_conrady", "coeffs": [0] * 5})
+    )
+    assert camera.lens is None
+
+
+K_ALONE = [[500, 0, 320], [0, 510, 240], [0, 0, 1]]
+
+
+@pytest.mark.parametrize("name", ["k.json", "k.txt", "k.npy"])
+def test_k_alone_is_a_camera_at_the_origin_and_asks_for_its_size(tmp_path, name):
+    path = tmp_path / name
+    match path.suffix:
+        case ".json":
+            path.write_text(json.dumps(K_ALONE))
+        case ".txt":
+            np.savetxt(path, K_ALONE)
+        case _:
+            np.save(path, K_ALONE)
+    with pytest.raises(InputError, match="does not say how many pixels"):
+        cameras.read(path)
+    (camera,) = cameras.read(path, options=VGA)
+    assert camera.pinhole.distance == (500, 510) and camera.pinhole.principal_point == (320.5, 239.5)
+
+
+def test_arrays_of_poses_are_a_camera_each(tmp_path):
+    poses = np.tile(np.eye(4), (3, 1, 1))
+    poses[:, 0, 3] = range(3)
+    np.savez(tmp_path / "scene.npz", intrinsics=np.tile(K_ALONE, (3, 1, 1)), poses=poses)
+    np.savez(tmp_path / "shared.npz", K=np.array(K_ALONE), extrinsics=np.linalg.inv(poses)[:, :3])
+    np.save(tmp_path / "poses.npy", poses)
+    vectors = {"rvecs": np.zeros((3, 3, 1)), "tvecs": -poses[:, :3, 3:]}
+    np.savez(tmp_path / "calibration.npz", mtx=np.array(K_ALONE), dist=np.zeros((1, 5)), **vectors)
+    options = Options(
+        size=(640, 480), pose="c2w_opencv", view_plane=Pinhole((0, 0, 0), (0, 1, 0), (0, 0, 1), 500, 640, 480).plane
+    )
+    for name, pose in (
+        ("scene.npz", "c2w_opencv"),
+        ("shared.npz", None),
+        ("poses.npy", "c2w_opencv"),
+        ("calibration.npz", None),
+    ):
+        read_cameras = cameras.read(tmp_path / name, options=dataclasses.replace(options, pose=pose))
+        assert [camera.pinhole.eye for camera in read_cameras] == [(0, 0, 0), (1, 0, 0), (2, 0, 0)]
+    with pytest.raises(InputError, match="give --pose"):
+        cameras.read(tmp_path / "scene.npz", options=VGA)
+
+
+MAIN_JS = """// Copyright
+let cameras = [
+    {
+        id: 0,
+        img_name: '00001', // the first
+        width: 1959,
+        height: 1090,
+        position: [
+            -3, -0.5, 2e0,
+        ],
+        rotation: [
+            [1, 0, 0],
+            [0, 1, 0],
+            [0, 0, 1],
+        ],
+        fy: 1164.5,
+        fx: 1159.25,
+    },
+];
+let camera = cameras[0];
+"""
+PAGE = """<script type="module">
+  const viewer = new GaussianSplats3D.Viewer({
+    'cameraUp': [0, -1, 0],  // y is down
+    'initialCameraPosition': [-1, -4, 6],
+    'initialCameraLookAt': [0, 4, 0]
+  });
+"""
+LOOKAT = "Cam0 -D origin=1,2,3 -D target=1,2,2 -D up=0,1,0 -D fovy=60.5 -D clip=0.01,1000\n" * 2
+
+
+def test_cameras_of_splatting_viewers_are_those_that_they_show():
+    """By the formulas of their own sources; the angles are degrees of the picture's height, by hand."""
+    text = json.dumps({"id": 0, "img_name": "a", "width": 9, "height": 8, "position": [1, 2, 3], "fx": 5, "fy": 6,
+                       "rotation": np.eye(3).tolist()})  # fmt: skip
+    assert cameras.read(text)[0].pinhole.eye == (1, 2, 3)
+    (camera,) = cameras.read(MAIN_JS)
+    pinhole = camera.pinhole
+    assert (pinhole.width, pinhole.height, pinhole.distance, pinhole.eye) == (1959, 1090, (1159.25, 1164.5), (-3, -0.5, 2))
+    assert pinhole.basis()[1] == pytest.approx((0, -1, 0)) and pinhole.basis()[2] == pytest.approx((0, 0, -1))
+    (camera,) = cameras.read(PAGE, options=VGA)
+    assert (camera.pinhole.eye, camera.pinhole.look_at, camera.pinhole.up) == ((-1, -4, 6), (0, 4, 0), (0, -1, 0))
+    assert camera.pinhole.distance[0] == pytest.approx(240 / math.tan(math.radians(25)))
+    read_cameras = cameras.read(LOOKAT, options=VGA)
+    assert len(read_cameras) == 2 and read_cameras[0].pinhole.look_at == (1, 2, 2)
+    assert read_cameras[0].pinhole.distance[1] == pytest.approx(240 / math.tan(math.radians(30.25)))
+    with pytest.raises(InputError, match="initialCameraPosition 0 times"):
+        read(PAGE.replace("[-1, -4, 6]", "config.position"))
+
+
+def test_an_intrinsic_of_open3d_alone_has_its_columns_first():
+    text = json.dumps({"width": 640, "height": 480, "intrinsic_matrix": [525.5, 0, 0, 0, 526.5, 0, 319.5, 239.5, 1]})
+    (camera,) = cameras.read(text)
+    assert camera.pinhole.distance == (525.5, 526.5) and camera.pinhole.principal_point == (320, 240)
+    assert camera.pinhole.eye == (0, 0, 0) and camera.pinhole.basis()[1] == pytest.approx((0, -1, 0))
+
+
+def test_a_pointer_of_git_lfs_says_how_to_get_the_file():
+    with pytest.raises(InputError, match="git lfs pull"):
+        cameras.read("version https://git-lfs.github.com/spec/v1\noid sha256:997004fb\nsize 772721\n")
+
+
+TOOLBOX = """% Intrinsic and Extrinsic Camera Parameters
+%-- Focal length:
+fc = [ 657.395353340077460 ; 658.763142353886830 ];
+%-- Principal point:
+cc = [ 302.983766534402610 ; 242.616284123219370 ];
+%-- Skew coefficient:
+alpha_c = 0.000000000000000;
+%-- Distortion coefficients:
+kc = [ -0.255835686105780 ; 0.127572945483490 ; -0.000208182110586 ; 0.000033353463620 ; 0.000000000000000 ];
+fc_error = [ 0.3 ; 0.4 ];
+nx = 640;
+ny = 480;
+omc_1 = [ 1.654766e+00 ; 1.651927e+00 ; -6.699815e-01 ];
+Tc_1  = [ -1.778005e+02 ; -8.395097e+01 ; 8.528764e+02 ];
+omc_error_1 = [ 5.0e-04 ; 6.0e-04 ; 8.0e-04 ];
+omc_2 = [ NaN ; NaN ; NaN ];
+Tc_2  = [ NaN ; NaN ; NaN ];
+omc_3 = [ 1.849011e+00 ; 1.900554e+00 ; -3.970866e-01 ];
+Tc_3  = [ -1.549437e+02 ; -1.595167e+02 ; 7.575891e+02 ];
+"""
+
+
+def test_pictures_of_the_calibration_toolbox_for_matlab_are_where_opencv_projects_them():
+    cv2 = pytest.importorskip("cv2")
+    read_cameras = cameras.read(TOOLBOX.replace("\n", "\r\n"))
+    assert [camera.name for camera in read_cameras] == ["image 1", "image 3"]
+    k = np.array([[657.395353340077460, 0, 302.983766534402610], [0, 658.763142353886830, 242.616284123219370], [0, 0, 1]])
+    bent = np.array([-0.255835686105780, 0.127572945483490, -0.000208182110586, 0.000033353463620, 0.0])
+    turns = ([1.654766, 1.651927, -0.6699815], [1.849011, 1.900554, -0.3970866])
+    moved = ([-177.8005, -83.95097, 852.8764], [-154.9437, -159.5167, 757.5891])
+    points = np.array([[0.0, 0, 0], [100, 0, 0], [0, 120, 30]])
+    for camera, turn, at in zip(read_cameras, turns, moved, strict=True):
+        wanted, _ = cv2.projectPoints(points, np.array(turn), np.array(at), k, bent)
+        column, row, _ = distortion.project(camera.pinhole, camera.lens, points)
+        np.testing.assert_allclose(np.stack([column, 480 - row], axis=-1) - 0.5, wanted[:, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "Eigen::Matrix3d K; K << 600, 0, 320, 0, 601, 240, 0, 0, 1;\n"
+        "Eigen::Matrix4d T_cw = Eigen::Matrix4d::Identity();\nT_cw << 1,0,0,0, 0,1,0,0, 0,0,1,2, 0,0,0,1;",
+        "K <- matrix(c(600,0,320, 0,601,240, 0,0,1), nrow=3, byrow=TRUE)\nR <- diag(3)\nt <- c(0,0,2)\n",
+        "Camera matrix :\n [[6.00e+02 0.00e+00 3.20e+02]\n [0.00e+00 6.01e+02 2.40e+02]\n [0.00e+00 0.00e+00 1.00e+00]]\n"
+        "R:\n [[1. 0. 0.]\n [0. 1. 0.]\n [0. 0. 1.]]\nt:\n [0. 0. 2.]\n",
+    ],
+    ids=["Eigen", "R", "print"],
+)
+def test_matrices_that_are_made_before_they_are_filled_and_names_of_two_words_are_read(code):
+    camera = read(code)
+    assert camera.pinhole.distance == (600, 601) and camera.pinhole.principal_point == (320.5, 239.5)
+    assert camera.pinhole.eye == (0, 0, -2)
+
+
+def test_json_with_a_comma_before_the_closing_bracket_in_the_next_line_is_read():
+    text = cameras.write([Camera("a", CAMERAS["shifted"])], "transforms").rstrip().removesuffix("}") + ",\n}\n"
+    (camera,) = cameras.read(text)
+    assert camera.pinhole == CAMERAS["shifted"]

@@ -142,3 +142,23 @@ def test_frames_of_a_batch_are_those_of_f(real_blender, tmp_path, engine):
 
 def check(outcome):
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+
+
+def test_a_calibrated_lens_bends_picture_and_labels_alike(real_blender, tmp_path):
+    """The box's left edge is straight: the lens shows its middle two pixels farther out than its ends."""
+    (tmp_path / "cameras.txt").write_text("1 OPENCV 640 360 600 600 320 180 -0.25 0.06 0 0\n")
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n")
+    words = ["--orbit", "1", "--samples", "4", "--labels", "depth", "--transforms", "--distort", tmp_path]
+    done = batch(real_blender, *words, "--out", tmp_path / "out")
+    assert done.returncode == 0, done
+    document = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    assert (document["camera_model"], document["k1"], document["k2"], document["w"]) == ("OPENCV", -0.25, 0.06, 640)
+    pixels = {}
+    for name, channel in (("orbit_000.exr", "Combined.R"), ("orbit_000.labels.exr", "Depth.Z")):
+        with OpenEXR.File(str(tmp_path / "out" / name), separate_channels=True) as file:
+            pixels[channel] = file.channels()[f"ViewLayer.{channel}"].pixels
+    is_box = pixels["Depth.Z"] < 1e9
+    assert ((pixels["Combined.R"] > 0.005) == is_box).mean() > 0.98  # at its outline a pixel is of both
+    ends = np.flatnonzero(is_box.any(axis=1))[[4, -5]]
+    left = [int(np.flatnonzero(is_box[row])[0]) for row in (*ends, 180)]
+    assert left[2] <= min(left[:2]) - 1, left

@@ -308,6 +308,8 @@ def recognized(source: str | Path | Source) -> str:
         with _told_of_damage(source, FORMATS[name].TITLE):
             if _recognizes(FORMATS[name], source):
                 return name
+    if source.data.startswith(b"version https://git-lfs"):
+        raise InputError(f"{source.name} is Git LFS's pointer to the file, and not the file: get it by git lfs pull")
     if source.json_problem:
         raise InputError(f"{source.name} looks like JSON and is none ({source.json_problem}): correct it")
     if source.path is None:

@@ -5,11 +5,14 @@
     cv::Mat K = (cv::Mat_<double>(3, 3) << 600, 0, 320, 0, 600, 180, 0, 0, 1);      Eigen: K << 600, 0, …;
     K <- matrix(c(600, 0, 0, 0, 600, 0, 320, 180, 1), nrow = 3)                     column by column, as R does unless byrow
 
+    fc = [ 657.4 ; 657.8 ]; cc = …; kc = …; omc_1 = …; Tc_1 = …     the Camera Calibration Toolbox for MATLAB, a picture each
+
 The arrays are found by their names and brought into rows; their meaning, and what the names are, is OpenCV's (opencv.py). A
 4 × 4 matrix is also read without K: then the camera sees as `Options.view_plane` says. Nothing is run: what is computed from
 other arrays (an inverse, a product) is refused where the camera needs it.
 
-Sources: the manuals of numpy.array, torch.tensor, MATLAB's matrices, cv::Mat_'s and Eigen's comma initializers, R's matrix.
+Sources: the Camera Calibration Toolbox's description of its parameters; the manuals of numpy.array, torch.tensor, MATLAB's
+matrices, cv::Mat_'s and Eigen's comma initializers, R's matrix.
 """
 
 import functools
@@ -48,6 +51,8 @@ _UNPACKED = re.compile(r"\s*(?:[A-Za-z_]\w{0,40}\s*,\s*)+")
 _TEMPLATE = re.compile(r"\s*<[\w\s,:]{0,60}>")
 _ORDER = re.compile(r"byrow\s*=\s*(?:TRUE|T)\b")
 _SCALARS = ("fx", "fy", "cx", "cy")
+_DIAGONAL = re.compile(r"\(\s*[1-4]\s*\)")
+_TOOLBOX = re.compile(r"^\s*(fc|cc|kc|nx|ny|alpha_c|omc_\d+|Tc_\d+)\s*=\s*\[?([^\]\n]*)\]?", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,8 @@ def recognizes(source: Source) -> bool:
         return False
     if source.json_problem and not {*"('"} & {*source.text}:  # JSON that is damaged, and no dictionary of Python
         return False
+    if _of_toolbox(source.text):
+        return True
     values = _values(source.text)
     return opencv.says_intrinsics(values) or any(_is_whole_pose(name, value) for name, value in values.items())
 
@@ -77,6 +84,8 @@ def _flat(rows: list) -> list:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
+    if named := _of_toolbox(source.text):
+        return [opencv.camera(name, values, options) for name, values in named.items()]
     values = _values(source.text)
     known = {name: value for name, value in values.items() if not isinstance(value, _Unknown)}
     is_posed = any(_is_whole_pose(name, value) for name, value in known.items())
@@ -84,6 +93,35 @@ def read(source: Source, options: Options) -> list[Camera]:
         if not opencv.is_size(key) and not (is_posed and opencv.is_of_pose(key)):
             raise InputError(f"{values[key].name} is computed from what the text does not say: write its numbers")
     return [opencv.camera("Camera", known, options)]
+
+
+def _of_toolbox(text: str) -> dict[str, dict[str, Any]]:
+    """The cameras of the Camera Calibration Toolbox for MATLAB by the numbers of their pictures; none if it is not its text.
+
+    Those of pictures that were not used, NaN, are left out.
+    """
+    if "cc" not in text or "fc" not in text:
+        return {}
+    stated = {}
+    for name, value in _TOOLBOX.findall(texts.without(_COMMENT, text)):
+        try:
+            stated[name] = [float(word) for word in re.split(r"[\s,;]+", value.strip().rstrip(";").strip())]
+        except ValueError:
+            return {}
+    if any(len(stated.get(name, ())) != 2 for name in ("fc", "cc")):
+        return {}
+    skew = stated.get("alpha_c", [0.0])[0] * stated["fc"][0]
+    (f_x, f_y), (c_x, c_y) = stated["fc"], stated["cc"]
+    shared: dict[str, Any] = {"k": [[f_x, skew, c_x], [0.0, f_y, c_y], [0.0, 0.0, 1.0]]}
+    shared |= {own_name: stated[name] for name, own_name in (("kc", "dist"),) if name in stated}
+    shared |= {own_name: stated[name][0] for name, own_name in (("nx", "width"), ("ny", "height")) if name in stated}
+    turns = {name.removeprefix("omc_"): turn for name, turn in stated.items() if name.startswith("omc_")}
+    posed = {
+        f"image {number}": {**shared, "rvec": turn, "t": stated[f"Tc_{number}"]}
+        for number, turn in turns.items()
+        if f"Tc_{number}" in stated and not any(map(math.isnan, turn))
+    }
+    return posed or {"Camera": shared}
 
 
 @functools.lru_cache(maxsize=1)
@@ -111,8 +149,14 @@ class _Code:
         for at, word in enumerate(self._words[:-4]):
             if (word[:1].isalpha() or word[:1] == "_") and (begins := self._value_of(at)) is not None:
                 for name, place in self._unpacked(at, begins):
-                    self._assigned.setdefault(name, []).append(place)
+                    self._assigned.setdefault(self._whole(name, at), []).append(place)
         self._numbers: dict[str, float | None] = {}
+
+    def _whole(self, name: str, at: int) -> str:
+        """The name with the word before it where both are a name together: Camera matrix, as people print it."""
+        before, place = self._words[at - 1], self._places[at - 1]
+        is_one = at > 0 and self.text[place + len(before) : self._places[at]] == " " and not opencv.is_known(opencv.plain(name))
+        return before + name if is_one and opencv.is_known(opencv.plain(before + name)) else name
 
     def _value_of(self, at: int) -> int | None:
         """The beginning of the value that a name gets: by =, : (also behind a quote), <- or <<."""
@@ -164,7 +208,8 @@ class _Code:
             key = opencv.plain(name)
             if not opencv.is_known(key) and key not in _SCALARS:
                 continue
-            for place in places[:20]:
+            filled = [place for place in places if self.text[place - 2 : place] == "<<"]  # whatever it was made as
+            for place in (filled or places)[:20]:
                 array = self._array(place)
                 value: object = array if array else self._reader.value(place)[0]
                 if array == []:
@@ -218,7 +263,8 @@ class _Code:
         last, after = first, tokens.token(self.text, first.end)
         while after.text in JOINTS and (part := tokens.token(self.text, after.end)).kind == "name":
             last, after = part, tokens.token(self.text, part.end)
-        if last.text in ("eye", "identity", "zeros") and after.text == "(":
+        is_identity = last.text == "diag" and _DIAGONAL.match(self.text, after.start)
+        if (last.text in ("eye", "identity", "zeros") or is_identity) and after.text == "(":
             return self._filled(last.text, after.start)
         if not _MAKERS.fullmatch(last.text):
             return (None, after.start) if after.text == "(" else None

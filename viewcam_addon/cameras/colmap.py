@@ -11,19 +11,22 @@ numbers have as many digits as bring back the same float64. Comments before them
 binary model, in which COLMAP leaves no room, has these in a file of their own beside it. Of text and binary in one folder the
 binary one counts, as for COLMAP.
 
+**Rigs.** Where the pictures of several cameras are called alike from their last number on, and the cameras keep their places to
+one another, RIG_CONFIG beside the model says the rig, as `colmap rig_configurator` and pycolmap's apply_rig_config read it.
 rigs and frames, new in COLMAP 3.12, are not written: without them each image is a frame of its own. With them the images repeat
 the poses that they compose; COLMAP passes over those of the images, and all others over rigs and frames: where somebody has
 changed one of the two alone, it is refused.
 
 Sources: COLMAP's doc/format.rst, doc/database.rst (pixel centers), src/colmap/sensor/models.h (the lenses) and
-src/colmap/scene/reconstruction_io_text.cc and _binary.cc (what parts a line: a name ends at a space).
+src/colmap/scene/rig.cc (ReadRigConfig), reconstruction_io_text.cc and _binary.cc (what parts a line: a name ends at a space).
 """
 
 import itertools
+import json
 import re
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -72,6 +75,9 @@ _AS_THE_RIG = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # the pose in it of a rig's f
 _SAME_POSE = 1e-5  # relative: what two poses of one image may differ by for the six digits of one
 
 TEXTS = ("images.txt", "cameras.txt", "points3D.txt")
+RIG_CONFIG = "rig_config.json"
+_MOMENT = re.compile(r"(?P<prefix>.*?)(?P<moment>[0-9]+[^0-9]*)", re.DOTALL)
+_ROUNDINGS = 16 * 2.0**-24  # of float32 in two of Blender's matrices and those of their parents, relative to the farthest eye
 """The files of a model that is written."""
 NOTES = "virtual_pinhole.txt"
 FORMS_OF_RIGS = tuple(f"{name}{suffix}" for name in _RIGS for suffix in (".txt", ".bin"))
@@ -396,7 +402,7 @@ def _binary_images(source: Source) -> Iterator[_Image]:
 
 def write(cameras: Sequence[Camera], options: Options) -> dict[str, str]:
     head = f"# {options.remembered}\n" if options.remembered else ""
-    return {name: head + text for name, text in texts(cameras).items()}
+    return {name: head + text if name in TEXTS else text for name, text in texts(cameras).items()}
 
 
 def check_names(files: Iterable[str]) -> None:
@@ -431,7 +437,43 @@ def texts(cameras: Iterable[Camera], tracks: Tracks | None = None) -> dict[str, 
         "cameras.txt": "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n"
         + "".join(f"{number} {camera}\n" for camera, number in numbers.items()),
         "points3D.txt": "# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n" + points,
+        **({RIG_CONFIG: json.dumps(rig, indent=1) + "\n"} if (rig := rig_config(cameras)) else {}),
     }
+
+
+def rig_config(cameras: Sequence[Camera]) -> list[dict[str, Any]]:
+    """The rig of the cameras by which these pictures were taken, as COLMAP reads it; empty where they are none."""
+    rig: dict[str, dict[str, Camera]] = {}
+    for camera in cameras:
+        if not (name := _MOMENT.fullmatch(naming.image_of(camera))):
+            return []
+        rig.setdefault(name["prefix"], {})[name["moment"]] = camera
+    reference, *others = rig.values()
+    moments = reference.keys()
+    if not others or len(moments) < 2 or any(other.keys() != moments for other in others):
+        return []
+    if any(b.startswith(a) for a, b in itertools.permutations(rig, 2)):
+        return []
+    off = _ROUNDINGS * max(1.0, *(abs(part) for camera in cameras for part in camera.pinhole.eye))
+    listed: list[dict[str, Any]] = []
+    for prefix, taken in rig.items():
+        if len({*map(_camera, taken.values())}) > 1:
+            return []
+        places = np.array([_place_in_rig(taken[moment].pinhole, reference[moment].pinhole) for moment in moments])
+        if np.abs(places - places[0]).max() > off:
+            return []
+        model, _, _, parameters = intrinsics_of((first := next(iter(taken.values()))).pinhole, first.lens)
+        pose: dict[str, Any] = {"ref_sensor": True}
+        if taken is not reference:
+            turn, shift = quaternion(places[0, :, :3].tolist()), places[0, :, 3].tolist()
+            pose = {"cam_from_rig_rotation": [*turn], "cam_from_rig_translation": shift}
+        listed.append({"image_prefix": prefix, **pose, "camera_model_name": model, "camera_params": [*parameters]})
+    return [{"cameras": listed}]
+
+
+def _place_in_rig(pinhole: Pinhole, reference: Pinhole) -> np.ndarray:
+    """(3, 4) from the axes of the rig's first camera to those of this one."""
+    return (np.array(world_to_camera(pinhole)) @ np.linalg.inv(world_to_camera(reference)))[:3]
 
 
 def _points(tracks: Tracks | None, images: int) -> tuple[list[str], str]:

@@ -6,39 +6,76 @@ after row; `fx`, `fy` in pixels of `width` × `height`. It has no principal poin
 Viewers take the list as one of views, or, as SuperSplat, as a path with a keyframe each: so what is written here is a path for
 them, too. They turn it with the splats as they show these.
 
-Source: gaussian-splatting's utils/camera_utils.py (camera_to_JSON); antimatter15/splat's main.js (getViewMatrix) and
-SuperSplat's src/file-handler.ts (loadCameraPoses).
+Their own are read, too: the list `cameras = [` of antimatter15's main.js, which is JavaScript; the view that a page of
+GaussianSplats3D begins with (initialCameraPosition, initialCameraLookAt, cameraUp), 50° of the height; and SIBR's paths, a line
+each (`NAME -D origin=… -D target=… -D up=… -D fovy=…`, degrees).
+
+Source: gaussian-splatting's utils/camera_utils.py (camera_to_JSON); antimatter15/splat's main.js (getViewMatrix);
+GaussianSplats3D's Viewer.js; SIBR's InputCamera.cpp (loadLookat); SuperSplat's src/file-handler.ts (loadCameraPoses).
 """
 
+import contextlib
 import json
+import math
+import re
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from .. import checks
 from ..errors import InputError
-from . import axes, naming, own
+from ..pinhole import Pinhole, Triple
+from . import axes, naming, own, texts
 from .camera import Camera, Options
 from .source import Record, Source
 
-TITLE = "cameras.json of Gaussian splatting"
+TITLE = "cameras.json of Gaussian splatting, and its viewers' cameras"
 SUFFIX = ".json"
 
 _KEYS = {"position", "rotation", "fx", "fy", "width", "height"}
 _MIDDLE = "The file says no principal point: it was taken in the picture's middle, as the training does"
 
 
+# JavaScript's names of keys, comments and texts.
+_LIST = re.compile(r"\bcameras\s*=\s*(?=\[)")
+_KEY = re.compile(r"""(?<=[{,])(\s*)["']?([A-Za-z_]\w*)["']?\s*:""")
+_TEXT = re.compile(r"'([^'\"\n]*)'")
+_COMMENT = r"//[^\n]*|/\*.*?(?:\*/|\Z)"
+_VIEWS = {"eye": "initialCameraPosition", "look_at": "initialCameraLookAt", "up": "cameraUp"}
+_USUAL_VIEW = {"eye": (0.0, 10.0, 15.0), "look_at": (0.0, 0.0, 0.0), "up": (0.0, 1.0, 0.0)}
+_FOV = 50.0
+_SIBR = re.compile(r"^(\S*)[ \t]+-D origin=(\S+)[ \t]+-D target=(\S+)[ \t]+-D up=(\S+)[ \t]+-D fov(y?)=(\S+)", re.MULTILINE)
+
+
 def recognizes(source: Source) -> bool:
-    return (
-        isinstance(source.json, list)
-        and bool(source.json)
-        and isinstance(source.json[0], dict)
-        and source.json[0].keys() >= _KEYS
-    )
+    pictures = _pictures(source)
+    if bool(pictures) and isinstance(pictures[0], dict) and pictures[0].keys() >= _KEYS:
+        return True
+    return not (source.is_folder or source.is_binary) and (_VIEWS["eye"] in source.text or bool(_SIBR.search(source.text)))
 
 
-def read(source: Source, _options: Options) -> list[Camera]:
-    pictures = [Record(values, f"camera {index}") for index, values in enumerate(source.json)]
+def _pictures(source: Source) -> list[Any]:
+    """The pictures, of JSON or of JavaScript; none where there is none."""
+    if isinstance(source.json, list):
+        return source.json
+    if source.document.keys() >= _KEYS:  # one of them alone
+        return [source.document]
+    if TITLE not in source.parsed:
+        source.parsed[TITLE] = []
+        if not (source.is_folder or source.is_binary) and (begin := _LIST.search(source.text)):
+            literal = _KEY.sub(r'\1"\2":', texts.without(_COMMENT, source.text[begin.end() :]))
+            literal = _TEXT.sub(r'"\1"', re.sub(r",(?=\s*[\]}])", "", literal))
+            with contextlib.suppress(ValueError, RecursionError):
+                source.parsed[TITLE], _ = json.JSONDecoder(parse_int=checks.whole_of_json).raw_decode(literal)
+    pictures: list[Any] = source.parsed[TITLE]
+    return pictures
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    if not _pictures(source):
+        return _of_sibr(source, options) or [_first_view(source, options)]
+    pictures = [Record(values, f"camera {index}") for index, values in enumerate(_pictures(source))]
     paths = [str(picture.get("img_name") or picture.place) for picture in pictures]
     cameras = []
     for picture, path, name in zip(pictures, paths, naming.distinct(paths), strict=True):
@@ -57,6 +94,44 @@ def read(source: Source, _options: Options) -> list[Camera]:
             notes = (*notes, _MIDDLE)
         cameras.append(Camera(name, pinhole, True, notes, image))
     return cameras
+
+
+def _of_sibr(source: Source, options: Options) -> list[Camera]:
+    """The cameras of SIBR's lines; none where there are none."""
+    cameras: list[Camera] = []
+    for line in _SIBR.finditer(source.text):
+        name = line[1] or f"{len(cameras):05d}"
+        record = Record(
+            {"origin": line[2].split(","), "target": line[3].split(","), "up": line[4].split(",")}, f"camera {name}"
+        )
+        width, height = options.size_or_refuse(source.name)
+        fov = Record({"fov": line[6]}, record.place).number("fov", None, 1e-6, 180 - 1e-6)
+        d = (height if line[5] else width) / 2 / math.tan(math.radians(fov) / 2)
+        eye, target, up = (_vector(record, key) for key in ("origin", "target", "up"))
+        pinhole = Pinhole(eye, target, up, d, width, height)
+        cameras.append(Camera(name, pinhole, False))
+    return cameras
+
+
+def _vector(record: Record, key: str) -> Triple:
+    x, y, z = record.numbers(key, 3)
+    return x, y, z
+
+
+def _first_view(source: Source, options: Options) -> Camera:
+    """The view that a page of GaussianSplats3D begins with."""
+    width, height = options.size_or_refuse(source.name)
+    text = texts.without(_COMMENT, source.text)
+    vectors = dict(_USUAL_VIEW)
+    for key, name in _VIEWS.items():
+        listed = [match[1] for match in re.finditer(rf"\b{name}\b[\"']?\s*[:=]\s*\[([^\]]*)\]", text)]
+        if len({*listed}) > 1 or (not listed and name in text):
+            raise InputError(f"{source.name} says {name} {len(listed)} times as three numbers: give a text that says it once")
+        if listed:
+            vectors[key] = _vector(Record({name: listed[0].rstrip(", \n").split(",")}, source.name), name)
+    d = height / 2 / math.tan(math.radians(_FOV) / 2)
+    note = f"GaussianSplats3D shows {_FOV:g}° of the picture's height"
+    return Camera("view", Pinhole(vectors["eye"], vectors["look_at"], vectors["up"], d, width, height), False, (note,))
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:

@@ -1,5 +1,7 @@
 """Open3D's PinholeCameraParameters and PinholeCameraTrajectory: what its viewer saves with P, and what people write by them.
 
+A PinholeCameraIntrinsic alone, as its examples' camera_primesense.json, stands at the origin.
+
 `extrinsic` is world to camera, x right, y down, z into the view, and `intrinsic_matrix` K, both **column after column**.
 (0, 0) is the center of the first pixel: its viewer puts the principal point at (w − 1)/2.
 
@@ -19,11 +21,19 @@ _ONE, _SEVERAL = "PinholeCameraParameters", "PinholeCameraTrajectory"
 
 
 def recognizes(source: Source) -> bool:
-    return source.document.get("class_name") in (_ONE, _SEVERAL)
+    return source.document.get("class_name") in (_ONE, _SEVERAL) or _is_intrinsic(source)
+
+
+def _is_intrinsic(source: Source) -> bool:
+    """True if all that is said is Open3D's intrinsic, whose K is one list of its columns."""
+    k = source.document.get("intrinsic_matrix")
+    return source.document.keys() == {"width", "height", "intrinsic_matrix"} and isinstance(k, list) and k[6:7] != [0]
 
 
 def read(source: Source, options: Options) -> list[Camera]:
     top = Record(source.document, source.name)
+    if _is_intrinsic(source):
+        top = Record({"intrinsic": dict(source.document), "extrinsic": np.eye(4).ravel().tolist()}, source.name)
     records = top.records("parameters", "camera") if top.get("class_name") == _SEVERAL else [top]
     cameras = []
     for number, record in enumerate(records):

@@ -5,6 +5,10 @@ that people give (K, camera_matrix, cameraMatrix, intrinsic_matrix …; R, rvec;
 file of a pose, so a file may hold K alone, which stands at the origin and looks along +z, as it would for `projectPoints`; a
 note says so. What is written has K, R, rvec, t, a distortion of zeros and the size, and NPZ is read only.
 
+So do the files that are like OpenCV's: of `stereoCalibrate` (M1 or K1, D1, M2, D2, and R and T from the first to the second, in
+the same file or in extrinsics.yml beside it), whose first camera stands at the origin; those of ORB-SLAM (Camera.fx …) and VINS
+(projection_parameters); fx, fy, cx, cy by name, as of RealSense; arrays of K and of poses, one a picture, in NPZ and NPY.
+
 **Pixels.** OpenCV puts (0, 0) at the center of the first pixel (`remap`, `undistort`, calibration), so half a pixel lies
 between its K and ours, and a note says that it was added; `pixel = "corner"` takes K as it stands, for files of tools that mean
 the corner.
@@ -17,7 +21,7 @@ Source: OpenCV's modules/core/src/persistence_yml.cpp and calib3d's projectPoint
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,20 +39,27 @@ SEVERAL = "a folder"
 
 _K = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", "cammatrix", "camk", "kmatrix")
 _R = ("r", "rot", "rotation", "rmat", "rotationmatrix", "rw2c")
-_SAYS_K = re.compile(r"(?:k|matrix|intrinsics?|mtx)[\s_$\"'-]*:", re.IGNORECASE)  # each of these
+_SAYS_K = re.compile(r"(?:[km][12lr]?|matrix_?\w{0,5}|intrinsics?|mtx|fx)[\s_$\"'-]*:", re.IGNORECASE)  # each of these
+_PARTS_OF_K = (("fx",), ("fy",), ("cx", "ppx", "u0", "px"), ("cy", "ppy", "v0", "py"))
+_OF_CAMERA = re.compile(r"^camera1?(?=(?:[fc][xy]|[kp]\d|width|height|type)$)")  # ORB-SLAM's
+_INNER = ("projectionparameters", "distortionparameters", "distortion", *_K)
+_STEREO = (("1", "2"), ("left", "right"), ("l", "r"))
+_OF_ONE = ("m", *_K)
+_BESIDE = "extrinsics.yml", "extrinsics.yaml", "extrinsics.xml"
 _RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
-_T = ("t", "tvec", "translation", "translationvector", "trans", "tw2c")
+_T = ("t", "tvec", "tvecs", "translation", "translationvector", "trans", "tw2c")
 _EXTRINSIC = (
     "extrinsic", "extrinsics", "rt", "worldtocamera", "worldtocam", "world2camera", "world2cam", "w2c", "tcw",
     "extrinsicmatrix", "tcamworld", "tcameraworld",
 )  # fmt: skip
 _DISTORTION = (
     "distortioncoefficients", "distcoeffs", "dist", "distortion", "distcoef", "distcoeff", "d", "distortioncoeffs", "dist0",
+    "coeffs",
 )  # fmt: skip
 _OTHER_DISTORTION = re.compile(r"dist(?!ance)|radial|tangential|^kc$|^[kp][1-6]$")
 _FISHEYE = re.compile(r"^(?:opencv_?)?fisheye|equidistant|kannala|^kb4?$")
 _OTHER_LENS = re.compile(r"fisheye|omni|mei|u?cm$|kb\d|spherical|ortho|fov|division|double|^ds$|theta|equirect|panoram|cylind")
-# Of what may be a pose in words that nobody knows; Kalibr's T_cam_imu is none.
+# Parts of names that may mean a pose in words that nobody knows; Kalibr's T_cam_imu is none.
 _MAY_BE_POSE = re.compile(r"pose|extrin|rotation|rot$|transf|transl|2cam|2world|toworld|tocam|w2|c2|rvec|tvec|position|quat")
 _NO_POSE = ("tcamimu", "timushift", "rectificationmatrix", "projectionmatrix", "p")
 _BLENDERS = ("matrixworld",)
@@ -67,10 +78,14 @@ _WAY = "R and t were taken as from world to camera, x right, y down, z into the 
 
 
 def recognizes(source: Source) -> bool:
-    return any(True for _ in _cameras_in(source))
+    return any(True for _ in _cameras_in(source)) or _is_pose_alone(source)
 
 
 def read(source: Source, options: Options) -> list[Camera]:
+    if _is_pose_alone(source):
+        raise InputError(
+            f"{source.name} has R and T and no K: give the file that has it, as intrinsics.yml with this one beside it"
+        )
     left_out, cameras, before = LeftOut(), [], np.eye(4)
     for name, values in _cameras_in(source):
         if "tcncnm1" in values:  # Kalibr's: from the camera before to this one
@@ -137,7 +152,8 @@ def rotation_vector(turn: Sequence[Sequence[float]]) -> tuple[float, float, floa
     w, *axis = axes.quaternion(turn)
     sine = math.hypot(*axis)
     angle = 2 * math.atan2(sine, w)
-    return tuple(angle * part / sine if sine else 0.0 for part in axis)
+    x, y, z = (angle * part / sine if sine else 0.0 for part in axis)
+    return x, y, z
 
 
 def of_rotation_vector(vector: Sequence[float], what: str) -> np.ndarray:
@@ -194,31 +210,143 @@ def _is_camera(values: Mapping[str, Any]) -> bool:
         return False
 
 
-def _cameras_in(source: Source):
+def _cameras_in(source: Source) -> Iterator[tuple[str, dict[str, Any]]]:
     """(name, values by plain name) of each camera in the file."""
     document = _document(source)
-    by_name = _by_name(document)
-    if _is_camera(by_name):
+    by_name = _with_k(_by_name(document))
+    if pair := _stereo(by_name, source):
+        yield from pair
+        return
+    if _is_camera(by_name) or "mirrorparameters" in by_name:  # of VINS' MEI, which is refused by its name
         yield (source.path.stem if source.path else "camera"), by_name
         return
     shared = {name: value for name, value in by_name.items() if not isinstance(value, dict)}
     for name, value in document.items():
-        if isinstance(value, dict) and _is_camera(inner := _by_name(value)):
+        if isinstance(value, dict) and _is_camera(inner := _with_k(_by_name(value))):
             yield str(name), {**shared, **inner}
+
+
+def _with_k(values: dict[str, Any]) -> dict[str, Any]:
+    """The values, with K and distortion that stand number by number, or in an object of their own, at their usual names."""
+    unread = [name for name in (*_RVEC, *_T) if isinstance(values.get(name), list) and any(map(_is_text, values[name]))]
+    values = {_OF_CAMERA.sub("", name): value for name, value in values.items() if name not in unread}
+    for name in (*_INNER, *_SIZE):
+        if isinstance(inner := values.get(name), dict) and "data" not in inner:
+            values = {**{key: value for key, value in values.items() if key != name}, **_by_name(inner)}
+    if "mu" in values and "mv" in values:  # VINS' name for OpenCV's fisheye, whose k1 … k4 are k2 … k5 there
+        names = {"mu": "fx", "mv": "fy", **{f"k{i + 1}": f"k{i}" for i in range(1, 5)}}
+        values = {names.get(key, key): value for key, value in values.items()}
+    parts = [_first(values, names) for names in _PARTS_OF_K]
+    if _first(values, _K) is None and all(isinstance(part, int | float) for part in parts):
+        used = {name for names in _PARTS_OF_K for name in names}
+        values = {**{key: value for key, value in values.items() if key not in used}, "k": parts}
+    return values
+
+
+def _is_text(value: Any) -> bool:
+    """True for what YAML has of a matrix in a list, as of all rvecs of a calibration: its tag alone."""
+    return isinstance(value, str) and value.startswith("!!")
+
+
+def _stereo(values: dict[str, Any], source: Source) -> list[tuple[str, dict[str, Any]]]:
+    """The two cameras that OpenCV's stereoCalibrate finds: (name, values) each; none where there are none."""
+    for names in _STEREO:
+        sides = [_of_side(values, name) for name in names]
+        if all(_is_camera(side) for side in sides):
+            near = [beside for name in _BESIDE if (beside := source.file(name)) is not None]
+            between = next(filter(None, map(_rotation_between, (values, *(_by_name(_storage(each)) for each in near)))), None)
+            if between is not None:
+                sides[0] |= {"r": np.eye(3).tolist(), "t": [0.0, 0.0, 0.0]}
+                sides[1] |= between
+            stem = f"{source.path.stem} " if source.path else "camera "
+            return [(stem + name, side) for name, side in zip(names, sides, strict=True)]
+    return []
+
+
+def _is_pose_alone(source: Source) -> bool:
+    """True if OpenCV's FileStorage has R and T and no K, as stereo_calib's extrinsics.yml."""
+    is_storage = not source.is_folder and ("opencv-matrix" in source.text[:2000] or "<opencv_storage>" in source.text[:2000])
+    return (
+        is_storage and _rotation_between(_by_name(_storage(source))) is not None and not any(True for _ in _cameras_in(source))
+    )
+
+
+def _of_side(values: dict[str, Any], name: str) -> dict[str, Any]:
+    """The values of one camera of two, by their names without its own, and the picture's size. Its R and P rectify it."""
+    side = {key: value for key, value in values.items() if is_size(key)}
+    for key, value in values.items():
+        root = key.removeprefix(name) if len(name) > 1 and key.startswith(name) else key.removesuffix(name)
+        if root != key and isinstance(value, list | dict) and (root in _OF_ONE or root in _DISTORTION):
+            side["k" if root in _OF_ONE else "distcoeffs"] = value
+    return side
+
+
+def _rotation_between(values: Mapping[str, Any]) -> dict[str, Any] | None:
+    """R and T from the first camera to the second; None where they are not said."""
+    turn, translation = _first(values, _R), _first(values, _T)
+    return None if turn is None or translation is None else {"r": turn, "t": translation}
 
 
 def _document(source: Source) -> Mapping[str, Any]:
     if source.is_folder:
         return {}
     if source.npz:
-        return {name: array.tolist() for name, array in source.npz.items()}
+        return _arrays(source.npz)
     if source.document:
         return source.document
+    if (k := _k_alone(source)) is not None:
+        return {"k": k}
     if isinstance(source.json, list):
         return {f"camera {i}": value for i, value in enumerate(source.json)}
-    if source.text.lstrip()[:1] == "<":
-        return _xml(source)
-    return source.yaml if _SAYS_K.search(source.text) else {}
+    return _storage(source) if source.text.lstrip()[:1] == "<" or _SAYS_K.search(source.text) else {}
+
+
+def _storage(source: Source) -> Mapping[str, Any]:
+    return _xml(source) if source.text.lstrip()[:1] == "<" else source.yaml
+
+
+def _is_stack(array: np.ndarray, name: str) -> bool:
+    """True if there is one K, pose or part of a pose for each of several pictures, and not one alone."""
+    if name in (*_RVEC, *_T):
+        return array.ndim > 1 and array.size == 3 * len(array)
+    return array.ndim == 3 and (name in _K or is_of_pose(name))
+
+
+def _k_alone(source: Source) -> list[list[float]] | None:
+    """The rows of K, which is all that the source holds, as an array, a list of JSON or three lines; else None."""
+    try:
+        if source.npy is not None:
+            rows = source.npy.tolist()
+        elif isinstance(source.json, list):
+            rows = source.json
+        elif source.is_binary or len(source.text) > 1000:
+            return None
+        else:
+            rows = [[float(word) for word in re.split(r"[\s,]+", line.strip())] for line in source.text.strip().split("\n")]
+        matrix = np.array(rows, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    is_k = (
+        matrix.shape == (3, 3) and matrix[2].tolist() == [0, 0, 1] and matrix[1, 0] == 0 and min(matrix[0, 0], matrix[1, 1]) > 2
+    )
+    return rows if is_k else None
+
+
+def _arrays(arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """The arrays by their names; where there is one for each of several pictures, a camera for each."""
+    names = {name: plain(name) for name in arrays}
+    names = {
+        name: each[:-1] if each[:-1] in (*_K, *_R, *_RVEC, *_T, *_EXTRINSIC, *_OTHER_POSE) else each
+        for name, each in names.items()
+    }
+    stacked = {name: len(arrays[name]) for name, each in names.items() if _is_stack(arrays[name], each)}
+    if len({*stacked.values()}) != 1:
+        return {name: array.tolist() for name, array in arrays.items()}
+    (count,) = {*stacked.values()}
+    return {
+        f"{i:05d}": {each: (arrays[name][i] if name in stacked else arrays[name]).tolist() for name, each in names.items()}
+        for i in range(count)
+    }
 
 
 def _xml(source: Source) -> dict[str, Any]:
@@ -372,7 +500,12 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     size, stated = _size(values, what, options)
     plane = plane_of_k(_numbers("K", k), size, half_pixel(options), what)
     plane, windowed = of_window(plane, values, what)
-    lens, note = settled(_coefficients(values, what, is_fisheye), is_fisheye, plane, what, options)
+    bent = _coefficients(values, what, is_fisheye)
+    if "inverse" in str(values.get("model", "")).lower() and any(
+        bent.values() if isinstance(bent, dict) else bent
+    ):  # RealSense's
+        not_a_pinhole(what, f"of the model {checks.quoted(values['model'])}")
+    lens, note = settled(bent, is_fisheye, plane, what, options)
     notes = told_of_half_pixel(options, "OpenCV") + windowed + note
     matrix, more = _pose(values, what, options)
     pinhole, more_of_pose = axes.pinhole(matrix, plane, what)
@@ -399,7 +532,8 @@ def says_fisheye(values: Mapping[str, Any], what: str) -> bool:
     models = [
         value
         for key, value in values.items()
-        if plain(key) in ("cameramodel", "distortionmodel", "model", "distortiontype") and isinstance(value, str)
+        if plain(key) in ("cameramodel", "distortionmodel", "model", "modeltype", "type", "distortiontype")
+        and isinstance(value, str)
     ]
     is_fisheye = [bool(_FISHEYE.search(model.lower())) for model in models]
     for model, known in zip(models, is_fisheye, strict=True):
@@ -448,7 +582,8 @@ def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple
         numbers = _numbers(f"the size of {what}", both)
         if len(numbers) != 2:
             raise InputError(f"the size of {what} has {len(numbers)} numbers: give the width and the height")
-        return tuple(pixels(f"the size of {what}", number) for number in numbers), True
+        across, up = (pixels(f"the size of {what}", number) for number in numbers)
+        return (across, up), True
     return options.size_or_refuse(what), False
 
 

@@ -5,7 +5,8 @@
     pose/0.txt, color/0.jpg          ScanNet: with intrinsic/intrinsic_color.txt, or intrinsics_color.txt, in the one above
 
 These are from the camera, x right, y down, z into the view, to the world. Other files do not say which way they go, and ask for
-`Options.pose`. K counts as OpenCV's does. Pictures that were not placed, whose numbers are no numbers, are left out.
+`Options.pose`; an NPY of one pose or of several is such a file. K counts as OpenCV's does. Pictures that were not placed, whose
+numbers are no numbers, are left out.
 
 Source: ScanNet's SensReader/python/README.md; 7-Scenes' and 3DMatch's pages; tsdf-fusion-python's fusion.py and demo.py.
 """
@@ -35,11 +36,16 @@ _FARTHEST = 1e-2
 
 
 def recognizes(source: Source) -> bool:
+    if source.npy is not None:
+        return bool(_of_array(source.npy))
     files = _files(source)
     return bool(files) and _matrix(files[0]) is not None
 
 
 def read(source: Source, options: Options) -> list[Camera]:
+    if source.npy is not None:
+        named = ((f"{i:05d}", {"transform": matrix}) for i, matrix in enumerate(_of_array(source.npy)))
+        return [opencv.camera(name, values, options) for name, values in named]
     files = _files(source)
     shared = _intrinsics(files[0])
     is_known = bool(shared) or (files[0].path is not None and bool(_OF_FRAME.fullmatch(files[0].path.stem)))
@@ -89,6 +95,20 @@ def _matrix(file: Source) -> tuple[float, ...] | None:
         rows = np.array([[float(word) for word in line] for line in lines])
     except ValueError:
         return None
+    return _pose(rows)
+
+
+def _of_array(array: np.ndarray) -> list[tuple[float, ...]]:
+    """The numbers of each pose of an array, (…, 3 or 4, 4); none if one of them is none."""
+    if array.ndim not in (2, 3) or array.shape[-2:] not in ((3, 4), (4, 4)):
+        return []
+    every = [_pose(rows.astype(np.float64)) for rows in array.reshape(-1, *array.shape[-2:])]
+    poses = [pose for pose in every if pose is not None]
+    return poses if len(poses) == len(every) else []
+
+
+def _pose(rows: np.ndarray) -> tuple[float, ...] | None:
+    """The numbers of a matrix, of which some may be infinite; None if it is no pose."""
     if np.isfinite(rows).all():
         turn = rows[:3, :3]
         is_turn = np.abs(turn).max() < 2 and np.abs(turn @ turn.T - np.eye(3)).max() < _FARTHEST

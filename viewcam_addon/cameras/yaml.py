@@ -19,25 +19,37 @@ def read(text: str) -> dict[str, Any]:
     """The keys of a text and what stands there; none of what is not of this part of YAML."""
     root: dict[str, Any] = {}
     stack: list[tuple[int, dict[str, Any]]] = [(-1, root)]
-    block: tuple[int, list] | None = None
+    block: list[tuple[int, list]] = []
     for line in _joined(text):
-        if (item := _ITEM.match(line)) and block is not None and len(item[1]) >= block[0]:
-            block[1].append(_value(item[2].strip()))
+        if block and (item := _ITEM.match(line)) and len(item[1]) >= block[0][0]:
+            _append(block, len(item[1]), item[2])
             continue
         if not (match := _key(line)):
             continue
         indent, key, value = match
         while indent <= stack[-1][0]:
             stack.pop()
-        holder, block = stack[-1][1], None
+        holder, block = stack[-1][1], []
         if value:
             holder[key] = _value(value)
         elif len(stack) <= _DEEPEST:
             inner = _Block()
             holder[key] = inner
             stack.append((indent, inner))
-            block = (indent, inner.items_of_list)
+            block = [(indent, inner.items_of_list)]
     return _settled_blocks(root)
+
+
+def _append(opened: list[tuple[int, list]], indent: int, text: str) -> None:
+    """Add an item to the list of its indentation; the item `- 1` opens one in it. opened : (indentation, list), outer first."""
+    while len(opened) > 1 and indent < opened[-1][0]:
+        opened.pop()
+    while (inner := _ITEM.match(text) if text else None) and len(opened) <= _DEEPEST:
+        indent += len(text) - len(inner[2])
+        opened[-1][1].append([])
+        opened.append((indent, opened[-1][1][-1]))
+        text = inner[2]
+    opened[-1][1].append(_value(text.strip()))
 
 
 def _key(line: str) -> tuple[int, str, str] | None:
