@@ -707,6 +707,35 @@ def test_matrices_that_are_made_before_they_are_filled_and_names_of_two_words_ar
     assert camera.pinhole.eye == (0, 0, -2)
 
 
+CALIBRATION = """<?xml version="1.0" encoding="UTF-8"?>
+<calibration>
+  <projection>frame</projection>
+  <width>1384</width>
+  <height>1032</height>
+  <f>1278.25</f>
+  <cx>-10.5</cx>
+  <cy>-12.25</cy>
+  <k1>-0.1776</k1>
+  <k2>0.1568</k2>
+  <p1>0.000397</p1>
+  <p2>-8.5e-05</p2>
+  <date>2020-07-15T09:43:30Z</date>
+</calibration>
+"""
+
+
+def test_a_calibration_of_metashape_alone_is_a_camera_at_the_origin():
+    (camera,) = cameras.read(CALIBRATION)
+    pinhole = camera.pinhole
+    assert (pinhole.width, pinhole.height, pinhole.distance, pinhole.eye) == (1384, 1032, (1278.25, 1278.25), (0, 0, 0))
+    assert pinhole.principal_point == (692 - 10.5, 516 + 12.25)
+    assert camera.lens == distortion.opencv({"k1": -0.1776, "k2": 0.1568, "p1": -8.5e-05, "p2": 0.000397})
+    (camera,) = cameras.read(CALIBRATION.replace("frame", "fisheye"))
+    assert camera.lens.projection == "equidistant"
+    with pytest.raises(InputError, match="'spherical'"):
+        cameras.read(CALIBRATION.replace("frame", "spherical"))
+
+
 def test_json_with_a_comma_before_the_closing_bracket_in_the_next_line_is_read():
     text = cameras.write([Camera("a", CAMERAS["shifted"])], "transforms").rstrip().removesuffix("}") + ",\n}\n"
     (camera,) = cameras.read(text)
