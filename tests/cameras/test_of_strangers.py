@@ -678,7 +678,7 @@ Tc_3  = [ -1.549437e+02 ; -1.595167e+02 ; 7.575891e+02 ];
 def test_pictures_of_the_calibration_toolbox_for_matlab_are_where_opencv_projects_them():
     cv2 = pytest.importorskip("cv2")
     read_cameras = cameras.read(TOOLBOX.replace("\n", "\r\n"))
-    assert [camera.name for camera in read_cameras] == ["image 1", "image 3"]
+    assert [camera.name for camera in read_cameras] == ["image_1", "image_3"]
     k = np.array([[657.395353340077460, 0, 302.983766534402610], [0, 658.763142353886830, 242.616284123219370], [0, 0, 1]])
     bent = np.array([-0.255835686105780, 0.127572945483490, -0.000208182110586, 0.000033353463620, 0.0])
     turns = ([1.654766, 1.651927, -0.6699815], [1.849011, 1.900554, -0.3970866])
@@ -736,7 +736,23 @@ def test_a_calibration_of_metashape_alone_is_a_camera_at_the_origin():
         cameras.read(CALIBRATION.replace("frame", "spherical"))
 
 
+def test_the_world_of_nerfstudio_alone_says_where_it_belongs():
+    with pytest.raises(InputError, match="has no cameras.* beside camera_path.json"):
+        cameras.read(json.dumps({"transform": np.eye(4)[:3].tolist(), "scale": 0.5}))
+
+
 def test_json_with_a_comma_before_the_closing_bracket_in_the_next_line_is_read():
     text = cameras.write([Camera("a", CAMERAS["shifted"])], "transforms").rstrip().removesuffix("}") + ",\n}\n"
     (camera,) = cameras.read(text)
     assert camera.pinhole == CAMERAS["shifted"]
+
+
+def test_cameras_that_their_file_does_not_name_are_called_so_that_colmap_can_name_their_pictures(tmp_path):
+    storage(
+        tmp_path / "intrinsics.yml", M1=np.array(K_ALONE, float), M2=np.array(K_ALONE, float), R=np.eye(3), T=np.ones((3, 1))
+    )
+    bundler = "# Bundle file v0.3\n1 0\n500 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 5\n"
+    for source in (tmp_path / "intrinsics.yml", bundler, TOOLBOX):
+        read_cameras = cameras.read(source, options=dataclasses.replace(VGA, without_distortion=True))
+        cameras.save(read_cameras, tmp_path / "model", "colmap")
+        assert [camera.name for camera in cameras.read(tmp_path / "model")] == [camera.name for camera in read_cameras]

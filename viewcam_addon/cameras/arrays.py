@@ -117,7 +117,7 @@ def _of_toolbox(text: str) -> dict[str, dict[str, Any]]:
     shared |= {own_name: stated[name][0] for name, own_name in (("nx", "width"), ("ny", "height")) if name in stated}
     turns = {name.removeprefix("omc_"): turn for name, turn in stated.items() if name.startswith("omc_")}
     posed = {
-        f"image {number}": {**shared, "rvec": turn, "t": stated[f"Tc_{number}"]}
+        f"image_{number}": {**shared, "rvec": turn, "t": stated[f"Tc_{number}"]}
         for number, turn in turns.items()
         if f"Tc_{number}" in stated and not any(map(math.isnan, turn))
     }

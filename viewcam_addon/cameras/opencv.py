@@ -257,7 +257,7 @@ def _stereo(values: dict[str, Any], source: Source) -> list[tuple[str, dict[str,
             if between is not None:
                 sides[0] |= {"r": np.eye(3).tolist(), "t": [0.0, 0.0, 0.0]}
                 sides[1] |= between
-            stem = f"{source.path.stem} " if source.path else "camera "
+            stem = f"{source.path.stem}_" if source.path else "camera_"
             return [(stem + name, side) for name, side in zip(names, sides, strict=True)]
     return []
 
@@ -296,7 +296,7 @@ def _document(source: Source) -> Mapping[str, Any]:
     if (k := _k_alone(source)) is not None:
         return {"k": k}
     if isinstance(source.json, list):
-        return {f"camera {i}": value for i, value in enumerate(source.json)}
+        return {f"camera_{i}": value for i, value in enumerate(source.json)}
     return _storage(source) if source.text.lstrip()[:1] == "<" or _SAYS_K.search(source.text) else {}
 
 
