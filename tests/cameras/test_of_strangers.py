@@ -737,8 +737,20 @@ def test_a_calibration_of_metashape_alone_is_a_camera_at_the_origin():
 
 
 def test_the_world_of_nerfstudio_alone_says_where_it_belongs():
-    with pytest.raises(InputError, match="has no cameras.* beside camera_path.json"):
+    with pytest.raises(InputError, match=r"has no cameras.* beside camera_path.json"):
         cameras.read(json.dumps({"transform": np.eye(4)[:3].tolist(), "scale": 0.5}))
+
+
+def test_a_list_of_cameras_is_one_of_each_by_its_name():
+    listed = [
+        {"name": f"00_0{i}", "type": "hd", "resolution": [640, 480], "K": K_ALONE, "distCoef": [0.1, 0, 0, 0, 0],
+         "R": np.eye(3).tolist(), "t": [[i], [0], [2]]}
+        for i in range(2)
+    ]  # fmt: skip
+    read_cameras = cameras.read(json.dumps({"calibDataSource": "160906", "cameras": listed}))
+    assert [camera.name for camera in read_cameras] == ["00_00", "00_01"]
+    assert [camera.pinhole.eye for camera in read_cameras] == [(0, 0, -2), (-1, 0, -2)]
+    assert read_cameras[0].lens == distortion.opencv({"k1": 0.1})
 
 
 def test_json_with_a_comma_before_the_closing_bracket_in_the_next_line_is_read():

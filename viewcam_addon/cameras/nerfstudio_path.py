@@ -46,8 +46,8 @@ def _is_world(source: Source) -> bool:
 def read(source: Source, options: Options) -> list[Camera]:
     if _is_world(source):
         raise InputError(
-            f"{source.name} has no cameras: it says how nerfstudio's world came of the data's; put it beside camera_path.json, and "
-            "choose the original world there"
+            f"{source.name} has no cameras: it says how nerfstudio's world came of the data's; put it beside camera_path.json, "
+            "and choose the original world there"
         )
     top = Record(source.document, source.name)
     kind = top.get("camera_type")

@@ -43,6 +43,7 @@ _SAYS_K = re.compile(r"(?:[km][12lr]?|matrix_?\w{0,5}|intrinsics?|mtx|fx)[\s_$\"
 _PARTS_OF_K = (("fx",), ("fy",), ("cx", "ppx", "u0", "px"), ("cy", "ppy", "v0", "py"))
 _OF_CAMERA = re.compile(r"^camera1?(?=(?:[fc][xy]|[kp]\d|width|height|type)$)")  # ORB-SLAM's
 _INNER = ("projectionparameters", "distortionparameters", "distortion", *_K)
+_LISTS = ("cameras", "Cameras", "views")  # of CMU Panoptic's calibrations, and of many programs' own
 _STEREO = (("1", "2"), ("left", "right"), ("l", "r"))
 _OF_ONE = ("m", *_K)
 _BESIDE = "extrinsics.yml", "extrinsics.yaml", "extrinsics.xml"
@@ -223,6 +224,9 @@ def _cameras_in(source: Source):
     for name, value in document.items():
         if isinstance(value, dict) and _is_camera(inner := _with_k(_by_name(value))):
             yield str(name), {**shared, **inner}
+        for i, each in enumerate(value if isinstance(value, list) and name in _LISTS else ()):
+            if isinstance(each, dict) and _is_camera(inner := _with_k(_by_name(each))):
+                yield str(each.get("name") or f"camera_{i}"), inner
 
 
 def _with_k(values: dict[str, Any]) -> dict[str, Any]:
