@@ -52,7 +52,7 @@ _TEMPLATE = re.compile(r"\s*<[\w\s,:]{0,60}>")
 _ORDER = re.compile(r"byrow\s*=\s*(?:TRUE|T)\b")
 _SCALARS = ("fx", "fy", "cx", "cy")
 _DIAGONAL = re.compile(r"\(\s*[1-4]\s*\)")
-_TOOLBOX = re.compile(r"^\s*(fc|cc|kc|nx|ny|alpha_c|omc_\d+|Tc_\d+)\s*=\s*\[?([^\]\n]*)\]?", re.MULTILINE)
+_TOOLBOX = re.compile(r"^[ \t]*(fc|cc|kc|nx|ny|alpha_c|omc_\d+|Tc_\d+)[ \t]*=[ \t]*\[?([^\]\n]*)\]?", re.MULTILINE)
 
 
 @dataclass(frozen=True)
