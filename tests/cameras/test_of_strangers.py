@@ -753,6 +753,14 @@ def test_a_list_of_cameras_is_one_of_each_by_its_name():
     assert read_cameras[0].lens == distortion.opencv({"k1": 0.1})
 
 
+@pytest.mark.parametrize("sign", ["=", " "])
+def test_options_of_f3d_are_a_camera_of_vtk(sign):
+    words = {"position": "7,-6,4", "focal-point": "0,0,1", "view-up": "0,0,1", "view-angle": "40"}
+    pinhole = read("f3d " + " ".join(f"--camera-{name}{sign}{value}" for name, value in words.items()) + " a.glb").pinhole
+    assert (pinhole.eye, pinhole.look_at, pinhole.up) == ((7, -6, 4), (0, 0, 1), (0, 0, 1))
+    assert pinhole.distance[1] == pytest.approx(240 / math.tan(math.radians(20)))
+
+
 def test_json_with_a_comma_before_the_closing_bracket_in_the_next_line_is_read():
     text = cameras.write([Camera("a", CAMERAS["shifted"])], "transforms").rstrip().removesuffix("}") + ",\n}\n"
     (camera,) = cameras.read(text)
