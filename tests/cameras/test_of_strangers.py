@@ -589,6 +589,9 @@ def test_arrays_of_poses_are_a_camera_each(tmp_path):
         assert [camera.pinhole.eye for camera in read_cameras] == [(0, 0, 0), (1, 0, 0), (2, 0, 0)]
     with pytest.raises(InputError, match="give --pose"):
         cameras.read(tmp_path / "scene.npz", options=VGA)
+    text = json.dumps({"mtx": K_ALONE, "dist": [0] * 5, **{name: value.tolist() for name, value in vectors.items()}})
+    read_cameras = cameras.read(text, options=VGA)
+    assert [camera.pinhole.eye for camera in read_cameras] == [(0, 0, 0), (1, 0, 0), (2, 0, 0)]
 
 
 MAIN_JS = """// Copyright

@@ -19,9 +19,10 @@ lines; K that means the corner where it is exactly half the size: the middle of 
 Source: OpenCV's modules/core/src/persistence_yml.cpp and calib3d's projectPoints.
 """
 
+import contextlib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -218,7 +219,7 @@ def _cameras_in(source: Source):
         yield from pair
         return
     if _is_camera(by_name) or "mirrorparameters" in by_name:  # of VINS' MEI, which is refused by its name
-        yield (source.path.stem if source.path else "camera"), by_name
+        yield from _of_pictures(source.path.stem if source.path else "camera", by_name)
         return
     shared = {name: value for name, value in by_name.items() if not isinstance(value, dict)}
     for name, value in document.items():
@@ -227,6 +228,20 @@ def _cameras_in(source: Source):
         for i, each in enumerate(value if isinstance(value, list) and name in _LISTS else ()):
             if isinstance(each, dict) and _is_camera(inner := _with_k(_by_name(each))):
                 yield str(each.get("name") or f"camera_{i}"), inner
+
+
+def _of_pictures(name: str, values: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The camera, or one for each picture where there is an rvec and a tvec of each, as `calibrateCamera` finds them."""
+    turns, places = (_first(values, names) for names in (_RVEC, _T))
+    if isinstance(turns, list) and isinstance(places, list):
+        with contextlib.suppress(InputError):
+            numbers = [np.array(flat("a vector", value)) for value in (turns, places)]
+            if len(numbers[0]) == len(numbers[1]) > 3 and len(numbers[0]) % 3 == 0:
+                for i, (turn, place) in enumerate(zip(*(each.reshape(-1, 3).tolist() for each in numbers), strict=True)):
+                    rest = {key: value for key, value in values.items() if key not in (*_RVEC, *_T)}
+                    yield f"{i:05d}", {**rest, "rvec": turn, "t": place}
+                return
+    yield name, values
 
 
 def _with_k(values: dict[str, Any]) -> dict[str, Any]:
