@@ -375,6 +375,15 @@ def test_docstrings_begin_with_what_a_thing_is_or_does():
     assert guilty(vague_beginnings) == {}
 
 
+def test_comments_begin_with_what_a_thing_is_or_does():
+    """In Python and in the core; a sentence may begin with What, whose subject that is."""
+    vague = re.compile(r"(?m)^ *(?:#|//) (?:Of|That of|The same|Those|Whether)\b.*")
+    core = [path for path in PACKAGE.rglob("*") if path.suffix in (".h", ".cpp")]
+    texts = {str(path.relative_to(PACKAGE)): path.read_text(encoding="utf-8") for path in (*sources(), *core)}
+    assert {name: faults for name, text in texts.items() if (faults := vague.findall(text))} == {}
+    assert len(vague.findall("x = 1\n    # Of a picture.\n// The same of four.\n")) == 2
+
+
 def test_names_say_what_a_value_is_and_are_spelled_as_blender_spells():
     assert guilty(poor_names) == {}
     assert not [name for name in tracked_files() if is_british(name)]

@@ -40,7 +40,7 @@ def number(name: str, value: object, least: float = -math.inf, most: float = mat
 
 
 # No overloads by count: typing would keep them, and with them this module, once the add-on is gone.
-def vector(name: str, values: object, count: int) -> tuple[float, ...]:
+def vector(name: str, values: Any, count: int) -> tuple[Any, ...]:
     """`count` values, of whatever can be iterated over, as finite floats."""
     try:
         if type(values) not in (tuple, list) and isinstance(values, _WITHOUT_ORDER):  # abstract classes are slow to ask
@@ -55,7 +55,7 @@ def vector(name: str, values: object, count: int) -> tuple[float, ...]:
     return numbers
 
 
-def whole(name: str, value: object) -> int:
+def whole(name: str, value: Any) -> int:
     """The value as an int from 1 to `LARGEST_WHOLE`."""
     try:
         result = 0 if isinstance(value, bool) else operator.index(value)
@@ -99,7 +99,7 @@ def array(name: str, values: ArrayLike) -> NDArray[np.float64]:
             with warnings.catch_warnings():  # a masked element in a list becomes nan, with a warning
                 warnings.simplefilter("ignore")
                 values = np.asarray(values)
-        if np.ma.is_masked(values):
+        if np.ma.is_masked(values):  # type: ignore[no-untyped-call]
             raise TypeError
         if values.dtype == object:
             values = np.array([_real(value) for value in values.flat], dtype=np.float64).reshape(values.shape)
@@ -123,7 +123,7 @@ def finite(name: str, values: NDArray[np.float64]) -> None:
 def broadcast(**arrays: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
     """The named arrays, read-only, in their common shape."""
     try:
-        return np.broadcast_arrays(*arrays.values())
+        return tuple(np.broadcast_arrays(*arrays.values()))
     except ValueError:
         shapes = ", ".join(f"{name} {values.shape}" for name, values in arrays.items())
         raise InputError(f"the shapes do not fit together ({shapes}): give equal ones, or single numbers") from None
@@ -149,4 +149,4 @@ def _real(value: object) -> float:
     try:
         return float(value)
     except OverflowError:
-        return math.inf if value > 0 else -math.inf
+        return math.inf if value > 0 else -math.inf  # type: ignore[operator]

@@ -110,7 +110,8 @@ class ProcessGroup:
     """
 
     def __init__(self, command: Sequence[str], log: Path, variables: Mapping[str, str], handle: int | None = None) -> None:
-        apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if _ON_WINDOWS else {"start_new_session": True}
+        windows: Any = subprocess  # on Linux mypy knows nothing of what is Windows' own, here and below
+        apart = {"creationflags": windows.CREATE_NO_WINDOW} if _ON_WINDOWS else {"start_new_session": True}
         if handle is not None:
             apart |= _inherited(handle)
         with open(log, "wb") as words:
@@ -142,8 +143,9 @@ class ProcessGroup:
 class _WindowsJob:
     """A job object: a process and all that it starts."""
 
-    def __init__(self, process: subprocess.Popen) -> None:
-        self._kernel32 = ctypes.WinDLL("kernel32")
+    def __init__(self, process: Any) -> None:
+        windows: Any = ctypes
+        self._kernel32 = windows.WinDLL("kernel32")
         self._kernel32.CreateJobObjectW.restype = ctypes.c_void_p
         self._handle = ctypes.c_void_p(self._kernel32.CreateJobObjectW(None, None))
         self._kernel32.AssignProcessToJobObject(self._handle, ctypes.c_void_p(int(process._handle)))
@@ -156,12 +158,14 @@ class _WindowsJob:
         self._kernel32.CloseHandle(self._handle)
 
 
-def _inherited(handle: int) -> dict[str, object]:
+def _inherited(handle: int) -> dict[str, Any]:
     """The arguments of Popen by which the child has a handle of ours."""
     if not _ON_WINDOWS:
         return {"pass_fds": (handle,)}
-    os.set_handle_inheritable(handle, True)
-    return {"startupinfo": subprocess.STARTUPINFO(lpAttributeList={"handle_list": [handle]})}
+    windows: Any = os
+    windows.set_handle_inheritable(handle, True)
+    windows = subprocess
+    return {"startupinfo": windows.STARTUPINFO(lpAttributeList={"handle_list": [handle]})}
 
 
 class ProcessEnded(InputError):

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 # Lengths, in distances to the drawn view plane. Up is longer than v, which it covers where the view is level.
 _AXIS, _UP = 0.4, 0.6
-# Of an arrow's length: how long its head is, and how far its four barbs stand off.
+# The length of an arrow's head, and how far its four barbs stand off, as shares of its own length.
 _HEAD, _BARB = 0.12, 0.045
 # At most so many pixels of the grid, along the picture's larger side.
 _CELLS = 16

@@ -31,7 +31,7 @@ Index = int | NDArray[np.intp]
 # Terms of a sum settle in as many passes as there are terms or fewer; what has not settled by then is reported.
 _DISTILLATION_PASSES = 12
 _SPLITTER = 2.0**27 + 1
-# Of vectors whose largest component is about 1: the product of two components this small still has an exact error term.
+# In vectors whose largest component is about 1, the product of two components this small still has an exact error term.
 SMALLEST_FACTOR = 2.0**-400
 # The difference of two numbers below this can't overflow, nor can the splitting of its parts.
 LARGEST_PART = 2.0**1000

@@ -74,7 +74,7 @@ _LIGHT = {
     "Variance": _Pass("RGB"),
 }
 _RENDERED = _LIGHT | _GEOMETRY
-# Of a picture whose pixels have as many samples as a wanted error takes, how many.
+# The number of samples of each pixel, in a picture of a wanted error.
 _OPTIONAL = {"Sample Count": "X"}
 # Labels, beside some of these: docs/labels.md says what they hold. X and Y of a flow are pixels to the right and down.
 _LABELS = {

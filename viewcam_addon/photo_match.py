@@ -24,13 +24,14 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import checks
 from .errors import InputError
-from .pinhole import Pair, Pinhole, Triple, check_distance
+from .pinhole import Pinhole, Triple, check_distance
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ _SHORTEST, _LONGEST = 0.02, 200.0  # d of a start, of half the picture's larger 
 _LARGEST_ERROR = math.log(2.0)  # of d, as a factor: what is less certain than that is no answer
 _LARGEST_SHIFT = 0.5  # of the principal point's error, of half the picture's larger side: what is less certain is no answer
 _OPEN = 1e-13  # an eigenvalue of 7 by 7 numbers near 1 that is less than this is rounding
-# Of the coordinates' spread: what lies nearer to a plane than this is in it.
+# The share of the coordinates' spread within which a point is in a plane.
 _FLAT = 1e-6
 
 
@@ -61,9 +62,9 @@ class Match:
     pinhole: Pinhole
     precision: float
     error: float
-    distance_between: Pair
+    distance_between: tuple[float, float]
     eye_error: Triple | None
-    principal_point_error: Pair | None
+    principal_point_error: tuple[float, float] | None
     pixels: dict[str, float]
 
 
@@ -98,7 +99,7 @@ class KnownEdge:
 
 
 def from_edges(
-    edges: Sequence[tuple[str, ArrayLike, ArrayLike]],
+    edges: Sequence[tuple[str, Any, Any]],
     like: Pinhole,
     precision: float = 1.0,
     distance: float | None = None,
@@ -151,7 +152,7 @@ def _known_distance(distance: float | None) -> float | None:
     return distance
 
 
-def _eye_of(known: KnownEdge, edges: Sequence[tuple[str, ArrayLike, ArrayLike]], solution: Solution, like: Pinhole) -> Array:
+def _eye_of(known: KnownEdge, edges: Sequence[tuple[str, Any, Any]], solution: Solution, like: Pinhole) -> Array:
     """The eye of the camera that sees an edge of known length begin in a known place."""
     length = checks.number("length", known.length)
     if length <= 0:
@@ -199,7 +200,7 @@ def from_points(
 
 def from_rectangle(
     corners: ArrayLike,
-    sides: Pair,
+    sides: tuple[float, float],
     like: Pinhole,
     precision: float = 1.0,
     origin: Triple = (0.0, 0.0, 0.0),
@@ -219,10 +220,10 @@ def from_rectangle(
     """
     if len(axes) != 2 or any(axis not in _AXES for axis in axes) or axes[0] == axes[1]:
         raise InputError(f"a rectangle's sides run along {axes!r}: name two axes, such as XY")
-    sides = checks.vector("sides", sides, 2)
-    if min(sides) <= 0.0:
-        raise InputError(f"a rectangle has sides of {sides[0]:g} and {sides[1]:g}: give lengths above 0")
-    first, second = (length * np.eye(3)[_AXES.index(axis)] for length, axis in zip(sides, axes, strict=True))
+    lengths = checks.vector("sides", sides, 2)
+    if min(lengths) <= 0.0:
+        raise InputError(f"a rectangle has sides of {lengths[0]:g} and {lengths[1]:g}: give lengths above 0")
+    first, second = (length * np.eye(3)[_AXES.index(axis)] for length, axis in zip(lengths, axes, strict=True))
     places = np.array(checks.vector("origin", origin, 3)) + np.array([0 * first, first, first + second, second])
     return from_points(places, corners, like, precision, distance)
 

@@ -333,7 +333,7 @@ class Pinhole:
             principal_point=(self.principal_point[0] * scale_x, self.principal_point[1] * scale_y),
         )
 
-    def cropped(self, column: int, row: int, width: int, height: int) -> "Pinhole":
+    def cropped(self, column: float, row: float, width: int, height: int) -> "Pinhole":
         """The camera of the part of the picture whose lower left pixel is (column, row)."""
         column, row = checks.number("column", column), checks.number("row", row)
         point = (self.principal_point[0] - column, self.principal_point[1] - row)

@@ -11,7 +11,7 @@ Every matrix is (3, 3) float64 and takes column vectors: its columns are the ima
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ def _triples(m: Array, order: str, before: Sequence[float] | None = None) -> tup
     i, j, k, sign = _axes(order)
     from_lock = np.hypot(m[..., i, i], m[..., j, i])
     is_locked = before is not None and from_lock <= _FREE
-    first = np.float64(sign * before[i]) if is_locked else np.arctan2(m[..., k, j], m[..., k, k])
+    first: Any = np.float64(sign * before[i]) if before is not None and is_locked else np.arctan2(m[..., k, j], m[..., k, k])
     second = np.arctan2(-m[..., k, i], from_lock)
     sine, cosine = np.sin(first), np.cos(first)
     third = np.arctan2(sine * m[..., i, k] - cosine * m[..., i, j], cosine * m[..., j, j] - sine * m[..., j, k])
@@ -93,10 +93,10 @@ def quaternion(rotation: Array) -> Array:
 
 def from_quaternion(numbers: Sequence[float]) -> Array:
     """The rotation matrix of (w, x, y, z) of any length; of zero, as float32 measures it, Blender's half turn about x."""
-    numbers = np.array(numbers, dtype=np.float64)
-    if numbers @ numbers <= 2.0**-150:
-        numbers = np.array([0.0, 1.0, 0.0, 0.0])
-    w, x, y, z = numbers / np.linalg.norm(numbers)
+    four = np.array(numbers, dtype=np.float64)
+    if four @ four <= 2.0**-150:
+        four = np.array([0.0, 1.0, 0.0, 0.0])
+    w, x, y, z = four / np.linalg.norm(four)
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -134,7 +134,8 @@ def numbers(rotation: Array, mode: str, before: Sequence[float] | None = None) -
     return np.array(min(triples, key=lambda triple: math.dist(triple, before)))
 
 
-def _continued_axis_angle(angle: float, *axis: float, before: Sequence[float]) -> tuple[float, ...]:
+def _continued_axis_angle(angle: float, *turned_about: float, before: Sequence[float]) -> tuple[float, ...]:
+    axis: Sequence[float] = turned_about
     if angle <= _FREE:
         axis = before[1:]
     elif np.dot(axis, before[1:]) < 0:

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("bpy")
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from batch_folders import assert_same
+from disturbed import assert_same
 from walks import walk
 
 from viewcam_addon.cli import main

@@ -104,6 +104,11 @@ def test_what_is_not_seen_is_in_the_picture_where_it_changes_another_pixel():
     assert actual == NotModeled((HAIR, FOG), 0.2, 0.1)
 
 
+def test_a_surface_that_is_not_seen_and_fills_the_picture_with_fog_is_in_it():
+    assert in_the_picture((FOG,), {FOG: mask()}, mask(3, 4), is_lit=False) == NotModeled((FOG,), 0.1, 0.0)
+    assert in_the_picture((HAIR, FOG), {FOG: mask()}, mask(3, 4), is_lit=False) == NotModeled((HAIR,), 0.1, 0.0)
+
+
 def test_without_a_picture_of_everything_the_share_of_what_has_no_surface_is_unknown():
     assert in_the_picture((HAIR, FOG), {HAIR: mask(0)}, None, is_lit=False) == NotModeled((HAIR, FOG), None, 0.05)
     assert in_the_picture((HAIR,), {HAIR: mask(0)}, None, is_lit=False) == NotModeled((HAIR,), 0.05, 0.05)

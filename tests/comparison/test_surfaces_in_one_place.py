@@ -179,7 +179,13 @@ def one_of(where):
     return of
 
 
+def through_another_camera():
+    """The picture of a marker's camera that stands a hundredth of a unit aside."""
+    return rendered(Tracer(replace(a_scene(), camera=replace(CAMERA, eye=(0.31, -4.0, 3.1))), 1))
+
+
 FAULTS = {
+    "the camera of another marker": lambda _, test: through_another_camera(),
     "all rays off by 1e-3 px": lambda tracer, test: rendered(tracer, off=1e-3),
     "an index that is not there, on a floor": lambda _, test: harmed(test, "Object Index", one_of(floors)(test), lambda _: 4.0),
     "an index that is not there, on a leaf": lambda _, test: harmed(test, "Object Index", one_of(leaves)(test), lambda _: 1.0),

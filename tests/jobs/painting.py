@@ -15,7 +15,7 @@ from pathlib import Path
 TESTS = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(TESTS), str(TESTS.parent)]
 
-from batch_folders import assert_same, contents
+from disturbed import assert_same, contents
 
 from viewcam_addon.jobs import one
 from viewcam_addon.jobs.folder import Folder, Outputs, settings_hash

@@ -28,8 +28,15 @@ def run(statements: str, timeout: float) -> subprocess.CompletedProcess[bytes]:
     # There stands a bpy that only this process can import.
     variables = child_process.environment(apart_from=bpy.utils.system_resource("SCRIPTS"))
     # In a session of its own: a Ctrl-C that is meant for us would end it, and look like a failure.
-    how = {"env": variables, "start_new_session": True, "stdin": subprocess.DEVNULL, "capture_output": True}
-    return subprocess.run(command, **how, timeout=timeout, check=False)
+    return subprocess.run(
+        command,
+        env=variables,
+        start_new_session=True,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        timeout=timeout,
+        check=False,
+    )
 
 
 def call(module: str, arguments: list[str], timeout: float) -> subprocess.CompletedProcess[bytes]:

@@ -24,7 +24,7 @@ import contextlib
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import bpy
 import numpy as np
@@ -84,8 +84,8 @@ class CameraSync:
         # camera that follows something would be placed where it stands already.
         self._placed: tuple = ()
         # The camera's state and its stored values as they were last seen to agree; None where nobody has looked.
-        self._state: tuple | None = None
-        self._values: CameraValues | None = None
+        self._state: Any = None  # a tuple, and CameraValues; None until it is first seen
+        self._values: Any = None
         self._raw: tuple | None = None  # as Blender holds these values, once a frame has looked
         # The picture in which they decide all of the camera, each by itself, so that `carry` may bring it; None in no picture.
         self._carried_in: intrinsics.Frame | None = None
@@ -694,7 +694,7 @@ def _moved(camera_object: bpy.types.Object, wanted: Pinhole, read_back: Pinhole,
     """The parts EYE, VIEW and DISTANCE that Blender has moved by more than a rounding, and nobody holds where they are."""
     differing = findings.differences(wanted, read_back, pose.reach(camera_object, depsgraph)).keys()
     moved = set(conversion.PARTS & differing)
-    if findings.EYE in moved and np.array_equal(np.float32(wanted.eye), np.float32(read_back.eye)):
+    if findings.EYE in moved and np.array_equal(np.array(wanted.eye, np.float32), np.array(read_back.eye, np.float32)):
         moved.remove(findings.EYE)
     return moved - causes.held(camera_object) if moved else moved
 
@@ -702,11 +702,11 @@ def _moved(camera_object: bpy.types.Object, wanted: Pinhole, read_back: Pinhole,
 def _as_followed(camera_object: bpy.types.Object, eye: Triple, look_at: Triple) -> tuple[Triple, Triple]:
     """Eye and look-at, but the place of its target for a point that is there but for rounding, so that it stays followed."""
     rounding = findings.LARGEST_TURN * (math.dist(eye, look_at) + max(map(abs, (*eye, *look_at))))
-    synced = []
+    synced: list[Triple] = []
     for point, stated in zip(targets.POINTS, (eye, look_at), strict=True):
         at = targets.place(camera_object, point)
         synced.append(at if at is not None and math.dist(at, stated) <= rounding else stated)
-    return tuple(synced)
+    return synced[0], synced[1]
 
 
 def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use: bool) -> Pinhole:

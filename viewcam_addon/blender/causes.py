@@ -74,7 +74,7 @@ def followed(camera_object: bpy.types.Object) -> dict[str, str]:
 _MOVING = ("COPY_LOCATION", "LIMIT_LOCATION", "LIMIT_DISTANCE", "FLOOR")
 _TURNING = ("TRACK_TO", "DAMPED_TRACK", "LOCKED_TRACK", "COPY_ROTATION", "LIMIT_ROTATION", "COPY_SCALE", "LIMIT_SCALE")
 _CONSTRAINTS = dict.fromkeys(_MOVING, frozenset({EYE})) | dict.fromkeys(_TURNING, frozenset({VIEW}))
-# Those of them that leave a camera within their limits to who moves it.
+# The constraints that leave a camera within their limits to who moves it.
 _LIMITING = ("LIMIT_LOCATION", "LIMIT_ROTATION", "LIMIT_SCALE", "LIMIT_DISTANCE", "FLOOR", "COPY_SCALE")
 
 

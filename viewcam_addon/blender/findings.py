@@ -22,9 +22,9 @@ _FLOAT32 = 2.0**-24  # the relative error of storing a number as float32
 LARGEST_TURN = 17 * _FLOAT32
 # A location is rounded once, then multiplied by the parent's matrices, twice four roundings.
 _LOCATION_ROUNDINGS = 9
-# Of a distance: lens, sensor and pixel aspect.
+# The roundings of a distance: lens, sensor and pixel aspect.
 LARGEST_ZOOM = 3 * _FLOAT32
-# The shift, and its product with the size.
+# The roundings of the shift: itself, and its product with the size.
 _SHIFT_ROUNDINGS = 2
 
 EYE, VIEW, DISTANCE, CENTER = "eye", "view", "distance", "center"

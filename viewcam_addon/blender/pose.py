@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 # shear.
 LARGEST_SKEW = 32 * 4 * 2.0**-24
 
-# Of a matrix entry, which puts an axis off by √3 times that, 1.5e-7: where the rounded numbers make no more, they will do.
+# The rounding of a matrix entry, which puts an axis off by √3 times that, 1.5e-7: rounded numbers that make no more will do.
 _ROUNDING = 3 * 2.0**-25
 
 # The property that rotates an object in the mode it has, and that of the rotation which Blender applies after it.

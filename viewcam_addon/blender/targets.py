@@ -22,6 +22,7 @@ the other. A target that is such a camera stands at its own eye, so that two cam
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import bmesh
 import bpy
@@ -48,7 +49,8 @@ def values(camera_object: bpy.types.Object) -> CameraValues:
 def followed(camera_object: bpy.types.Object, stored: CameraValues) -> CameraValues:
     """Stored values of a camera with a followed point where its target is."""
     places = {point: place(camera_object, point) for point in stored.follows}
-    return replace(stored, **{point: at for point, at in places.items() if at})
+    more: dict[str, Any] = {point: at for point, at in places.items() if at}
+    return replace(stored, **more)
 
 
 def target_of(camera_object: bpy.types.Object, point: str) -> bpy.types.Object | None:
@@ -134,7 +136,7 @@ def connect(camera_object: bpy.types.Object) -> None:
                 camera_object.driver_remove(_HOOK, index)
             continue
         bone = bone_of(camera_object, point, target)
-        paths = ()
+        paths: tuple[str, ...] = ()
         if target.type == "CAMERA":  # where it will be, its eye and its eye's target tell earlier than its transform
             paths = "virtual_pinhole.eye[0]", f"{_HOOK}[0]"
         elif group_of(camera_object, point, target):

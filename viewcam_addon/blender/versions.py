@@ -14,17 +14,15 @@ from ..image import OLDER_NAMES
 CYCLES = bpy.app.version[:2]
 # What Light Falloff does to suns: nothing, or before, it multiplies them by as good as infinity.
 SUNS_HAVE_NO_FALLOFF = bpy.app.version >= (4, 4)
-# Whether lights are objects to their nodes, in whose space places are; before, these are the world's.
+# True if lights are objects to their nodes, in whose space places are; before, these are the world's.
 LIGHTS_HAVE_SPACES = bpy.app.version >= (4, 5)
 _LINEAR = 1  # an enum's number, as foreach_set takes it
 # What Cycles draws without a material: a diffuse surface, and since 5.0 a Principled one, which bends grazing smooth normals.
 DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
-# Whether Cycles has one normal a vertex, and splits those at sharp edges (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
+# True if Cycles has one normal a vertex, and splits those at sharp edges (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
 CYCLES_HAS_VERTEX_NORMALS = bpy.app.version < (5, 1)
-# Whether meshes can keep custom normals as they are given; before, as two angles of 16 bits. Measured: 4.2, 4.5, 5.0 and 5.2.
-MESHES_KEEP_NORMALS = bpy.app.version >= (4, 5)
 
-# Whether nodes whose links go in a circle are black; before, Cycles left these links out. Measured: 4.2, 5.0 and 5.2.
+# True if nodes whose links go in a circle are black; before, Cycles left these links out. Measured: 4.2, 5.0 and 5.2.
 CIRCLES_ARE_BLACK = bpy.app.version >= (5, 0)
 
 
@@ -174,7 +172,7 @@ def modifier_input(modifier: bpy.types.NodesModifier, identifier: str) -> Any:
 EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
 
 
-# Whether EEVEE draws a view layer's material in place of all others. Measured: 4.2 does not, 5.0 and 5.2 do.
+# True if EEVEE draws a view layer's material in place of all others. Measured: 4.2 does not, 5.0 and 5.2 do.
 EEVEE_OVERRIDES_MATERIALS = bpy.app.version >= (5, 0)
 
 

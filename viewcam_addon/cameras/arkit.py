@@ -26,19 +26,19 @@ _POLYCAM = {f"t_{row}{column}" for row in range(3) for column in range(4)}
 
 
 def recognizes(source: Source) -> bool:
-    return bool(_files(source)) or _is_record3d(source)
+    return bool(_files(source)) or _record3d_in(source) is not None
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    if _is_record3d(source):
-        cameras = _record3d(source if not source.is_folder else source.file("metadata"), options)
+    if metadata := _record3d_in(source):
+        cameras = _record3d(metadata, options)
     else:
         cameras = [_camera(file, options) for file in _files(source)]
     return cameras if options.axes == "y_up" else [camera.noted(_Y_UP) for camera in cameras]
 
 
 def _files(source: Source) -> list[Source]:
-    if not source.is_folder:
+    if source.path is None or not source.is_folder:
         return [source] if _is_ours(source) else []
     for parts in _FOLDERS:
         folder = Source(source.path.joinpath(*parts))
@@ -53,9 +53,9 @@ def _is_ours(source: Source) -> bool:
     return keys >= _POLYCAM or {"cameraPoseARFrame", "intrinsics"} <= keys
 
 
-def _is_record3d(source: Source) -> bool:
-    source = source.file("metadata") if source.is_folder else source
-    return source is not None and {"poses", "K", "w", "h"} <= source.document.keys()
+def _record3d_in(source: Source) -> Source | None:
+    file = source.file("metadata") if source.is_folder else source
+    return file if file is not None and {"poses", "K", "w", "h"} <= file.document.keys() else None
 
 
 def _camera(source: Source, options: Options) -> Camera:
@@ -110,7 +110,8 @@ def _record3d(source: Source, options: Options) -> list[Camera]:
         if not isinstance(each, list) or len(each) != len(poses):
             raise InputError(f"perFrameIntrinsicCoeffs of {source.name} should be four numbers for each pose: record it again")
         of_poses = [Record({"perFrameIntrinsicCoeffs": row}, what) for row, what in zip(each, whats, strict=True)]
-        planes = [axes.view_plane(*coefficients.numbers("perFrameIntrinsicCoeffs", 4), size) for coefficients in of_poses]
+        coefficients = (record.numbers("perFrameIntrinsicCoeffs", 4) for record in of_poses)
+        planes = [axes.view_plane(f_x, f_y, c_x, c_y, size) for f_x, f_y, c_x, c_y in coefficients]
     numbers = [Record({"pose": pose}, what).numbers("pose", 7) for pose, what in zip(poses, whats, strict=True)]
     x, y, z, w, *eyes = np.array(numbers).T
     turns = axes.rotations_of(np.stack([w, x, y, z], axis=-1), whats)

@@ -18,6 +18,8 @@ most and a false alarm for the rest.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +151,7 @@ class Depths:
         count = len(self.maps)
         self.pairs = [(i, (i + step) % count) for i in range(count) for step in range(1, min(_NEIGHBORS, count - 1) + 1)]
         self.samples = []
+        chosen: Any
         for depth in self.maps:
             rows, columns = np.nonzero(np.isfinite(depth) & (depth > 0))
             chosen = random.choice(len(rows), min(_SAMPLES, len(rows)), replace=False) if len(rows) else []
@@ -400,7 +403,7 @@ def _mistakes() -> list[Mistake]:
             True,
         ),
     ]
-    by_factors = [
+    by_factors: list[tuple[str, str, dict[str, Any], Callable[[Views, Any], Views]]] = [
         (
             "size",
             "focal lengths and principal points are of another size, or resolution percentage: times {} is right",
@@ -429,10 +432,14 @@ def _mistakes() -> list[Mistake]:
         ),
     ]
     return fine + [
-        Mistake(kind, sentence.format(description), lambda v, undone=undone, factor=factor: undone(v, factor))
+        Mistake(kind, sentence.format(description), partial(_undone_by, undone, factor))
         for kind, sentence, factors, undone in by_factors
         for description, factor in factors.items()
     ]
+
+
+def _undone_by(undone: Callable[[Views, Any], Views], factor: Any, views: Views) -> Views:
+    return undone(views, factor)
 
 
 MISTAKES = _mistakes()
@@ -501,7 +508,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     tried = [mistake for mistake in MISTAKES if not (mistake.of_world if of_depth else mistake.of_depth)]
     tried += _OF_LENSES if any(views.lenses) else []
     tried.append(_of_focal_factor(views, evidence))
-    if not of_depth and np.abs(views.center - views.size / 2).max() <= 0.5:
+    if isinstance(evidence, Tracks) and np.abs(views.center - views.size / 2).max() <= 0.5:
         tried += _left_out(views, evidence)
     errors = [evidence.errors(mistake.undone(views)) for mistake in tried]
     known = (as_is, *(each for each, mistake in zip(errors, tried, strict=True) if not mistake.is_fitted))
@@ -519,7 +526,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     errors_found = (as_is, *errors)[best]
     error, error_as_is = _usual(errors_found, evidence), _usual(as_is, evidence)
     certainty = float(costs[0] - costs[best])
-    measured = {"error": error, "error_as_is": error_as_is, "certainty": certainty, "observations": len(as_is)}
+    measured: dict[str, Any] = {"error": error, "error_as_is": error_as_is, "certainty": certainty, "observations": len(as_is)}
     sentence = f"something is wrong, in no way that is known: the evidence is off by {error_as_is:.3g} {evidence.unit}"
     unknown = Verdict("unknown", sentence, **measured)
     if certainty < _SURE:
@@ -586,7 +593,8 @@ def _factor_of_depths(views: Views, evidence: Depths) -> float:
     def usual(log: float) -> float:
         return _usual(evidence.errors(_scaled(views, math.exp(log))), evidence)
 
-    return math.exp(_least(usual, *np.log(_FACTORS), _STEPS, _FINEST))
+    first, last = np.log(_FACTORS)
+    return math.exp(_least(usual, first, last, _STEPS, _FINEST))
 
 
 def _least(cost: Callable[[float], float], first: float, last: float, steps: int, finest: float) -> float:

@@ -18,6 +18,7 @@ every machine. Rejected: `@` of NumPy and Python's `sum`, whose order or precisi
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,7 +38,7 @@ _TURNS: dict[str, tuple[Callable[[Triple], Triple] | None, Callable[[Triple], Tr
     "y_down": (lambda p: (p[0], p[2], -p[1]), lambda p: (p[0], -p[2], p[1])),
 }
 _NO_MEAN = 1e-6  # of the length of a mean of unit vectors
-# Of a rotation in a file, whose numbers have so many digits: what is worth a note, and what is none any more.
+# How far a rotation in a file, whose numbers have few digits, may be off: without a note, and as a rotation at all.
 _NOTED, _NO_ROTATION, _NO_QUATERNION = 1e-5, 2e-3, 1e-2
 _SCALED = 1e-3
 _FARTHEST = 2.0**1022  # as far again as the eye from the origin there must be room for the look-at point
@@ -66,8 +67,8 @@ def world_to_camera(pinhole: Pinhole) -> Rows:
     u, v, w = _axes(pinhole)
     rotation = [u, tuple(-a for a in v), tuple(-a for a in w)]
     e = pinhole.eye
-    translation = [-(row[0] * e[0] + row[1] * e[1] + row[2] * e[2]) for row in rotation]
-    translation = checks.vector("the translation from the world's origin to the camera", translation, 3)
+    moves = [-(row[0] * e[0] + row[1] * e[1] + row[2] * e[2]) for row in rotation]
+    translation = checks.vector("the translation from the world's origin to the camera", moves, 3)
     rows = [[*map(_plain, (*row, part))] for row, part in zip(rotation, translation, strict=True)]
     return [*rows, [0.0, 0.0, 0.0, 1.0]]
 
@@ -167,7 +168,7 @@ def rotation(rows: Sequence[Sequence[float]], what: str, scaled: bool = False) -
     if not scaled and min(lengths) < max(lengths) * (1 - _NO_ROTATION):
         stretched = " by ".join(f"{length:.6g}" for length in lengths)
         raise InputError(f"the rotation of {what} has axes of the lengths {stretched}: give axes of one length")
-    axes = tuple(tuple(part / length for part in column) for column, length in zip(columns, lengths, strict=True))
+    axes = tuple((x / length, y / length, z / length) for (x, y, z), length in zip(columns, lengths, strict=True))
     askew = max(abs(_dot(axes[i], axes[j])) for i, j in ((0, 1), (0, 2), (1, 2)))
     if askew > _NO_ROTATION:
         degrees = math.degrees(math.asin(min(askew, 1)))
@@ -258,7 +259,7 @@ def _check_length(length: float, what: str) -> None:
         raise InputError(f"the quaternion of {what} has the length {length:.6g}: give one of length 1")
 
 
-def _turn(w, x, y, z) -> tuple:
+def _turn(w: Any, x: Any, y: Any, z: Any) -> tuple:
     """The rows of the rotation of a quaternion of length 1, of floats or of arrays."""
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -283,7 +284,7 @@ def quaternion(rotation: Sequence[Sequence[float]]) -> Quaternion:
     best = max(range(4), key=lambda i: multiples[i][i])
     w, x, y, z = multiples[best]
     size = math.copysign(math.sqrt(w * w + x * x + y * y + z * z), next(part for part in (w, x, y, z) if part))
-    return tuple(part / size + 0.0 for part in (w, x, y, z))
+    return w / size + 0.0, x / size + 0.0, y / size + 0.0, z / size + 0.0
 
 
 def moved(camera: Camera, options: Options) -> Camera:
@@ -343,12 +344,12 @@ def _in_world(camera: Camera, turn: Callable[[Triple], Triple] | None, scale: fl
         return camera
     pinhole = camera.pinhole
     e, l, up = ((turn(p) if turn else p) for p in (pinhole.eye, pinhole.look_at, pinhole.up))
-    e, l = (tuple(scale * a + b + 0.0 for a, b in zip(p, (0.0, 0.0, rise), strict=True)) for p in (e, l))
+    e, l = ((scale * x + 0.0 + 0.0, scale * y + 0.0 + 0.0, scale * z + rise + 0.0) for x, y, z in (e, l))
     world = np.column_stack([_matrix(turn) * scale, [0.0, 0.0, rise]])
     before = np.vstack([np.eye(3, 4) if camera.world is None else camera.world, [0, 0, 0, 1]])
     return dataclasses.replace(
         camera,
-        pinhole=dataclasses.replace(pinhole, eye=e, look_at=l, up=tuple(a + 0.0 for a in up)),
+        pinhole=dataclasses.replace(pinhole, eye=e, look_at=l, up=(up[0] + 0.0, up[1] + 0.0, up[2] + 0.0)),
         world=tuple(map(tuple, (world @ before + 0.0).tolist())),
     )
 

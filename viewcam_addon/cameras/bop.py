@@ -34,8 +34,9 @@ def recognizes(source: Source) -> bool:
 def read(source: Source, options: Options) -> list[Camera]:
     if source.document.keys() >= _OF_SENSOR:
         return [_of_sensor(source, options)]
-    source = _document(source)
-    cameras = []
+    if (source_of_all := _document(source)) is None:
+        return []
+    source, cameras = source_of_all, []
     for number, values in source.document.items():
         image = Record(values, f"image {number}")
         name, size, stated = _picture(source, number, image, options)
@@ -43,7 +44,9 @@ def read(source: Source, options: Options) -> list[Camera]:
         notes = (*opencv.told_of_half_pixel(options, "BOP"), *(() if options.scale != 1 else (_UNITS,)))
         turn, translation = np.eye(3), (0.0, 0.0, 0.0)
         if "cam_R_w2c" in image or "cam_t_w2c" in image:
-            turn, translation = np.array(image.numbers("cam_R_w2c", 9)).reshape(3, 3), image.numbers("cam_t_w2c", 3)
+            turn = np.array(image.numbers("cam_R_w2c", 9)).reshape(3, 3)
+            x, y, z = image.numbers("cam_t_w2c", 3)
+            translation = x, y, z
         else:
             notes += (_NO_WORLD,)
         pinhole, more = axes.pinhole(axes.from_world_to_camera(turn, translation, image.place), plane, image.place)
@@ -84,9 +87,9 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
 
 
 def _document(source: Source) -> Source | None:
-    source = source.file(FILE) if source.is_folder else source
-    first = next(iter(source.document.values()), None) if source else None
-    return source if isinstance(first, dict) and "cam_K" in first else None
+    file = source.file(FILE) if source.is_folder else source
+    first = next(iter(file.document.values()), None) if file else None
+    return file if isinstance(first, dict) and "cam_K" in first else None
 
 
 def _picture(source: Source, number: str, image: Record, options: Options) -> tuple[str | None, tuple[int, int], bool]:
@@ -100,5 +103,6 @@ def _picture(source: Source, number: str, image: Record, options: Options) -> tu
         for up in ("..", "../.."):
             of_all = source.file(*up.split("/"), "camera.json")
             if of_all and {"width", "height"} <= of_all.document.keys():
-                return None, tuple(pixels(key, of_all.document[key]) for key in ("width", "height")), True
+                width, height = (pixels(key, of_all.document[key]) for key in ("width", "height"))
+                return None, (width, height), True
     return None, options.size_or_refuse(image.place), False

@@ -53,10 +53,6 @@ class Calibration:
         """The pinhole of the calibrated camera's own plane in another's place."""
         return _with_plane(pinhole, self.plane)
 
-    def covering(self, pinhole: Pinhole) -> Pinhole:
-        """The pinhole in another's place whose picture has all that the calibrated camera shows. Raises as `cover` does."""
-        return _with_plane(pinhole, self.cover)
-
     @cached_property
     def cover(self) -> ViewPlane:
         """The view plane of a pinhole's picture with square pixels that has all that the calibrated camera shows.

@@ -92,8 +92,10 @@ def _binary_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, i
 
 def depths(path: Path, cameras: Sequence[Camera]) -> Depths | None:
     """The depth maps that transforms.json names, one for each camera; None if it names none."""
-    source = Source(path)
-    if source.is_folder and (source := source.file("transforms.json")) is None:
+    source: Source | None = Source(path)
+    if source and source.is_folder:
+        source = source.file("transforms.json")
+    if source is None or source.path is None:
         return None
     document = source.document
     frames = document.get("frames")

@@ -13,6 +13,7 @@ import math
 import re
 import struct
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -80,7 +81,7 @@ def _document(source: Source) -> dict:
     inner = _json(source)
     if inner is not source and inner.json_problem:
         raise InputError(f"the JSON in {source.name} is none ({inner.json_problem}): export it again")
-    return inner.document
+    return dict(inner.document)
 
 
 def _json(source: Source) -> Source:
@@ -98,7 +99,9 @@ class _Worlds:
     """The nodes' matrices in the world."""
 
     def __init__(self, nodes: list[Record]) -> None:
-        self._nodes, self._parents, self._known = nodes, {}, {}
+        self._nodes = nodes
+        self._parents: dict[int, int] = {}
+        self._known: dict[int, Any] = {}
         for index, node in enumerate(nodes):
             for child in _list(node.get("children")):
                 if not isinstance(child, int) or not 0 <= child < len(nodes) or child in self._parents:
@@ -109,11 +112,13 @@ class _Worlds:
 
     def above(self, index: int) -> list[int]:
         """The node's parents, nearest first."""
-        result = []
-        while (index := self._parents.get(index)) is not None:
+        result: list[int] = []
+        parent = self._parents.get(index)
+        while parent is not None:
             if len(result) > len(self._nodes):
-                raise InputError(f"node {index} is its own parent: correct its children")
-            result.append(index)
+                raise InputError(f"node {parent} is its own parent: correct its children")
+            result.append(parent)
+            parent = self._parents.get(parent)
         return result
 
     def of(self, index: int) -> np.ndarray:
@@ -175,7 +180,8 @@ def _camera(name: str, camera: Record, matrix: np.ndarray, options: Options) -> 
     width, height = size
     slope = math.tan(angle / 2)
     d_y = height / 2 / slope
-    d_x, notes = d_y / options.pixel_aspect, ()
+    d_x = d_y / options.pixel_aspect
+    notes: tuple[str, ...] = ()
     if "aspectRatio" in lens:
         aspect = lens.number("aspectRatio", least=1e-9)
         across = width / 2 / (aspect * slope)

@@ -25,7 +25,8 @@ def recognizes(source: Source) -> bool:
 
 
 def read(source: Source, _options: Options) -> list[Camera]:
-    rows = _array(source)
+    if (rows := _array(source)) is None:
+        return []
     images = naming.in_order(source.path if source.is_folder or not source.path else source.path.parent, _FOLDERS, len(rows))
     cameras = []
     for index, row in enumerate(rows):
@@ -44,11 +45,11 @@ def read(source: Source, _options: Options) -> list[Camera]:
 
 
 def _array(source: Source) -> np.ndarray | None:
-    source = source.file(FILE) if source.is_folder else source
-    if source is None or source.data[:6] != b"\x93NUMPY":
+    file = source.file(FILE) if source.is_folder else source
+    if file is None or file.data[:6] != b"\x93NUMPY":
         return None
     try:
-        array = npy.read(source.data)
+        array = npy.read(file.data)
     except ValueError:
         return None
     if array.ndim != 2 or array.shape[1] not in (15, 17) or not len(array):

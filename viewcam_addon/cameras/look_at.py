@@ -201,7 +201,7 @@ class _Code:
         self._values: dict[str, object] = {}
         self._lookups = 0
         self._roles: dict[tuple[str, ...], str | None] = {}
-        # Of those that may say something of a camera: the parts of a name, what follows it, where that ends, and where the
+        # Matches that may say something of a camera: the parts of a name, what follows it, where that ends, and where the
         # name stands.
         self.statements: list[tuple[list[str], str, int, int]] = []
         self.assigned: dict[str, list[int]] = {}

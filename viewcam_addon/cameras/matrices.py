@@ -65,7 +65,8 @@ def _matrices_in(text: str) -> list[tuple[str, list[float], int]]:
     result = []
     for name in _NAMES.finditer(text[: 2**20]):
         role = _ROLES.get(texts.plain((name[1] + (name[2] or "")).replace(" ", "")))
-        numbers = _sixteen(text, _BEFORE.match(text, name.end()).end())
+        before = _BEFORE.match(text, name.end())
+        numbers = before and _sixteen(text, before.end())
         if role and numbers:
             result.append((role, numbers, name.start()))
             if len(result) > _MOST:

@@ -41,7 +41,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     if source.xml.tag == "calibration":
         return [_of_calibration(source, options)]
     left_out, result, lost = LeftOut(), [], 0
-    for chunk in source.xml.iter("chunk"):
+    for chunk in source.xml.iter("chunk") if source.xml is not None else ():
         whole = _placed(chunk.find("transform"), "the chunk")
         components = {  # in the world, as the chunk's own transform repeats of the active one
             component.get("id"): _placed(component.find("transform"), f"component {component.get('id')}")
@@ -158,7 +158,7 @@ def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, di
     resolution = sensor.find("resolution") if resolution is None else resolution
     if resolution is None:
         raise InputError(f"{what} has no resolution: export the XML again")
-    size = [pixels(f"the {side} of {what}", resolution.get(side)) for side in ("width", "height")]
+    width, height = (pixels(f"the {side} of {what}", resolution.get(side)) for side in ("width", "height"))
     values: dict[str, float] = {}
     for child in calibration:
         with contextlib.suppress(InputError):
@@ -168,7 +168,7 @@ def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, di
         raise InputError(f"{what} has the focal length {focal:g}: give one above 0")
     across = focal + values.get("b1", 0.0)
     plane = axes.view_plane(
-        across, focal, size[0] / 2 + values.get("cx", 0.0), size[1] / 2 + values.get("cy", 0.0), tuple(size)
+        across, focal, width / 2 + values.get("cx", 0.0), height / 2 + values.get("cy", 0.0), (width, height)
     )
     bent = {name: values[name] for name in (*_LENS, "b2") if name in values}
     lens = distortion.opencv(

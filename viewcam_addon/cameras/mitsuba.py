@@ -14,7 +14,8 @@ src/sensors/perspective.cpp, include/mitsuba/core/transform.h (look_at, has_scal
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -122,8 +123,8 @@ def _camera(sensor: _Sensor, options: Options) -> Camera:
                 raise InputError(f"fov_axis of {what} is {checks.quoted(axis)}: give one of {', '.join(_FOV_AXES)}")
             angle = math.radians(_number(values["fov"], f"fov of {what}"))
         else:
-            length = str(values.get("focallength", "50mm")).strip().removesuffix("mm")
-            length = _number(length, f"focal_length of {what}")
+            stated = str(values.get("focallength", "50mm")).strip().removesuffix("mm")
+            length = _number(stated, f"focal_length of {what}")
             if not 1e-6 < length < 1e6:
                 raise InputError(f"focal_length of {what} is {length:g} mm: give a positive length")
             angle, axis = 2 * math.atan(_DIAGONAL_OF_FILM / 2 / length), "diagonal"
@@ -154,9 +155,10 @@ def _film(sensor: _Sensor, options: Options) -> tuple[texts.Film, tuple[int, int
     if sensor.film is None:
         return texts.film(options, "Mitsuba", default=_SIZE), None
     what = f"the film of {sensor.name}"
-    size = tuple(
+    width, height = (
         _whole(sensor.film.get(key, usual), f"{key} of {what}") for key, usual in zip(("width", "height"), _SIZE, strict=True)
     )
+    size = width, height
     film = texts.film(options, "Mitsuba", size=size)
     keys = ("cropoffsetx", "cropoffsety", "cropwidth", "cropheight")
     if not any(key in sensor.film for key in keys):
@@ -229,7 +231,7 @@ def _elements(root: ElementTree.Element, tag: str) -> list[ElementTree.Element]:
     return [element for child in root for element in _elements(child, tag)]
 
 
-def _sensor(element: ElementTree.Element, name: str, kind: str, text, by_id: Mapping) -> _Sensor:
+def _sensor(element: ElementTree.Element, name: str, kind: str, text: Callable[[str], str], by_id: Mapping) -> _Sensor:
     values: dict[str, object] = {}
     film, pose = None, None
     children = [by_id.get(text(child.get("id", "")), child) if child.tag.lower() == "ref" else child for child in element]
@@ -256,7 +258,7 @@ def _sensor(element: ElementTree.Element, name: str, kind: str, text, by_id: Map
     return _Sensor(kind, name, values, film, pose)
 
 
-def _read(element: ElementTree.Element, text) -> str:
+def _read(element: ElementTree.Element, text: Callable[[str], str]) -> str:
     """The value; as it stands, and refused only where the camera needs it, if the command line says it."""
     value = element.get("value", "")
     try:
@@ -265,7 +267,7 @@ def _read(element: ElementTree.Element, text) -> str:
         return value
 
 
-def _transform(steps: Sequence[ElementTree.Element], name: str, text) -> "np.ndarray | _Look":
+def _transform(steps: Sequence[ElementTree.Element], name: str, text: Callable[[str], str]) -> "np.ndarray | _Look":
     moves = [step for step in steps if isinstance(step.tag, str)]
     matrices = [_step(step, name, text) for step in moves]
     if len(matrices) == 1:
@@ -282,7 +284,7 @@ def _is_mirror(step: object) -> bool:
     return isinstance(step, np.ndarray) and step.tolist() == np.diag([-1.0, 1, 1, 1]).tolist()
 
 
-def _step(step: ElementTree.Element, name: str, text) -> "np.ndarray | _Look":
+def _step(step: ElementTree.Element, name: str, text: Callable[[str], str]) -> "np.ndarray | _Look":
     tag, what = step.tag.lower(), f"<{step.tag}> of Mitsuba's sensor {name}"
 
     def vector(key: str, usual: float | None = None) -> tuple[float, ...]:
@@ -372,6 +374,7 @@ def _dictionary(text: str, opened: int, kind: str, name: str) -> _Sensor:
         if key in ("toworld",):
             pose = _product(text, item.end())
         elif text[item.end()] == "{":
+            inside: Any
             inside, _ = reader.value(item.end())
             if not isinstance(inside, dict) and key in ("film",):
                 texts.fail(text, item.end(), "give the film as a dictionary of numbers")

@@ -61,7 +61,7 @@ _DISTORTION = (
 _OTHER_DISTORTION = re.compile(r"dist(?!ance)|radial|tangential|^kc$|^[kp][1-6]$")
 _FISHEYE = re.compile(r"^(?:opencv_?)?fisheye|equidistant|kannala|^kb4?$")
 _OTHER_LENS = re.compile(r"fisheye|omni|mei|u?cm$|kb\d|spherical|ortho|fov|division|double|^ds$|theta|equirect|panoram|cylind")
-# Of what may be a pose in words that nobody knows; Kalibr's T_cam_imu is none.
+# Parts of names that may mean a pose in words that nobody knows; Kalibr's T_cam_imu is none.
 _MAY_BE_POSE = re.compile(r"pose|extrin|rotation|rot$|transf|transl|2cam|2world|toworld|tocam|w2|c2|rvec|tvec|position|quat")
 _NO_POSE = ("tcamimu", "timushift", "rectificationmatrix", "projectionmatrix", "p")
 _BLENDERS = ("matrixworld",)
@@ -154,7 +154,8 @@ def rotation_vector(turn: Sequence[Sequence[float]]) -> tuple[float, float, floa
     w, *axis = axes.quaternion(turn)
     sine = math.hypot(*axis)
     angle = 2 * math.atan2(sine, w)
-    return tuple(angle * part / sine if sine else 0.0 for part in axis)
+    x, y, z = (angle * part / sine if sine else 0.0 for part in axis)
+    return x, y, z
 
 
 def of_rotation_vector(vector: Sequence[float], what: str) -> np.ndarray:
@@ -211,7 +212,7 @@ def _is_camera(values: Mapping[str, Any]) -> bool:
         return False
 
 
-def _cameras_in(source: Source):
+def _cameras_in(source: Source) -> Iterator[tuple[str, dict[str, Any]]]:
     """(name, values by plain name) of each camera in the file."""
     document = _document(source)
     by_name = _with_k(_by_name(document))
@@ -600,7 +601,8 @@ def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple
         numbers = _numbers(f"the size of {what}", both)
         if len(numbers) != 2:
             raise InputError(f"the size of {what} has {len(numbers)} numbers: give the width and the height")
-        return tuple(pixels(f"the size of {what}", number) for number in numbers), True
+        across, up = (pixels(f"the size of {what}", number) for number in numbers)
+        return (across, up), True
     return options.size_or_refuse(what), False
 
 

@@ -18,11 +18,11 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from .. import checks
 from ..errors import InputError
-from ..intrinsics import ViewPlane
-from ..pinhole import Pinhole
+from ..pinhole import Pinhole, ViewPlane
 from . import texts
 from .camera import Camera, Options
 from .source import Source
@@ -39,11 +39,11 @@ _DOCUMENTS = re.compile(rf"{KEY}[^\w{{]{{0,4}}(?:\d{{1,18}} )?(\{{[^{{}}]*\}})")
 _BEGINNINGS = re.compile(rf"^(?:#|//) {KEY} of (\"(?:[^\"\\\n]|\\.){{0,1000}}\")", re.MULTILINE)
 # What a text says, checked: eye, look_at, up; distance (one or two), width, height, principal_point, mirrored; fov, fov_x,
 # fov_y with their axis, degrees or radians as `_Angle` says.
-Values = dict[str, object]
+Values = dict[str, Any]
 
 _SPELLINGS = {
     **dict.fromkeys(("eye", "from", "origin", "location", "position", "lookfrom"), "eye"),
-    **dict.fromkeys(("lookat", "at", "to", "target", "center", "center", "focalpoint"), "look_at"),
+    **dict.fromkeys(("lookat", "at", "to", "target", "center", "focalpoint"), "look_at"),
     **dict.fromkeys(("up", "upvector", "vup", "viewup"), "up"),
     **dict.fromkeys(("distance", "dist", "d"), "distance"),
     **dict.fromkeys(("fov", "fieldofview", "angle"), "fov"),
@@ -91,8 +91,8 @@ def recognizes(source: Source) -> bool:
         return True
     if isinstance(document := _document(source), dict):
         return any(isinstance(document.get(key), dict) for key in ("stated_camera", "camera")) or _is_camera(document)
-    word = _word(source.text, _GAP.match(source.text).end())
-    return bool(word) and bool(_SAYS_VALUE.match(source.text, word.end()))
+    word = _word(source.text, _after(_GAP, source.text, 0))
+    return word is not None and bool(_SAYS_VALUE.match(source.text, word.end()))
 
 
 def _is_camera(document: dict) -> bool:
@@ -122,7 +122,7 @@ def document(pinhole: Pinhole) -> dict:
     its pixels.
     """
     d_x, d_y = pinhole.distance
-    document = {name: list(getattr(pinhole, name)) for name in VECTORS}
+    document: dict[str, Any] = {name: list(getattr(pinhole, name)) for name in VECTORS}
     document |= {"distance": d_x if d_x == d_y else [d_x, d_y], "width": pinhole.width, "height": pinhole.height}
     if pinhole.principal_point != (pinhole.width / 2, pinhole.height / 2):
         document["principal_point"] = list(pinhole.principal_point)
@@ -239,7 +239,7 @@ def lines_of(source: Source) -> list[dict]:
     lines = [line for line in source.text.split("\n", _MOST_LINES) if line.strip()]
     if len(lines) < 2 or not all(line.startswith("{") and line.rstrip().endswith("}") for line in lines):
         return []
-    documents = [Source(line).document for line in lines]
+    documents = [dict(Source(line).document) for line in lines]
     return documents if all(map(_is_camera_of_several, documents)) else []
 
 
@@ -310,18 +310,24 @@ def pairs(text: str) -> Values:
     """
     values: Values = {}
     at = 0
-    while (at := _GAP.match(text, at).end()) < len(text):
+    while (at := _after(_GAP, text, at)) < len(text):
         word = _word(text, at)
         if not word:
             fail(text, at, _SAID)
-        name = _spelt(word[0])
+        name = _spelt(word[0]) or ""
         if name in values:
             fail(text, at, f"{name} is given twice, leave one out")
-        start = _SAYS.match(text, word.end()).end()
+        start = _after(_SAYS, text, word.end())
         values[name], at = _value(text, start, name)
     if "size" in values:
         values["width"], values["height"] = values.pop("size")
     return values
+
+
+def _after(pattern: re.Pattern[str], text: str, at: int) -> int:
+    """The end of what a pattern, which may be nothing, matches at a place."""
+    match = pattern.match(text, at)
+    return match.end() if match else at
 
 
 def _word(text: str, at: int) -> re.Match | None:
@@ -346,10 +352,12 @@ def _value(text: str, start: int, name: str) -> tuple[object, int]:
     if name in ("width", "height"):
         if not value.is_integer():
             fail(text, start, "give whole pixels")
-        return int(value), _PIXELS.match(text, at).end()
+        return int(value), _after(_PIXELS, text, at)
     if name == "distance":
-        return value, _PIXELS.match(text, at).end()
+        return value, _after(_PIXELS, text, at)
     unit = _UNIT.match(text, at)
+    if unit is None:
+        return value, at
     if unit[1]:
         value = _Angle(math.radians(value))
     elif unit[2]:
@@ -359,7 +367,7 @@ def _value(text: str, start: int, name: str) -> tuple[object, int]:
 
 def axis(text: str, at: int) -> tuple[str, int]:
     """One of `AXES`, in any spelling, and where the word ends."""
-    at = _GAP.match(text, at).end()
+    at = _after(_GAP, text, at)
     word = _WORD.match(text, at)
     if not word or word[0].lower() not in _AXIS_SPELLINGS:
         fail(text, at, f"give one of {', '.join(AXES)} for the axis of the field of view")

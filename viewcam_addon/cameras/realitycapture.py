@@ -117,7 +117,7 @@ def _lens(model: str, numbers: dict[str, float]) -> distortion.Lens:
 def _values(source: Source) -> dict[str, str]:
     """Attributes and child elements by name, wherever in the XMP."""
     result: dict[str, str] = {}
-    for element in source.xml.iter():
+    for element in source.xml.iter() if source.xml is not None else ():
         result |= element.attrib
         if text := (element.text or "").strip():
             result[element.tag] = text

@@ -14,7 +14,7 @@ import struct
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -79,7 +79,8 @@ class Source:
         if self.is_folder:
             return b""
         if self.path is None:
-            return self._content if isinstance(self._content, bytes) else self._content.encode("utf-8", errors="replace")
+            text: Any = self._content
+            return text if isinstance(text, bytes) else text.encode("utf-8", errors="replace")
         try:
             if self.path.stat().st_size > _MOST_BYTES:
                 raise InputError(f"{self.path} is larger than {_MOST_BYTES >> 20} MiB: give the file of the cameras alone")
@@ -138,10 +139,12 @@ class Source:
         if text[:1] not in ("{", "["):
             return None, ""
         problem = ""
-        for attempt in (lambda: text, lambda: _without_comments(text)):
+        attempts: tuple[Callable[[], str], ...] = (lambda: text, lambda: _without_comments(text))
+        for attempt in attempts:
             try:
-                numbers = {"parse_int": checks.whole_of_json, "parse_constant": _not_finite}
-                return json.loads(attempt(), object_pairs_hook=_unique, **numbers), ""
+                whole: Any = checks.whole_of_json  # floats of many digits, too
+                document = json.loads(attempt(), object_pairs_hook=_unique, parse_int=whole, parse_constant=_not_finite)
+                return document, ""
             except json.JSONDecodeError as error:
                 problem = f"line {error.lineno}, column {error.colno}: {error.msg}"
             except RecursionError:
@@ -218,7 +221,7 @@ class Source:
     def file(self, *parts: str) -> "Source | None":
         """The file of that name in the folder, or beside this file; None if there is none."""
         if self.path is None:
-            held = self._content.get("/".join(parts)) if self.is_folder else None
+            held = self._content.get("/".join(parts)) if isinstance(self._content, Mapping) else None
             return None if held is None else Source(held)
         path = (self.path if self.is_folder else self.path.parent).joinpath(*parts)
         try:
@@ -414,7 +417,7 @@ def _parsed_xml(text: str) -> ElementTree.Element | None:
         depth -= 1
         builder.end(_local(tag))
 
-    def refuse(*_: object) -> None:
+    def refuse(*_: object) -> Any:
         raise InputError("the XML declares entities of its own: take them out, none is read")
 
     parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, builder.data

@@ -7,7 +7,7 @@ is tried twice and no text takes long.
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NoReturn
 
@@ -15,8 +15,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import InputError
-from ..intrinsics import ViewPlane
-from ..pinhole import Pinhole, Triple
+from ..pinhole import Pinhole, Triple, ViewPlane
 from . import axes
 from .camera import Camera, Options
 
@@ -63,7 +62,8 @@ def numbers(text: str, at: int, count: int, name: str) -> tuple[tuple[float, ...
     """So many finite numbers from `at` on, whatever stands between them, and where they end."""
     result: list[float] = []
     while len(result) < count:
-        at = _GAP.match(text, at).end()
+        if gap := _GAP.match(text, at):
+            at = gap.end()
         match = _NUMBER.match(text, at)
         if not match or not math.isfinite(float(match[0])):
             fail(text, at, f"give {count} finite numbers for {name}" if count > 1 else f"give a finite number for {name}")
@@ -142,9 +142,8 @@ def film(
         if nobody knows the size.
     """
     if size:
-        return Film(
-            *(checks.whole(name, number) for name, number in zip(("width", "height"), size, strict=True)), is_stated=True
-        )
+        width, height = (checks.whole(name, number) for name, number in zip(("width", "height"), size, strict=True))
+        return Film(width, height, is_stated=True)
     notes: tuple[str, ...] = ()
     if default and not (options.size or options.view_plane or options.base):
         taken, notes = (
@@ -259,5 +258,5 @@ def shortest(number: float) -> str:
     return text.removesuffix(".0")
 
 
-def listed(numbers, separator: str = " ") -> str:
+def listed(numbers: Iterable[float], separator: str = " ") -> str:
     return separator.join(map(shortest, numbers))

@@ -54,9 +54,8 @@ def read(source: Source, options: Options) -> list[Camera]:
         raise InputError(f"{source.name} has {rows.shape[1]} numbers in a line: a pose has at least 8")
     if len(rows) > _MOST:
         raise InputError(f"{source.name} has {len(rows)} poses: give at most {_MOST}")
-    mounted, plane, lens, notes = np.eye(4), None, None, (_WHOSE,)
-    if kind == "EuRoC":
-        mounted, plane, lens, notes = _sensor(source, options)
+    own = (np.eye(4), None, None, (_WHOSE,)) if kind != "EuRoC" else _sensor(source, options)
+    mounted, plane, lens, notes = own
     plane = options.view_plane or plane or options.plane_or_refuse(source.name)
     stated = kind == "EuRoC" and options.view_plane is None
     whats = [f"pose {index}" for index in range(len(rows))]
@@ -98,7 +97,7 @@ def _kind(source: Source) -> str | None:
         return "Redwood" if rows[4] == _PINNED else None
     if counts == {(16, False)}:
         return "Replica" if all(row[12:] == _PINNED for row in rows) else None
-    return {(8, False): "TUM", (12, False): "KITTI"}.get(*counts) if len(counts) == 1 else None
+    return {(8, False): "TUM", (12, False): "KITTI"}.get(counts.pop()) if len(counts) == 1 else None
 
 
 def _is_named_chan(source: Source) -> bool:
@@ -130,9 +129,9 @@ def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | N
     if options.view_plane or "intrinsics" not in values:
         return mounted, None, None, ()
     f_x, f_y, c_x, c_y = values.numbers("intrinsics", 4)
-    size = tuple(int(side) for side in values.numbers("resolution", 2))
+    width, height = (int(side) for side in values.numbers("resolution", 2))
     half = opencv.half_pixel(options)
-    plane = axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
+    plane = axes.view_plane(f_x, f_y, c_x + half, c_y + half, (width, height))
     numbers = values.numbers("distortion_coefficients", 4) if "distortion_coefficients" in values else ()
     lens, notes = opencv.settled(numbers, is_fisheye, plane, "cam0", options)
     return mounted, plane, lens, (*notes, *opencv.told_of_half_pixel(options, "EuRoC"))

@@ -24,7 +24,7 @@ cameras/cameras.py (get_image_coords, _generate_rays_from_coords); instant-ngp's
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -204,8 +204,8 @@ def _cameras(source: Source, options: Options) -> list[Camera]:
             pinhole, more = axes.pinhole(matrix if undone is None else undone(matrix), plane, frame.place)
             image = path if naming.has_suffix(path) or "file_path" not in frame else f"{path}.png"
             time = frame.number("time") if "time" in frame else None
-            image = image if "file_path" in frame else None
-            cameras.append(Camera(name, pinhole, stated, (*world_notes, *notes, *more), image, time=time, lens=lens))
+            named = image if "file_path" in frame else None
+            cameras.append(Camera(name, pinhole, stated, (*world_notes, *notes, *more), named, time=time, lens=lens))
     return left_out.with_notes(cameras)
 
 
@@ -254,11 +254,11 @@ def _plane(
             )
     size, stated = _size(both, source, path, options)
     focal = {along: _focal(both, along, side) for along, side in zip("xy", size, strict=True)}
-    if not any(focal.values()):
+    f_x, f_y = focal["x"] or focal["y"], focal["y"] or focal["x"]
+    if not f_x or not f_y:
         if options.view_plane or options.base:
             return options.plane_or_refuse(both.place), False, None, ()
         raise InputError(f"{both.place} has neither fl_x nor camera_angle_x: it can't be a camera without")
-    f_x, f_y = focal["x"] or focal["y"], focal["y"] or focal["x"]
     plane = axes.view_plane(f_x, f_y, both.number("cx", size[0] / 2), both.number("cy", size[1] / 2), size)
     numbers = {key: both.number(key, 0.0) for key in _LENS}
     if "distortion_params" in both:
@@ -320,7 +320,7 @@ def _told_of_world(top: Record) -> tuple[str, ...]:
     return ("The file says that its world was turned or scaled before (applied_transform): it was left so",)
 
 
-def _applied(top: Record):
+def _applied(top: Record) -> Callable[[np.ndarray], np.ndarray]:
     """The function that takes a matrix back into the world before `applied_transform` and `applied_scale`."""
     applied = np.eye(4)
     if "applied_transform" in top:

@@ -166,7 +166,7 @@ def of_screen(photograph: np.ndarray, lens: Lens, plane: ViewPlane, widest: int)
     width, height = plane.width // times, plane.height // times
     blocks = photograph[: height * times, : width * times].reshape(height, times, width, times, -1)
     small = _smaller(plane, plane.width / times, plane.height / times, width, height)
-    # Of widths, the one whose height is nearest to a whole number: a picture is shown by its aspect.
+    # The width is chosen whose height is nearest to a whole number: a picture is shown by its aspect.
     aspect = plane.height / plane.width
     cut_width = min(range(width, max(1, width * 3 // 4), -1), key=lambda across: abs(across * aspect - round(across * aspect)))
     cut_height = max(1, round(cut_width * aspect))

@@ -134,6 +134,8 @@ def in_the_picture(
         return NotModeled((*seen, *unseen), None if unseen else share, share)
     if not (changed & ~pixels).any():
         unseen = []
+    elif not seen and not unseen:  # a surface that is not seen can fill with fog what is
+        unseen = list(names)
     return NotModeled((*seen, *unseen), float(np.mean(changed | pixels)), share)
 
 

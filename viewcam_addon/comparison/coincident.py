@@ -30,12 +30,12 @@ from .tolerances import Array
 SAMPLES = 64
 """The samples of each pixel: what they leave uncertain counts as noise of the reference."""
 
-# Of a pixel's light, from which on the pixel says nothing of the rest. Less is a tolerance. Chosen: with a smaller share more
-# pixels are taken out that could still tell larger faults, with a larger one some stay that can tell nothing else.
+# The share of a pixel's light from which on the pixel says nothing of the rest. Less is a tolerance. Chosen: with a smaller
+# share more pixels are taken out that could still tell larger faults, with a larger one some stay that can tell nothing else.
 _SHARE = 0.1
 
-# Of the pixels with light, below which the rest of a comparison answers nothing. Calibrated: a room lit by a lamp in the
-# plane of its ceiling has 0 to 4 % left, and scenes with other choices have a third or more.
+# The share of the pixels with light below which the rest of a comparison answers nothing. Calibrated: a room lit by a lamp in
+# the plane of its ceiling has 0 to 4 % left, and scenes with other choices have a third or more.
 _LEAST_LEFT = 0.1
 
 

@@ -244,7 +244,7 @@ def _measure(
     for name, of_pass in errors.items():
         unit = PASSES[name].unit if name in PASSES else "relative"
         # Tolerances are in radians, people of degrees.
-        error, one_rounding, storage = (np.degrees(figure) if unit == "°" else figure for figure in of_pass)
+        error, one_rounding, storage = (np.asarray(np.degrees(figure) if unit == "°" else figure) for figure in of_pass)
         rows.append(measure(name, unit, error, one_rounding, storage))
         flat = np.full(size[0] * size[1], np.nan, dtype=np.float32)
         flat[chosen] = in_float32(error)

@@ -38,9 +38,9 @@ SIZES = (PIXELS, 8, BLOCKS, CONTOURS, WHOLE)
 """Sides of the tiles, in pixels; 0 is one tile over all, and so is −1, of what is along contours."""
 
 _NEARLY_ALL = tolerances.ROUNDINGS[tolerances.PERCENTILES.index(99.0)]
-# Of the default filter width of 1.5 px; twice the shift, for what the table does beside shifting.
+# The errors of the default filter, 1.5 px wide; twice the shift, for what the table does beside shifting.
 _FILTER_SHIFT, _FILTER_CONTRAST = 2 * 4.9e-4, 0.0021
-# Of a bias that is told to be found: that of 99 cases in 100, a normal distribution's, since it is a tail that is not far out.
+# The power to find the bias that is told: 99 cases in 100, by a normal distribution, since this tail is not far out.
 POWER = 0.99
 _POWER_ERRORS = 2.3263
 # Standard errors of what has no noise at all: beyond any limit, and a number still.
@@ -186,7 +186,7 @@ def _statistics(
         square = np.maximum(square, noise.tile_sums(np.broadcast_to(sides.shared, difference.shape), size))
         errors = _errors(_beyond(total, allowance), square)
         critical = np.full(errors.shape, noise.sign_critical(noise.sidak(level, errors.size)))
-        own = noise.tile_sums(light**2, size)
+        own = noise.tile_sums(np.square(light), size)
         yield size, errors, critical, findable(noise.tile_sums(light, size), allowance, square, critical, own)
 
 
@@ -240,7 +240,8 @@ def _contour_errors(sides: Sides, rounding: Array, shift: float, across: Sequenc
 def _mean_at(values: Array, places: Sequence[tuple[int, int]]) -> Array:
     """(height − 4, width − 4, channels): of each inner pixel, the mean of the values at so many rows and columns from it."""
     height, width = values.shape[:2]
-    return sum(values[2 + i : height - 2 + i, 2 + j : width - 2 + j] for i, j in places) / len(places)
+    total: Array = np.sum([values[2 + i : height - 2 + i, 2 + j : width - 2 + j] for i, j in places], axis=0)
+    return total / len(places)
 
 
 def _errors(differences: Array, variances: Array) -> Array:
@@ -260,14 +261,14 @@ def _hypothesis_test(sides: Sides, size: int, errors: Array, allowed: Array, fin
         _extent(length, max(size, WHOLE), i) for length, i in zip(sides.reference.shape[:2], (row, column), strict=True)
     )
     there = (slice(bottom, top + 1), slice(left, right + 1), channel)
-    means = (float(side[there].mean()) for side in (sides.reference, sides.test))
+    reference, test = (float(side[there].mean()) for side in (sides.reference, sides.test))
     name = CHANNEL_NAMES[channel] if errors.shape[2] == len(CHANNEL_NAMES) else ""
     return HypothesisTest(
         size,
         errors,
         allowed,
         float(allowed[index]),
-        Place((left, right), (bottom, top), name, *means, float(errors[index])),
+        Place((left, right), (bottom, top), name, reference, test, float(errors[index])),
         findable,
     )
 

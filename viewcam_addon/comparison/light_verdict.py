@@ -64,12 +64,18 @@ class LightRow:
     factor: float | None = None
 
     @property
+    def without_noise(self) -> tuple[PassErrors, Edges]:
+        """The comparison of light without noise, which it is; AssertionError of other light."""
+        assert self.noise_free is not None and self.edges is not None
+        return self.noise_free, self.edges
+
+    @property
     def ratio(self) -> float:
         return self.test / self.reference if self.reference else float("nan")
 
     @property
     def ok(self) -> bool:
-        exact = self.noise_free is None or (self.noise_free.ok and self.edges.ok)
+        exact = self.noise_free is None or all(each.ok for each in self.without_noise)
         return exact and not self.broken and all(test.ok for test in self.hypothesis_tests)
 
     def to_json(self) -> dict:
@@ -162,7 +168,7 @@ class RadianceComparison:
         if self.is_empty:
             return answered(False, NOTHING, _nothing_left(self.taken_out), self.not_modeled)
         if not self.is_noisy:
-            row = combined.noise_free
+            row, _ = combined.without_noise
             text = (
                 f"over {row.count:,} pixels without noise the light differs by {row.values[0]:.1e} of its "
                 f"value in the median and by at most {row.values[-1]:.1e}, {percent(row.worst[1])} of what float32 allows"
@@ -303,10 +309,11 @@ def _noise_free_lines(comparison: RadianceComparison) -> list[str]:
     head = "".join(f"{percentile_name(p):>10}" for p in PERCENTILES)
     table = [f"{'relative':<17}{'pixels':>11}{head}  of tolerance"]
     for row in comparison.rows:
-        figures = "".join(f"{value:>10.1e}" for value in row.noise_free.values)
-        percentile, share = row.noise_free.worst
+        noise_free, _ = row.without_noise
+        figures = "".join(f"{value:>10.1e}" for value in noise_free.values)
+        percentile, share = noise_free.worst
         used = f"{percent(share):>7} at {percentile_name(percentile):<6}{mark(row.ok)}"
-        table.append(f"{row.name:<17}{row.noise_free.count:>11,}{figures}  {used}{_edges(row)}")
+        table.append(f"{row.name:<17}{noise_free.count:>11,}{figures}  {used}{_edges(row)}")
     return table
 
 
@@ -317,7 +324,8 @@ def edge_text(edges: Edges) -> str:
 
 
 def _edges(row: LightRow) -> str:
-    return f"; {edge_text(row.edges)}" if row.edges.count or row.edges.leaks else ""
+    _, edges = row.without_noise
+    return f"; {edge_text(edges)}" if edges.count or edges.leaks else ""
 
 
 def _difference(row: LightRow) -> str:
@@ -325,7 +333,7 @@ def _difference(row: LightRow) -> str:
         return f"{row.name} has {row.broken:,} pixel{'s' if row.broken > 1 else ''} without a number"
     test = worst_test(row)
     if test is None:
-        noise_free, edges = row.noise_free, row.edges
+        noise_free, edges = row.without_noise
         if not edges.ok:
             return f"{row.name} differs by more than float32 allows: {edge_text(edges)}"
         percentile, share = noise_free.worst

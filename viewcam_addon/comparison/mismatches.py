@@ -30,9 +30,9 @@ from .tolerances import Array, Seen
 # surfaces_at(columns, rows, px, py) -> what rays through n sub-pixel positions may see: (m,) which of them each surface is of,
 # ascending, its nearest surface first; (m,) the objects' names; and dict of pass name to (m, channels) float32, perhaps with
 # "UV Slope", "Normal Slope" and "Normal Enlargement". A ray that meets nothing has one entry, too. As Tracer.surfaces_at.
-SurfacesAt = Callable[[NDArray, NDArray, Array, Array], tuple[NDArray, NDArray, Seen]]
+SurfacesAt = Callable[[NDArray, NDArray, Array | float, Array | float], tuple[NDArray, NDArray, Seen]]
 
-# Of n pixels: the error, what one rounding causes, and what storage and the filter's bias cause, which may be one number.
+# The error of n pixels, what one rounding causes, and what storage and the filter's bias cause, which may be one number.
 Errors = tuple[Array, Array, Array | float]
 
 KINDS = ("not a number", "coverage", "object index", "material index", "surface")

@@ -29,9 +29,9 @@ CHANNEL_NAMES = ("red", "green", "blue")
 
 # A standard error below so many roundings of float32 of the value itself is no noise but rounding.
 _QUIET = 16.0
-# Of test pictures, so that their means tell whether all samples agree.
+# The number of test pictures from which their means tell whether all samples agree.
 _MANY_SEEDS = 8
-# Of a number of samples: more than anybody renders, and that Python refuses to read.
+# The digits that a number of samples may have: more than anybody renders. Python refuses to read thousands of them.
 _MOST_DIGITS = 9
 
 

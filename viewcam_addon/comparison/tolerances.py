@@ -74,9 +74,9 @@ GRAZING = 0.2
 # By how much errors grow there, the tracer tells (Normal Enlargement).
 NORMAL_STORAGE = 2.11 / 32767
 
-# Of a radiance, where a surface's albedo is looked up in a table: Cycles made its tables by random numbers, the tracer by
-# quadrature. Calibrated on 4.2 to 5.2: half of the pixels of random materials are off by 2.7e-5, all but a hundredth by 7.8e-5
-# (tests/blender/light/test_closures.py). A surface of one material is off by the same everywhere.
+# The error of a radiance where a surface's albedo is looked up in a table: Cycles made its tables by random numbers, the tracer
+# by quadrature. Calibrated on 4.2 to 5.2: half of the pixels of random materials are off by 2.7e-5, all but a hundredth by
+# 7.8e-5 (tests/blender/light/test_closures.py). A surface of one material is off by the same everywhere.
 ALBEDO_TABLES = 1e-4
 
 

@@ -269,7 +269,7 @@ def _faults(comparison: GeometryComparison) -> list[str]:
     position, rest = comparison.rows[0], comparison.rows[1:]
     if position.name != "Position":
         rest = comparison.rows
-    elif position.count and not (position.ok and comparison.systematic.ok):
+    elif position.count and not (position.ok and (comparison.systematic is None or comparison.systematic.ok)):
         i = PERCENTILES.index(position.worst[0])
         faults.append(
             f"positions are {plain(position.values[i])} px off at {percentile_name(PERCENTILES[i])}, "
@@ -299,6 +299,7 @@ def _faults(comparison: GeometryComparison) -> list[str]:
 def _cause(comparison: GeometryComparison) -> str:
     """The likely cause of the systematic part: the largest of shift, zoom and roll, in pixels at the picture's border."""
     s = comparison.systematic
+    assert s is not None  # as positions are off
     radius = max(comparison.pinhole.width, comparison.pinhole.height) / 2
     if s.zoom_x < -1:
         return "the picture looks mirrored left to right"

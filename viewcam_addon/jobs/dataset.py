@@ -48,7 +48,8 @@ def refuse(shots: Sequence[Job], suffix: str, test: str | None = None) -> None:
     place = Pinhole((0, 0, 1), (0, 0, 0), (0, 1, 0), 1, 1, 1)
     firsts = {shot.calibration: str(shot.name) for shot in reversed(shots)}
     cameras = [
-        Camera(name, each.at(place) if each else place, image=name, lens=each and each.lens) for each, name in firsts.items()
+        Camera(name, each.at(place) if each else place, image=name, lens=each.lens if each else None)
+        for each, name in firsts.items()
     ]
     transforms.document(cameras)
     colmap.texts(cameras)
@@ -81,8 +82,9 @@ def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suf
         if a camera is mirrored or a name holds a space, which these formats can't say, or if the files can't be written;
         FullDiskError if the disk is full.
     """
-    records = {shot.name: folder.finished(shot.name, settings[shot.name]) for shot in shots}
-    missing = [name for name, record in records.items() if record is None]
+    finished = {shot.name: folder.finished(shot.name, settings[shot.name]) for shot in shots}
+    records = {name: record for name, record in finished.items() if record is not None}
+    missing = [name for name in finished if name not in records]
     if missing:
         return f"no dataset is written, since {len(missing)} of {len(shots)} shots are missing: {several(missing)}"
     cameras = [replace(_camera(folder, name, record), image=f"{name}.{suffix}") for name, record in records.items()]

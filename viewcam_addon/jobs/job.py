@@ -200,7 +200,7 @@ def conflicts(values: Mapping[str, object], in_list: bool = False) -> list[tuple
     values : what is stated, by field; None where it is wrong already, and no more is to be told of it. in_list : whether it is
     one of several, which needs a name, and a camera that is not the scene's own.
     """
-    result = []
+    result: list[tuple[tuple[str, ...], str]] = []
     if "name" not in values and in_list:
         result.append((("name",), "missing, give each shot a name of its own for its files"))
     stated = tuple(field for field in (*FOUR_VALUES, *BESIDE_THEM) if field in values)
@@ -256,8 +256,9 @@ def _percentage(place: str, value: object) -> str:
 
 
 def _name(place: str, value: object) -> str:
-    names.check(place, _text(place, value))
-    return value
+    name = _text(place, value)
+    names.check(place, name)
+    return name
 
 
 def _choice(place: str, value: object, *, among: tuple[str, ...]) -> str:

@@ -21,7 +21,7 @@ from ..errors import InputError
 from . import names
 
 _ON_WINDOWS = sys.platform == "win32"
-if _ON_WINDOWS:
+if sys.platform == "win32":
     import msvcrt
 else:
     import fcntl
@@ -104,7 +104,8 @@ class Claims:
 
     def _be_the_only_one(self, folder: Path) -> None:
         try:
-            msvcrt.locking(self._file, msvcrt.LK_NBLCK, 1)
+            if sys.platform == "win32":
+                msvcrt.locking(self._file, msvcrt.LK_NBLCK, 1)
         except OSError as error:
             os.close(self._file)
             raise InputError(f"another batch works in {folder}: wait for it, or give another --out") from error

@@ -32,8 +32,9 @@ class _Made(Sequence[Job]):
         return len(self._numbers)
 
     def __getitem__(self, index: int | slice) -> Any:
-        numbers = self._numbers[index]
-        return _Made(self._make, numbers) if isinstance(index, slice) else self._make(numbers)
+        if isinstance(index, slice):
+            return _Made(self._make, self._numbers[index])
+        return self._make(self._numbers[index])
 
 
 def orbit(pinhole: Pinhole, count: int) -> Sequence[Job]:
@@ -49,7 +50,7 @@ def orbit(pinhole: Pinhole, count: int) -> Sequence[Job]:
     """
     count = _count(checks.whole("orbit's number of shots", count))
     middle = (pinhole.width / 2, pinhole.height / 2)
-    beside = {
+    beside: dict[str, Any] = {
         "width": pinhole.width,
         "height": pinhole.height,
         "principal_point": None if pinhole.principal_point == middle else pinhole.principal_point,
@@ -137,7 +138,7 @@ def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Job]:
     """
     problems = Problems("the cameras")
     files: dict[str, str] = {}
-    shots = []
+    shots: list[Job] = []
     for camera, pinhole in pinholes:
         name = names.made_fit(camera)
         other = files.setdefault(names.one_file(name), camera)

@@ -127,6 +127,7 @@ class ServedRenderer:
             if "render" in request:
                 self._ends = time.monotonic() + self._limit if self._limit else math.inf
             try:
+                assert self._server is not None
                 answer = self._server.ask(request, self._ends if request.keys() & {"render", "label", "check"} else math.inf)
             except AnswerTimeout as late:
                 self.close()

@@ -75,8 +75,8 @@ def write(
             (temporary / kind).mkdir()
         for number, (path, document) in enumerate(pictures):
             with files.understood(path):
-                values = _picture(path, document, objects, temporary, number, threads)
-            for name, each in zip(scene, values, strict=True):
+                parts = _picture(path, document, objects, temporary, number, threads)
+            for name, each in zip(scene, parts, strict=True):
                 scene[name][str(number)] = each
             progress((number + 1) / len(pictures))
         for name, values in {**scene, "objects": objects.to_json()}.items():
@@ -209,7 +209,9 @@ def _box(mask: Document | None) -> list[int]:
 def _camera(document: Document) -> Document:
     picture = document["picture"]
     camera = cameras.Camera(picture, Pinhole(**document["camera"]), image=picture, lens=files.lens(document))
-    return json.loads(cameras.write([camera], "bop", cameras.Options(scale=1 / _MILLIMETERS)))["0"]
+    text = cameras.write([camera], "bop", cameras.Options(scale=1 / _MILLIMETERS))
+    assert isinstance(text, str)
+    return json.loads(text)["0"]
 
 
 def _copy_rgb(path: Path, document: Document, output: Path, number: int) -> bool:

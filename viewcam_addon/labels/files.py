@@ -242,7 +242,7 @@ def _document(path: Path, labels: Labels, names: list[str], depth_steps: float) 
         "format": _FORMAT,
         "version": _VERSION,
         "picture": path.name,
-        "camera": asdict(labels.image.camera),
+        "camera": labels.image.camera and asdict(labels.image.camera),
         **({} if labels.lens is None else {"lens": labels.lens.to_json()}),
         "files": names,
         "passes": list(labels.image.passes),

@@ -34,7 +34,7 @@ _STEP = 1e-3
 _ROUNDING = 2.0**-22
 """The rounding of depths in float32, here and where the point comes from, 2⁻²⁴ each, for surfaces that are seen at an angle."""
 
-# Of the plastic number, whose powers fill the plane most evenly: multiples of these, wrapped, rank a grid's pixels so that the
+# Powers of the plastic number, which fill the plane most evenly: multiples of these, wrapped, rank a grid's pixels so that the
 # first n of them lie as far apart as n can.
 EVENLY = 0.7548776662466927, 0.5698402909980532
 

@@ -3,7 +3,7 @@
 import hashlib
 import itertools
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -303,11 +303,11 @@ class Silhouettes:
             pass
         return result
 
-    def _covered(self, core: CoreScene, eye: Array, axes: Array, window: Sequence[int]) -> NDArray[np.bool_]:
+    def _covered(self, core: CoreScene, eye: Array, axes: Array, window: tuple[int, int, int, int]) -> NDArray[np.bool_]:
         """True where an instance is seen in a part of the picture. eye, axes : the camera's in its space."""
         surfaces, clip = self._surfaces, self._surfaces.scene.clip
         if surfaces.lens is None:
-            return core.silhouette(surfaces.camera, clip, eye, axes, tuple(window))
+            return core.silhouette(surfaces.camera, clip, eye, axes, window)
         left, low, width, height = window
         x, y = (each[low : low + height, left : left + width].ravel() for each in surfaces.view_plane)
         ends = math.nextafter(clip[0], 0.0), math.nextafter(clip[1], math.inf)

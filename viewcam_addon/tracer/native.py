@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..image import GEOMETRY_PASSES, LIGHT_PASSES
@@ -235,7 +235,7 @@ def _address(array: NDArray | None) -> int | None:
 
 def array(values: object, dtype: type, shape: Sequence[int | None]) -> NDArray:
     """Values as one contiguous array of a shape (None is any size), as the core wants them; ValueError where they are not."""
-    laid_out = np.ascontiguousarray(values, dtype)
+    laid_out: NDArray = np.ascontiguousarray(values, dtype)
     if laid_out.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, laid_out.shape, strict=True)):
         raise ValueError(f"an array of the shape {laid_out.shape} in place of {tuple(shape)}")
     return laid_out
@@ -255,7 +255,7 @@ class _Links:
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Links) and vars(self) == vars(other)
 
-    __hash__ = None
+    __hash__ = None  # type: ignore[assignment]
 
     def receiving(self, name: str) -> int:
         """`Object::lit_by` of an object."""
@@ -323,8 +323,12 @@ class CoreScene:
     def _add_geometry(self, geometry: Mesh | Spheres) -> None:
         count = len(geometry.materials)
         if isinstance(geometry, Spheres):
-            parts = (geometry.centers, np.float64, (count, 3)), (geometry.radii, np.float64, (count,))
-            spheres = _Spheres(count, *(self._keep(*part) for part in (*parts, (geometry.materials, np.int32, (count,)))))
+            of_spheres = (
+                (geometry.centers, np.float64, (count, 3)),
+                (geometry.radii, np.float64, (count,)),
+                (geometry.materials, np.int32, (count,)),
+            )
+            spheres = _Spheres(count, *(self._keep(*part) for part in of_spheres))
             self.check(self.core.add_spheres(self.handle, spheres))
             return
         parts = (
@@ -437,13 +441,13 @@ class CoreScene:
             emission = _color(lamp.emission or WHITE, images, nodes)
             self.check(self.core.add_lamp(self.handle, described_lamp(lamp, self._links), emission))
         film, world = scene.film, scene.world
-        described = _Film(hidden_from=kinds(world.hidden_from), transparent=film.transparent, exposure=film.exposure)
-        described.version = 100 * scene.cycles[0] + scene.cycles[1]
-        described.filter, described.filter_width = FILTERS.index(film.filter), film.filter_width
+        seen = _Film(hidden_from=kinds(world.hidden_from), transparent=film.transparent, exposure=film.exposure)
+        seen.version = 100 * scene.cycles[0] + scene.cycles[1]
+        seen.filter, seen.filter_width = FILTERS.index(film.filter), film.filter_width
         self._add_textures(scene, (Color(WHITE, image) for image in world.images), images)
-        described.world, described.has_backdrop = _described_world(world, images), world.backdrop is not None
-        described.backdrop = _described_world(world.backdrop or world, images)
-        self.check(self.core.set_film(self.handle, described))
+        seen.world, seen.has_backdrop = _described_world(world, images), world.backdrop is not None
+        seen.backdrop = _described_world(world.backdrop or world, images)
+        self.check(self.core.set_film(self.handle, seen))
         self._light = scene
 
     def _add_textures(self, scene: Scene, colors: Iterable[Color], images: dict[str, int]) -> None:
@@ -519,7 +523,7 @@ class CoreScene:
         return objects.view(np.int32).astype(np.int64), slopes
 
     def rays(
-        self, origins: NDArray, directions: NDArray, nearest: float | NDArray = 0.0, farthest: float | NDArray = math.inf
+        self, origins: ArrayLike, directions: ArrayLike, nearest: float | NDArray = 0.0, farthest: float | NDArray = math.inf
     ) -> NDArray:
         """Rays as `closest` and `occluded` take them, (n, 8): (n, 3) origins in world space, directions of any length."""
         origins, directions = np.broadcast_arrays(np.asarray(origins, np.float64) - self.origin, directions)
@@ -748,7 +752,7 @@ def described_closure(closure: Closure, images: Mapping[str, int], nodes: Mappin
 
 
 def _planes(passes: Passes, stride: int) -> Any:
-    addresses = []
+    addresses: list[int | None] = []
     for name in GEOMETRY_PASSES:
         values = passes.get(name)
         if values is not None and values.size:
@@ -764,7 +768,7 @@ def _planes(passes: Passes, stride: int) -> Any:
 def _used(scene: Scene) -> set[str]:
     """The names of materials that any surface has; "" is the plain one."""
     slots = {name: np.unique(geometry.materials).tolist() for name, geometry in scene.geometries.items()}
-    used = set()
+    used: set[str] = set()
     for geometry, materials in {(placed.geometry, placed.materials) for placed in scene.objects}:
         used.update(materials[slot] if slot < len(materials) else "" for slot in slots[geometry])
     return used

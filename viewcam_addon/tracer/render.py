@@ -210,7 +210,9 @@ class Tracer:
         objects = self._scene.objects
         owners = np.repeat([placed.name for placed in objects], [len(placed.matrices) for placed in objects])
         there = [name for name in names if name in owners]
-        instances = self.hits()[1] if there else None
+        if not there:
+            return {}
+        instances = self.hits()[1]
         return {name: np.isin(instances, np.flatnonzero(owners == name)) for name in there}
 
     def closest(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray, NDArray, NDArray]:
@@ -273,6 +275,7 @@ class Tracer:
             corners = mesh.vertices[mesh.triangles[triangle]] @ matrix[:, :3, :3].transpose(0, 2, 1) + matrix[:, None, :3, 3]
             weights = barycentric(eye + depth[here, None] * directions[here], corners)
             turned = np.stack([np.cross(matrix[:, :3, (i + 1) % 3], matrix[:, :3, (i + 2) % 3]) for i in range(3)], axis=-1)
+            assert mesh.corner_normals is not None  # else it is not smooth
             between = (weights[..., None] * mesh.corner_normals[triangle]).sum(axis=1)
             length = np.linalg.norm((turned @ between[..., None])[..., 0], axis=-1)
             most = np.linalg.norm(turned, ord=2, axis=(1, 2))

@@ -50,6 +50,13 @@ def subsurface():
     shader.inputs["Subsurface Weight"].default_value = 0.5
 
 
+def glow_below_a_coat():
+    """A glow that Cycles dims where a path goes on, and does not where it ends."""
+    shader = bpy.data.materials["Skin"].node_tree.nodes["Principled BSDF"]
+    shader.inputs["Emission Strength"].default_value, shader.inputs["Sheen Weight"].default_value = 5.0, 1.0
+    shader.inputs["Coat Weight"].default_value = 1.0
+
+
 def hair():
     settings = bpy.data.objects["Ball"].modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system.settings
     settings.type, settings.count, settings.hair_length = "HAIR", 300, 0.6
@@ -76,6 +83,8 @@ def focus():
     ("change", "level", "name"),
     [
         (subsurface, "path", "Ball"),
+        (glow_below_a_coat, "direct", "Ball"),
+        (glow_below_a_coat, "path", "Ball"),
         (hair, "geometry", "Ball"),
         (hair, "path", "Ball"),
         (fog, "path", "Fog"),

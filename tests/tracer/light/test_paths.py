@@ -11,9 +11,11 @@ import pytest
 
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
+from viewcam_addon.tracer.scene.colors import WHITE
 from viewcam_addon.tracer.scene.film import Bounces, Film
 from viewcam_addon.tracer.scene.lamps import Area, Point, Sun, World
-from viewcam_addon.tracer.scene.materials import Color, Material, sum_of
+from viewcam_addon.tracer.scene.materials import Color, Material, Picture, sum_of
+from viewcam_addon.tracer.scene.shader_nodes import node
 
 FLOAT32 = 2.0**-24
 # A picture is a mean of float64, rounded once; smooth normals are float32, and what only visibility sees.
@@ -192,11 +194,11 @@ def test_a_lambert_sphere_under_a_sun_is_bright_by_its_cosine_and_dark_behind(ma
     assert (passes["Combined"][~met] == (0, 0, 0, 1)).all()
 
 
-def lit_from_above(make_mesh, make_lit, lamp=None, thing=None, samples=64, seed=0, albedo=0.8, film=None):
+def lit_from_above(make_mesh, make_lit, lamp=None, thing=None, samples=64, seed=0, albedo=0.8, **light):
     """The middle of a plane, 0.0016 wide, from below a lamp or a thing that shines: what it gets differs there by 1e-6."""
     camera = Pinhole((0, 0, 0.5), (0, 0, 0), (0, 1, 0), 5000, 16, 12)
     things = [(square(make_mesh, 0.05), lambert(albedo))] + ([thing] if thing else [])
-    return render(make_lit(camera, *things, lamps=(lamp,) if lamp else ()), "direct", samples, seed, threads=1)
+    return render(make_lit(camera, *things, lamps=(lamp,) if lamp else (), **light), "direct", samples, seed, threads=1)
 
 
 def facing_rectangle(half_x, half_y, height):
@@ -226,6 +228,22 @@ def test_an_area_lamp_lights_a_point_by_its_form_factor(make_mesh, make_lit, ell
 def test_a_shining_square_lights_a_point_by_its_form_factor(make_mesh, make_lit):
     passes = lit_from_above(make_mesh, make_lit, thing=(square(make_mesh, 0.5, 1.0), glow(5)))
     assert_close(passes, 0.8 * 5 * facing_rectangle(0.5, 0.5, 1.0), 0.005)
+
+
+def test_a_shining_principled_square_lights_by_the_mean_of_its_image(make_mesh, make_lit):
+    images = {"screen": Picture(np.tile(np.array([[[7.0], [3.0]]], np.float32), (1, 1, 3)))}
+    screen = Material(node("principled", emission_color=Color(WHITE, image="screen"), emission_strength=1.0))
+    mesh = replace(square(make_mesh, 0.5, 1.0), corner_uvs=np.array([[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]], "f4"))
+    passes = lit_from_above(make_mesh, make_lit, thing=(mesh, screen), images=images)
+    assert_close(passes, 0.8 * 5 * facing_rectangle(0.5, 0.5, 1.0), 0.005)
+
+
+def test_a_coat_dims_what_shines_below_it_alike_in_all_colors(make_mesh, make_lit):
+    def light_of(color):
+        coated = Material(node("principled", emission_color=color, emission_strength=5.0, coat_weight=1.0))
+        return lit_from_above(make_mesh, make_lit, thing=(square(make_mesh, 0.5, 1.0), coated))["Combined"][..., 1]
+
+    np.testing.assert_allclose(light_of((0.0, 1.0, 1.0)), light_of(WHITE), rtol=ROUNDED)
 
 
 @pytest.mark.parametrize("radius", [0.05, 0.5, 0.9])

@@ -16,6 +16,7 @@ where a flight has corners), a copy of the scene to bake in (drivers and physics
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import bpy
 import numpy as np
@@ -127,7 +128,7 @@ def _look(flight: _Flight, scene: bpy.types.Scene, is_key: bool) -> None:
     camera_object, camera = flight.camera_object, flight.camera_object.data
     depsgraph = datablocks.depsgraph_of(scene)
     try:
-        stated = cameras.stated(camera_object.evaluated_get(depsgraph), scene)
+        stated: Any = cameras.stated(camera_object.evaluated_get(depsgraph), scene)  # it is in use
         flight.live.append((cameras.read(camera_object, scene), math.dist(stated.eye, stated.look_at)))
         if not is_key:
             return

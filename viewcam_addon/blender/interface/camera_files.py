@@ -75,7 +75,9 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, file_menu.IntoScene, bpy.types.O
 
         try:
             paths = self._paths()
-            read_cameras, notes, kinds = [], [], set()
+            read_cameras: list[formats.Camera] = []
+            notes: list[str] = []
+            kinds = set()
             for path in paths:
                 kinds.add(formats.recognized(path))
                 more, more_notes = read(path, context.scene, self.distance, self)
@@ -105,10 +107,10 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, file_menu.IntoScene, bpy.types.O
             else f"{len(read_cameras)} cameras"
         )
         pictures = f", {imported.pictures} with pictures" if imported.pictures else ""
-        more_notes = f"; {len(notes)} notes" if len(notes) > 1 else "; 1 note" if notes else ""
+        noted = f"; {len(notes)} notes" if len(notes) > 1 else "; 1 note" if notes else ""
         for note in notes[:_MOST_NOTES]:
             self.report({"WARNING"}, file_menu.text(note))
-        self.report({"INFO"}, file_menu.text(f"{paths[0].name}: {what}{pictures} ({title}){more_notes}"))
+        self.report({"INFO"}, file_menu.text(f"{paths[0].name}: {what}{pictures} ({title}){noted}"))
         if notes and not bpy.app.background:
             file_menu.show(file_menu.lines_of([(note, "INFO") for note in notes]), "Imported Cameras", context)
         return {"FINISHED"}
@@ -211,7 +213,7 @@ class VIEWCAM_OT_export_cameras(WorldOptions, ExportHelper, bpy.types.Operator):
 
     def _at_each_frame(self, scene: bpy.types.Scene) -> list[formats.Camera]:
         frames = makers.frames(f"{scene.frame_start}..{scene.frame_end}")[:: scene.frame_step]
-        result = dataset_cameras.of_frames(scene, [(job.name, job.frame) for job in frames])
+        result = dataset_cameras.of_frames(scene, [(job.name, job.frame) for job in frames if job.frame is not None])
         frame = datablocks.frame_of(scene)
         return [dataclasses.replace(each, pinhole=picture.at_full_size(each.pinhole, frame)) for each in result]
 

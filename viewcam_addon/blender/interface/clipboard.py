@@ -8,7 +8,7 @@ well; size and pixel aspect are the scene's, and where they differ it is told, o
 import contextlib
 import dataclasses
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface
@@ -239,7 +239,9 @@ def text_of(
     InputError
         as `camera_of` does, or if the format can't say what the camera is.
     """
-    return formats.write([camera_of(camera_object, scene)], format, options)
+    text = formats.write([camera_of(camera_object, scene)], format, options)
+    assert isinstance(text, str)  # the formats of the clipboard are no folders
+    return text
 
 
 def paste(
@@ -267,7 +269,7 @@ def paste(
     return messages
 
 
-def _pose(pinhole: Pinhole) -> dict[str, tuple]:
+def _pose(pinhole: Pinhole) -> dict[str, Any]:
     return {name: getattr(pinhole, name) for name in _NAMES}
 
 

@@ -76,10 +76,10 @@ class Outcome:
 
         And of everything, where not all of it is modeled: the artist's own picture, of which the others show stand-ins.
         """
-        paths = {name: self._there(file) for name, file in _PICTURES.items()}
+        paths = {name: path for name, file in _PICTURES.items() if (path := self._there(file))}
         everything = self._there(SIDES["everything"])
         more = {"everything": everything} if everything else {}
-        return more | paths if all(paths.values()) else {}
+        return more | paths if len(paths) == len(_PICTURES) else {}
 
     def is_of(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
         """True if the camera is still the one that was compared."""
@@ -142,7 +142,7 @@ class RunningComparison:
         """The check of the job, on its way; the report names what repeats it with the artist's file."""
         copy, report = self.folder / _file_name(), str(self.folder / _REPORT)
         difference = str(self.folder / _REPORT / _PICTURES["difference"])
-        command = f"viewcam {dataclasses.replace(job, blend=copy).check_words()}"
+        command = f"viewcam {dataclasses.replace(job, blend=str(copy)).check_words()}"
         files = {"report": report, "difference": difference, "sides": report, "command": command}
         return start(copy, scene, [job], self.folder / _OUTPUT, files=files)
 
@@ -196,7 +196,8 @@ class RunningComparison:
         result = _read(self.folder / _RESULT)
         if "answer" not in result:
             return Outcome(*of, None, failure(self._output(), status))
-        folder, temporary = self.folder / _REPORT, self.folder
+        folder = self.folder / _REPORT
+        temporary: Path | None = self.folder
         if self._keep_in:
             try:
                 shutil.copytree(folder, self._keep_in, copy_function=_copy_whole, dirs_exist_ok=True)
@@ -204,14 +205,18 @@ class RunningComparison:
             except (OSError, InputError) as error:
                 return Outcome(*of, None, f"The report can't be kept in {self._keep_in} ({error}): choose another folder")
         drawn = result.get("difference", {})
-        verdict = (
+        return Outcome(
+            *of,
             result["answer"],
             result["sentence"],
             headline(result),
             tuple(figures(result)),
             tuple(lacking(result["ledger"])),
+            folder,
+            drawn.get("colors", ""),
+            drawn.get("scale", {}),
+            temporary,
         )
-        return Outcome(*of, *verdict, folder, drawn.get("colors", ""), drawn.get("scale", {}), temporary)
 
     def _output(self) -> str:
         return (self.folder / _OUTPUT).read_text(encoding="utf-8", errors="replace")
@@ -353,7 +358,7 @@ def start(
         if it can't be started; InputError if what it is to do can't be written.
     """
     if not bpy.app.binary_path:  # a module of Python, which opens the copy itself
-        jobs = [dataclasses.replace(job, blend=copy) for job in jobs]
+        jobs = [dataclasses.replace(job, blend=str(copy)) for job in jobs]
         plan = plan and dataclasses.replace(plan, blend=copy)
     written = log.with_name("jobs.json")
     orders.write(written, jobs, plan, files)

@@ -18,7 +18,7 @@ viewport is drawn (a quick drag is over before it is drawn, and in a quad view e
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import bpy
 import numpy as np
@@ -85,7 +85,7 @@ def drag(camera_object: bpy.types.Object, name: str, value: Triple) -> None:
     if _drag and (_drag.camera_name, _drag.name) != (camera_object.name, name):  # over, and the timer has not looked yet
         end_drag()
     if _drag is None:
-        start = tuple(np.float32(place(camera_object, name)).tolist())
+        start: Any = tuple(np.array(place(camera_object, name), np.float32).tolist())
         length = math.hypot(*camera_object.virtual_pinhole.up)
         _drag = _Drag(camera_object.name, name, start, length, _state(camera_object), bpy.context.window)
         if not bpy.app.timers.is_registered(_end_if_over):
@@ -114,7 +114,7 @@ def end_drag() -> None:
     global _drag
     ended, _drag = _drag, None
     camera_object = bpy.data.objects.get((ended.camera_name, None)) if ended else None
-    if camera_object is None or _state(camera_object) == ended.before:
+    if ended is None or camera_object is None or _state(camera_object) == ended.before:
         return
     key_changes(camera_object, ended.before, datablocks.scene_of(camera_object))
     _push_undo(f"Drag {_LABELS[ended.name]}", ended.window)
@@ -134,7 +134,8 @@ def _handle_property(name: str, description: str) -> bpy.props.FloatVectorProper
     def set(_handles: "Handles", value: Triple) -> None:
         camera_object = camera_in(bpy.context)
         if camera_object and place(camera_object, name):
-            drag(camera_object, name, tuple(value))
+            x, y, z = value
+            drag(camera_object, name, (x, y, z))
 
     return bpy.props.FloatVectorProperty(
         name=_LABELS[name], description=description, subtype="TRANSLATION", get=get, set=set, options={"SKIP_SAVE"}

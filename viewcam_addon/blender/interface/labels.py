@@ -8,6 +8,7 @@ though flow needs the frames before and after. What it came to belongs to this s
 import contextlib
 import json
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -133,11 +134,8 @@ class _LabelsPanel(SubPanel):
     bl_label = "Labels"
 
     def draw(self, context: bpy.types.Context) -> None:
-        camera_object, settings, layout = (
-            datablocks.camera_in(context),
-            context.window_manager.virtual_pinhole_labels,
-            self.layout,
-        )
+        camera_object: Any = datablocks.camera_in(context)
+        settings, layout = context.window_manager.virtual_pinhole_labels, self.layout
         panel_rows.begin(layout, context)
         column = layout.column()
         column.active = background.running is None

@@ -10,6 +10,7 @@ stands outside of it.
 
 import contextlib
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import bpy
@@ -25,6 +26,8 @@ from .operators import CameraOperator
 
 class _Move(CameraOperator):
     """A subclass says in `moved(pinhole, camera_object, scene)` where the camera goes."""
+
+    moved: Callable[[Pinhole, bpy.types.Object, bpy.types.Scene], Pinhole]
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         pinhole = _pinhole(camera_object, scene)

@@ -4,6 +4,7 @@ They work in any mode and on any camera: the one that is named, else the active 
 """
 
 import dataclasses
+from collections.abc import Callable
 from typing import ClassVar
 
 import bpy
@@ -40,6 +41,9 @@ class CameraOperator(NamesCamera):
     """The base of all operators of a camera. A subclass says in `work(camera_object, scene)` what it does."""
 
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+    work: Callable[[bpy.types.Object, bpy.types.Scene], None]
+    report: Callable[[set[str], str], None]  # this and the next one: Blender's
+    poll_message_set: ClassVar[Callable[[str], None]]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -12,6 +12,7 @@ objects in the scene (they would be in the file, the outliner and the render).
 import functools
 import math
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 import bpy
 import numpy as np
@@ -35,7 +36,7 @@ HALO, _HALO_WIDTH = (0.0, 0.0, 0.0, 0.45), 2.5  # its color, and by how many pix
 _OUTLINE = 6  # what blf.shadow calls so
 _MARK = (4.0, 9.0)  # pixels from the look-at point at which each of the mark's four strokes begins and ends
 
-_handlers = []
+_handlers: list[object] = []
 
 
 def is_shown(camera_object: bpy.types.Object, context: bpy.types.Context) -> bool:
@@ -74,7 +75,8 @@ def _figures(context: bpy.types.Context) -> Iterator[tuple[Pinhole, Triple, floa
     for camera_object in _cameras(context):
         group = camera_object.virtual_pinhole
         try:
-            yield cameras.stated(camera_object, context.scene), group.numbers()[2], group.plane_at
+            if stated := cameras.stated(camera_object, context.scene):
+                yield stated, group.numbers()[2], group.plane_at
         except InputError:  # the panel shows it
             continue
 
@@ -178,6 +180,7 @@ def _draw_letters() -> None:
             if at:
                 places[name] = at + _BESIDE * size * _clearest([end - at for end in ends if end])
         for name, at in places.items():
+            assert at is not None
             width, height = blf.dimensions(font, name)
             blf.position(font, at.x - width / 2, at.y - height / 2, 0)
             blf.color(font, *colors[name])
@@ -238,7 +241,8 @@ class _ShowPanel(SubPanel):
     bl_label = "Show"
 
     def draw(self, context: bpy.types.Context) -> None:
-        group, layout = datablocks.camera_in(context).virtual_pinhole, self.layout
+        camera_object: Any = datablocks.camera_in(context)
+        group, layout = camera_object.virtual_pinhole, self.layout
         panel_rows.begin(layout, context, decorate=True)
         column = layout.column(heading="Viewport")
         column.active = group.enabled

@@ -10,6 +10,7 @@ go in (`iface`), and then not again.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface
@@ -101,7 +102,7 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
         # Where the point is, its target says, or what places the camera at every frame.
         is_free = quantity not in followed and targets.place(group.id_data, point) is None
         target = targets.target_of(group.id_data, point)
-        followers = [(f"{point}_target", "Object", None)]
+        followers: list[tuple[str, str, tuple[Any, str] | None]] = [(f"{point}_target", "Object", None)]
         if target and target.type == "ARMATURE":
             followers.append((f"{point}_bone", "Bone", (target.data, "bones")))
         elif target and target.type == "MESH":
@@ -162,11 +163,12 @@ class _OptionsPanel(SubPanel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return super().poll(context) and datablocks.camera_in(context).virtual_pinhole.enabled
+        camera_object = datablocks.camera_in(context)
+        return camera_object is not None and camera_object.virtual_pinhole.enabled
 
     def draw(self, context: bpy.types.Context) -> None:
-        camera_object, layout = datablocks.camera_in(context), self.layout
-        group = camera_object.virtual_pinhole
+        camera_object: Any = datablocks.camera_in(context)
+        group, layout = camera_object.virtual_pinhole, self.layout
         panel_rows.begin(layout, context, decorate=True)
         column = layout.column()
         zoomed = column.column()
@@ -185,21 +187,21 @@ class _MovePanel(SubPanel):
     bl_label = "Move"
 
     def draw(self, context: bpy.types.Context) -> None:
-        name = datablocks.camera_in(context).name
+        camera_object: Any = datablocks.camera_in(context)
         column = self.layout.column()
         for label, buttons in _MOVES.items():
             row = panel_rows.described(column, context, label, (), share=0.25)
             row = row.row(align=True) if "icon" in buttons[0][1] else panel_rows.buttons(row, context)
             for operator, look, properties in buttons:
                 button = row.operator(operator, **look)
-                button.camera = name
+                button.camera = camera_object.name
                 for key, value in properties.items():
                     setattr(button, key, value)
 
 
 _STEP = math.radians(15)  # as Blender's own view orbits by Numpad 4, 6, 8 and 2
 # The rows: label → (operator, how its button looks, the operator's properties) from left to right.
-_MOVES = {
+_MOVES: dict[str, tuple[tuple[str, dict[str, Any], dict[str, Any]], ...]] = {
     "From": (("viewcam.adopt_view", {"text": "Current View"}, {}),),
     "Look At": (
         ("viewcam.look_at_selection", {"text": "Selection"}, {}),

@@ -12,6 +12,8 @@ from . import readouts
 class CameraPanel:
     """A panel that is there while there is a camera that it can be about."""
 
+    layout: bpy.types.UILayout
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return datablocks.camera_in(context) is not None

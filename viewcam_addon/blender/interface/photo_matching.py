@@ -12,7 +12,7 @@ be in the file), and gizmos (Blender makes none of them on a picture's pixels).
 
 import functools
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import bpy
 import numpy as np
@@ -20,7 +20,7 @@ from mathutils import Vector
 
 from ... import photo_match
 from ...errors import InputError
-from ...pinhole import Pair, Pinhole
+from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, targets
 from . import kept, overlay, panel_rows, readouts
@@ -40,6 +40,8 @@ _HELP = {
     POINTS: "Drag each selected object to where the picture shows it",
 }
 
+Place = tuple[float, float]  # in the picture, pixels
+
 _drawn = None  # what the viewport shows of the match that goes on
 
 
@@ -57,10 +59,10 @@ class Drawing:
     like: Pinhole
     kind: str = EDGES
     axes: str = "XY"
-    sides: Pair = (1.0, 1.0)
+    sides: Place = (1.0, 1.0)
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     places: tuple = ()
-    ends: list[Pair] = field(default_factory=list)
+    ends: list[Place] = field(default_factory=list)
     along: list[str] = field(default_factory=list)
     axis: str = "X"
     exact: float = 1.0
@@ -69,7 +71,7 @@ class Drawing:
     length: float = 0.0
     taken: int | None = None
 
-    def press(self, place: Pair, reach: float, exact: float) -> None:
+    def press(self, place: Place, reach: float, exact: float) -> None:
         """Take the end that is within reach, pixels of the picture, else begin a new edge or corner.
 
         Edges along other axes keep their ends: a box has edges along all three that begin in one corner.
@@ -89,7 +91,7 @@ class Drawing:
             self.ends.append(place)
             self.taken = len(self.ends) - 1
 
-    def move(self, place: Pair) -> None:
+    def move(self, place: Place) -> None:
         if self.taken is not None:
             self.ends[self.taken] = place
 
@@ -113,7 +115,7 @@ class Drawing:
         """The camera that follows. Raises InputError as photo_match does."""
         distance = self.like.distance[0] if self.is_lens_known else None
         if self.kind == EDGES:
-            edges = [(axis, *self.ends[2 * i : 2 * i + 2]) for i, axis in enumerate(self.along)]
+            edges = [(axis, self.ends[2 * i], self.ends[2 * i + 1]) for i, axis in enumerate(self.along)]
             whole = [edge for edge in edges if np.hypot(*np.subtract(edge[2], edge[1])) >= 1.0]
             known = photo_match.KnownEdge(0, self.length, self.origin) if self.length > 0 else None
             return photo_match.from_edges(whole, self.like, self.exact, distance, known, self.is_principal_point_free)
@@ -227,8 +229,9 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
         except InputError as error:
             self.report({"ERROR"}, datablocks.sentence(error))
             return {"CANCELLED"}
-        self.before, self.result, self.sentence = kept.state(self.camera_object), None, ""
-        self.frame = None  # of the picture in the region, once it has been drawn
+        self.before, self.sentence = kept.state(self.camera_object), ""
+        self.result: Any = None  # a Match
+        self.frame: Any = None  # left, bottom, right and top of the picture in the region, once it has been drawn
         _drawn = self
         context.window_manager.modal_handler_add(self)
         self._tell(context)
@@ -268,7 +271,7 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
         """Blender closes the window or the file."""
         self._leave(context, canceled=True)
 
-    def _in_picture(self, event: bpy.types.Event) -> tuple[Pair, float]:
+    def _in_picture(self, event: bpy.types.Event) -> tuple[Place, float]:
         """The mouse's place in the picture, and how many of its pixels one of the screen shows."""
         left, bottom, right, top = self.frame
         like = self.drawing.like

@@ -7,6 +7,7 @@ playback), Cancel, another file, turning the add-on off and leaving Blender end 
 
 import itertools
 from pathlib import Path
+from typing import Any
 
 import bpy
 import bpy.utils.previews
@@ -255,7 +256,7 @@ class _ProofPanel(CameraPanel):
     bl_label = "Proof"
 
     def draw(self, context: bpy.types.Context) -> None:
-        camera_object = datablocks.camera_in(context)
+        camera_object: Any = datablocks.camera_in(context)
         if background.running:
             _draw_progress(self.layout)
         else:

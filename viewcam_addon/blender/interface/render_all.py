@@ -59,7 +59,7 @@ def shots(scene: bpy.types.Scene, animation: bool) -> list[Job]:
             name += "_"
         taken.add(one_file(name))
         picture = own_picture.of_camera(camera_object, scene)
-        frames = range(picture["frame_start"], picture["frame_end"] + 1) if animation else (scene.frame_current,)
+        frames = range(int(picture["frame_start"]), int(picture["frame_end"]) + 1) if animation else (scene.frame_current,)
         rows += [shot(camera_object, scene, f"{name}_{frame:04d}" if animation else name, frame) for frame in frames]
     if not rows:
         raise InputError(f"scene {scene.name!r} has no camera that is rendered: add one, or show one in renders")
@@ -155,6 +155,7 @@ class VIEWCAM_OT_open_contact_sheet(bpy.types.Operator):
         return bool(_sheet and _sheet.is_file())
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
+        assert _sheet is not None  # as `poll` has seen
         return bpy.ops.wm.url_open(url=_sheet.absolute().as_uri())
 
 

@@ -26,6 +26,7 @@ class _Panel:
     bl_region_type = "WINDOW"
     bl_context = "render"
     COMPAT_ENGINES = frozenset({ENGINE})
+    layout: bpy.types.UILayout
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

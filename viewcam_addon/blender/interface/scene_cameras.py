@@ -4,7 +4,8 @@ The panel shows the active object if that is a camera, else the scene's camera, 
 the active object, as a click in the viewport would. Rejected: a choice of the panel's own (two ideas of what is active).
 """
 
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import bpy
 
@@ -52,6 +53,9 @@ def choose(camera_object: bpy.types.Object, context: bpy.types.Context) -> None:
 
 class _SceneOperator:
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+    work: Callable[[bpy.types.Context], None]
+    report: Callable[[set[str], str], None]  # this and the next one: Blender's
+    poll_message_set: ClassVar[Callable[[str], None]]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -209,11 +213,13 @@ class _PicturePanel(SubPanel):
     bl_label = "Own Picture"
 
     def draw_header(self, context: bpy.types.Context) -> None:
-        self.layout.prop(datablocks.camera_in(context).virtual_pinhole_picture, "use", text="")
+        camera_object: Any = datablocks.camera_in(context)
+        self.layout.prop(camera_object.virtual_pinhole_picture, "use", text="")
 
     def draw(self, context: bpy.types.Context) -> None:
         """While the camera is the scene's, what counts are the scene's numbers, here as in Output."""
-        camera_object, scene = datablocks.camera_in(context), context.scene
+        camera_object: Any = datablocks.camera_in(context)
+        scene = context.scene
         own, is_active = camera_object.virtual_pinhole_picture, own_picture.owner(scene) == camera_object
         render, frames = (scene.render, scene) if is_active else (own, own)
         layout = self.layout

@@ -6,7 +6,8 @@ points and ends of bones, before modifiers, since that is what the artist picks.
 fills half of its box), but for the few kinds of objects that show their points to no script.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 import bmesh
 import bpy
@@ -74,7 +75,7 @@ def _points_of_objects(blocks: list[bpy.types.Object], depsgraph: bpy.types.Deps
         yield rotation.float64(block.evaluated_get(depsgraph).matrix_world.translation)[None]
 
 
-def _local_points(evaluated: bpy.types.Object) -> Array:
+def _local_points(evaluated: bpy.types.Object) -> NDArray[Any]:
     """(n, 3): the points of an evaluated object, in its own space; none of an object without geometry."""
     if evaluated.type == "MESH":
         return export_geometry.read(evaluated.data.vertices, "co", np.float32, 3)
@@ -89,13 +90,13 @@ def _local_points(evaluated: bpy.types.Object) -> Array:
     return _rows(evaluated.bound_box if evaluated.type in _BOXED else [])
 
 
-def _placed(local: Array, matrix: bpy.types.bpy_prop_array) -> Array:
+def _placed(local: NDArray[Any], matrix: bpy.types.bpy_prop_array) -> Array:
     """Points in an object's space, (n, 3), in the world."""
     matrix = rotation.float64(matrix)
     return local.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def _rows(vectors: object) -> Array:
+def _rows(vectors: Iterable[Any]) -> Array:
     """(n, 3) of any number of vectors."""
     return np.array([tuple(vector) for vector in vectors], dtype=np.float64).reshape(-1, 3)
 

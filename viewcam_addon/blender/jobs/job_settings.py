@@ -11,6 +11,7 @@ shots (persistent_data.py), and no camera of the file follows a picture of anoth
 import dataclasses
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -82,7 +83,7 @@ class JobSettings:
 
     def frame_of(self, shot: Job) -> intrinsics.Frame:
         """The picture of a shot."""
-        values: dict[str, float] = {}
+        values: dict[str, Any] = {}
         if shot.width is not None:
             values |= {"resolution_x": shot.width, "resolution_y": shot.height, "percentage": 100}
         if shot.pixel_aspect is not None:

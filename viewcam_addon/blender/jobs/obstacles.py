@@ -72,7 +72,7 @@ def camera_of(
         if none is called so, if the scene has none of its own, or if it is no perspective camera.
     """
     name = settings.scene_camera(shot.frame) if shot.camera is None else shot.camera
-    camera_object = among.get(name)
+    camera_object = None if name is None else among.get(name)
     if camera_object is None:
         if not among:
             raise InputError(f"scene {scene.name!r} has no camera: add one, or give another file")
@@ -84,6 +84,7 @@ def camera_of(
 
 def stated(shot: Job, frame: intrinsics.Frame) -> Pinhole:
     """The pinhole that a shot's values ask for in the picture of `frame`."""
+    assert shot.eye and shot.look_at and shot.up and shot.d  # as Job has checked
     distance = (shot.d, shot.d * (frame.pixel_aspect_x / frame.pixel_aspect_y))
     whole = Pinhole(shot.eye, shot.look_at, shot.up, distance, *frame.size, shot.principal_point, bool(shot.mirrored))
     return whole.cropped(*frame.window) if frame.crop else whole

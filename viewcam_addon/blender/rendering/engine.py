@@ -131,12 +131,12 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
     # For a batch: whether the scene, once it is read, serves all pictures until Blender tells of a change. An artist may change
     # what Blender does not tell of.
     keeps_scene = False
-    # Of the last picture: the level at which it was traced, and what is not modeled as it is, one sentence each.
+    # The level at which the last picture was traced, and what of it is not modeled as it is, one sentence each.
     level = _GEOMETRY
     warnings: tuple[str, ...] = ()
     _keeper = None
     _read = None  # what it was read for, and the scene
-    # Of a viewport: what traces it, and what was drawn last as a texture, with its picture.
+    # The tracer of a viewport, and what was drawn there last as a texture, with its picture.
     _live: LiveView | None = None
     _texture: tuple | None = None
 

@@ -20,7 +20,7 @@ from . import cycles, graphics
 
 _RENDER = {
     "film_transparent": True,
-    # Of the filter nothing is left, and with one sample no jitter: EEVEE's rays go through the pixels' centers.
+    # Nothing is left of the filter, and with one sample no jitter: EEVEE's rays go through the pixels' centers.
     "filter_size": 0.0,
     "use_high_quality_normals": True,
 }

@@ -14,6 +14,7 @@ not: there no vertex is split.
 import contextlib
 from collections.abc import Collection, Iterator
 from dataclasses import replace
+from typing import Any
 
 import bpy
 import numpy as np
@@ -38,7 +39,7 @@ _ATTRIBUTES = {
 # Cycles' radius of points that have none.
 DEFAULT_RADIUS = 0.01
 
-Array = NDArray[np.generic]
+Array = NDArray[Any]
 
 
 def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colors: bool = False, attributes: Collection[str] = ()) -> Mesh:
@@ -94,7 +95,7 @@ def mesh_shown(evaluated: bpy.types.Object, split: bool = False) -> Iterator[bpy
 
 def spheres_of(points: bpy.types.PointCloud) -> Spheres:
     """The points of an evaluated point cloud, object space. Cycles gives all of them the first material."""
-    centers = _attribute(points, "position", "vector", np.float32, 3)
+    centers: Any = _attribute(points, "position", "vector", np.float32, 3)  # which every point cloud has
     radii = _attribute(points, "radius", "value", np.float32)
     if radii is None:
         radii = np.full(len(centers), DEFAULT_RADIUS, np.float32)
@@ -141,7 +142,8 @@ def _corner_normals(
         return read(mesh.corner_normals, "vector", np.float32, 3)[corners]
     triangles = corner_vertices[corners]
     normals = read(mesh.vertex_normals, "vector", np.float32, 3)[triangles]
-    flat = _attribute(mesh, "sharp_face", "value", np.bool_, domain="FACE")[faces]
+    sharp: Any = _attribute(mesh, "sharp_face", "value", np.bool_, domain="FACE")  # else its normals were the points'
+    flat = sharp[faces]
     first, second, third = np.moveaxis(vertices[triangles[flat]], 1, 0)
     across = np.cross(second - first, third - first)
     lengths = np.linalg.norm(across, axis=1, keepdims=True)
@@ -221,6 +223,6 @@ def _attribute(owner: bpy.types.ID, name: str, field: str, dtype: type, width: i
 
 def read(collection: bpy.types.bpy_prop_collection, field: str, dtype: type, width: int = 1) -> Array:
     """(items,) or (items, width) of `dtype`."""
-    values = np.empty(len(collection) * width, dtype)
+    values: Array = np.empty(len(collection) * width, dtype)
     collection.foreach_get(field, values)
     return values.reshape(-1, width) if width > 1 else values

@@ -5,7 +5,7 @@ import bpy
 from ...tracer.scene.film import Bounces, Film
 from .ledger import Ledger
 
-# Those of Bounces → those of `scene.cycles`.
+# Fields of Bounces → properties of `scene.cycles`.
 BOUNCES = {
     "total": "max_bounces",
     "diffuse": "diffuse_bounces",

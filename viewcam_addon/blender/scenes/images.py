@@ -28,7 +28,7 @@ def shows_nothing(node: bpy.types.Node) -> bool:
 
 def missing(tree: bpy.types.NodeTree | None) -> list[str]:
     """The nodes of a tree that show no image, one clause each; whether it leads to the output is not asked."""
-    result = {}
+    result: dict[str, None] = {}  # in their order
     for node in nodes.all_of(tree) if tree else ():
         if shows_nothing(node):
             used = (
@@ -38,7 +38,7 @@ def missing(tree: bpy.types.NodeTree | None) -> list[str]:
     return list(result)
 
 
-def obstacle(image: bpy.types.Image | None) -> str | None:
+def obstacle(image: bpy.types.Image) -> str | None:
     """The reason that this image, which is not missing, can't be a picture, one clause, or None where it can."""
     if image.source not in ("FILE", "GENERATED"):
         return f"shows {image.name!r}, which is no single still image"

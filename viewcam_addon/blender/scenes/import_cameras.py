@@ -23,6 +23,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -166,7 +167,7 @@ class _CameraImport:
             pose.set_rotation(block, turn, keys["rotation_quaternion"][-1] if keys["rotation_quaternion"] else None)
             for path in ("location", "rotation_quaternion"):
                 keys[path].append(tuple(getattr(block, path)))
-            stored = intrinsics.lens_and_sensor(data, sensor)
+            stored: dict[str, Any] = intrinsics.lens_and_sensor(data, sensor)
             for path in _OF_DATA:
                 keys[path].append((stored[path] if path in stored else getattr(data, path),))
         for path, numbers in keys.items():
@@ -186,12 +187,13 @@ class _CameraImport:
         start = self._scene.frame_start
         if any(camera.time is None for camera in cameras):
             return [*cameras], [start + i for i in range(len(cameras))]
-        cameras = sorted(cameras, key=lambda camera: camera.time)
+        cameras = sorted(cameras, key=lambda camera: camera.time or 0.0)
         twice = next((camera for before, camera in itertools.pairwise(cameras) if camera.time == before.time), None)
         if twice is not None:
             raise InputError(f"two cameras have the time {twice.time!r}, {twice.name!r} one of them: import a camera each")
         render = self._scene.render
-        return cameras, [start + (camera.time - cameras[0].time) * render.fps / render.fps_base for camera in cameras]
+        times = [camera.time or 0.0 for camera in cameras]
+        return cameras, [start + (time - times[0]) * render.fps / render.fps_base for time in times]
 
     # --- Pictures
 
@@ -277,6 +279,7 @@ class _CameraImport:
     def _undistorted(self, camera: Camera, photograph: bpy.types.Image) -> bpy.types.Image | None:
         """A copy of the photograph as the pinhole sees it; None where it is of another size than its camera."""
         plane, lens = camera.pinhole.plane, camera.lens
+        assert lens is not None
         if tuple(photograph.size) != (plane.width, plane.height):
             self._note([_of_another_size(camera.name, photograph.size, plane)])
             return None
@@ -295,6 +298,7 @@ class _CameraImport:
     def _packed(self, camera: Camera) -> bpy.types.Image:
         image = bpy.data.images.new(camera.name, camera.pinhole.width, camera.pinhole.height)
         self._overrides.afterwards(bpy.data.batch_remove, [image])
+        assert camera.picture is not None
         image.pack(data=camera.picture, data_len=len(camera.picture))
         image.source = "FILE"
         return image

@@ -28,7 +28,7 @@ from .nodes import Input, Output
 from .shaders import RGB
 
 _WHITE = (1.0, 1.0, 1.0)
-# Of the cosine between two axes of an area light; beyond it Cycles' own formulas contradict each other.
+# The largest cosine between two axes of an area light; beyond it Cycles' own formulas contradict each other.
 _SHEAR = 1e-5
 
 

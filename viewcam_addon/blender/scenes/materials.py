@@ -10,6 +10,7 @@ shaders.py has found.
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import bpy
 
@@ -62,7 +63,7 @@ def is_volume_alone(material: bpy.types.Material | None) -> bool:
     """True if a material fills what it covers with a volume and has no surface, as fog in a box."""
     tree = material and versions.node_tree(material)
     output = tree.get_output_node("CYCLES") if tree else None
-    return bool(output) and output.inputs["Volume"].is_linked and not output.inputs["Surface"].is_linked
+    return output is not None and output.inputs["Volume"].is_linked and not output.inputs["Surface"].is_linked
 
 
 def make_transparent(overrides: Overrides, material: bpy.types.Material) -> None:
@@ -114,12 +115,12 @@ def _shader(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.typ
     added = adder.add(shader.class_name)
     for name, theirs in shader.words.items():
         setattr(added, theirs, word_of(node[name]))
-    for name, theirs in shader.inputs.items():
+    for name, place in shader.inputs.items():
         value = node[name]
         if isinstance(value, Node) and not value.is_value:
-            adder.link(_shader(adder, value, reading).outputs[0], added.inputs[theirs])
-        elif value is not None and (isinstance(theirs, int) or theirs in added.inputs):
-            _color(adder, added.inputs[theirs], value, reading)
+            adder.link(_shader(adder, value, reading).outputs[0], added.inputs[place])
+        elif value is not None and (isinstance(place, int) or place in added.inputs):
+            _color(adder, added.inputs[place], value, reading)
     return added
 
 
@@ -133,7 +134,8 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
         for name, wanted in row.fixed.items():
             setattr(added, name, wanted)
         for name, theirs in row.words.items():
-            if node[name] == KINDS[node.type].inputs[name][0] and not hasattr(added, theirs):
+            choices: Any = KINDS[node.type].inputs[name]
+            if node[name] == choices[0] and not hasattr(added, theirs):
                 continue  # what an older version does
             _choose(added, theirs, row.word(node[name]))
         for name, theirs in row.flags.items():

@@ -35,6 +35,10 @@ class Output(NamedTuple):
         """An input of this output's node by its name or number, or None where it has no such input."""
         if isinstance(name, str) and name not in self.node.inputs:
             return None
+        return self.required(name)
+
+    def required(self, name: str | int) -> Input:
+        """An input that every node of this kind has."""
         return Input(self.node.inputs[name], self.groups)
 
 

@@ -142,7 +142,7 @@ def _sun(sky: bpy.types.Node, eye: _Eye) -> tuple[float, ...]:
     disc = light.any(axis=-1)
     if not disc.any():
         return (0.0,) * 7
-    # Of a disc that the horizon cuts, what is left counts.
+    # Where the horizon cuts a disc, what is left of it counts.
     towards = solid_angle[disc] @ directions[disc]
     towards /= np.linalg.norm(towards)
     covered = solid_angle[disc].sum()

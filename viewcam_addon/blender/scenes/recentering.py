@@ -23,6 +23,7 @@ and instances, which the file has rounded to half a meter, come out elsewhere th
 import contextlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
+from typing import TypeAlias
 
 import bpy
 import numpy as np
@@ -45,7 +46,7 @@ from .shading import Shading
 from .world import shown_world
 
 Array = NDArray[np.float64]
-Geometry = bpy.types.Mesh | bpy.types.PointCloud
+Geometry: TypeAlias = bpy.types.Mesh | bpy.types.PointCloud
 
 # A number is rounded once when Blender stores it; twice that allows for a last place of its product with a 1.
 _ROUNDING = 2.0**-23
@@ -187,7 +188,8 @@ def _seen(
             overrides.afterwards(bpy.data.batch_remove, [geometries[source.key]])
 
     placed_objects = placements(depsgraph, ledger, shading, copy_of)
-    for source, *_ in placed_objects if shading else ():
+    for source, *_ in placed_objects if shading is not None else ():
+        assert shading is not None
         _note_places(source, shading, ledger)
         if source.is_linked:
             ledger.note(source.name, "approximated", _UNLINKED)
@@ -243,9 +245,10 @@ def _view(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> _V
     camera = camera_object.evaluated_get(depsgraph)
     pinhole = cameras.read(camera, depsgraph.scene)
     stated = cameras.stated(camera, depsgraph.scene)
-    is_stated = stated and not findings.differences(stated, pinhole, pose.reach(camera_object, depsgraph))
+    if stated and not findings.differences(stated, pinhole, pose.reach(camera_object, depsgraph)):
+        pinhole = stated
     return _View(
-        actual=stated if is_stated else pinhole,
+        actual=pinhole,
         claimed=stated or pinhole,
         sensor_fit=camera.data.sensor_fit,
         sensor=datablocks.own_sensor(camera.data),
@@ -335,7 +338,8 @@ def _camera(overrides: Overrides, temporary: bpy.types.Scene, view: _View) -> bp
 
 def _relative(pinhole: Pinhole, origin: tuple[float, ...]) -> Pinhole:
     """The pinhole where `origin` is (0, 0, 0)."""
-    eye, look_at = (tuple(a - b for a, b in zip(point, origin, strict=True)) for point in (pinhole.eye, pinhole.look_at))
+    x, y, z = origin
+    eye, look_at = ((p[0] - x, p[1] - y, p[2] - z) for p in (pinhole.eye, pinhole.look_at))
     return replace(pinhole, eye=eye, look_at=look_at)
 
 

@@ -197,7 +197,23 @@ class Tree:
                 or inputs["factor"].rgb[0] not in {"first": (1.0,), "second": (0.0,)}[name]
             ):
                 inputs[name] = self.surface(source.input(shader.inputs[name]))
-        return Node(ours, tuple((inputs | self._words(source, ours)).items()))
+        return self._with_glow_on_top(source, Node(ours, tuple((inputs | self._words(source, ours)).items())))
+
+    def _with_glow_on_top(self, output: Output, shader: Node) -> Node:
+        """A shader whose sheen or coat does not dim its own light.
+
+        Cycles makes no closures, so no layers, where a path ends and, before 5.2, where it asks a surface for its light: how
+        much the layers take then depends on how many bounces there are and which of two samples has found the light.
+        """
+        is_layered = shader.type == "principled" and not (shader["sheen_weight"].is_black and shader["coat_weight"].is_black)
+        if not (is_layered and shader.is_shining):
+            return shader
+        self._reason(output, "gives off light below its coat or sheen, which Cycles dims on some ways only")
+        below = _node("principled", **{name: value for name, value in shader.inputs if not name.startswith("emission")})
+        glow = _node("emission", color=shader["emission_color"], strength=shader["emission_strength"])
+        alpha = shader["alpha"]
+        is_opaque = not alpha.varies and alpha.rgb[0] == 1.0
+        return _node("add", first=below, second=glow if is_opaque else _node("mix", factor=alpha, second=glow))
 
     def _emission(self, of: Input) -> Color | Node:
         """The emission of a surface whose shader is a color or a number."""

@@ -1,6 +1,7 @@
 """Blender's nodes that make values, read by their table (tracer/scene/value_nodes.py), and the curves and texts of some."""
 
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -31,7 +32,7 @@ def given_words(output: Output, ours: str, row: BlenderNode) -> dict[str, object
             continue
         if name == "interpolation" and word == "Smart":
             word = "Cubic"
-        choices = KINDS[ours].inputs[name]
+        choices: Any = KINDS[ours].inputs[name]
         known = next((each for each in choices if row.word(each) == word), None)
         if known is None:
             return f"has the {name} {word.lower()}"

@@ -1,7 +1,7 @@
 """Blender's world as the tracer's: one color, an equirectangular image, or what stands in for what is not modeled."""
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import bpy
 
@@ -60,7 +60,7 @@ def world_of(
         if pictures is not None:
             pictures |= rendered.pictures
         return replace(rendered.world, hidden_from=hidden_from), rendered.suns
-    # Of an image, even of one that is missing, Cycles samples light, which no constant world needs.
+    # Cycles samples the light of an image, even of one that is missing, which no constant world needs.
     is_constant = wrapped is None and (backdrop, wrapped_there) == (radiance, None)
     if reasons or (missing and is_constant):
         ledger.call_for_cycles(original, _make_constant, radiance)
@@ -125,7 +125,7 @@ class _Wrapped(NamedTuple):
 def _has_volume(world: bpy.types.World) -> bool:
     tree = versions.node_tree(world)
     output = tree and tree.get_output_node("CYCLES")
-    return bool(output) and output.inputs["Volume"].is_linked
+    return output is not None and output.inputs["Volume"].is_linked
 
 
 def _leave_out_volume(overrides: Overrides, world: bpy.types.World) -> None:
@@ -142,7 +142,7 @@ def _make_constant(overrides: Overrides, world: bpy.types.World, radiance: RGB) 
 
 
 # A node that mixes, and what of it must be so → its factor and both sides.
-_MIXES = (
+_MIXES: tuple[tuple[str, dict[str, Any], tuple[str, ...]], ...] = (
     ("MIX_SHADER", {}, ("Fac", "Shader", "Shader_001")),
     ("MIX_RGB", {"blend_type": "MIX", "use_clamp": False}, ("Fac", "Color1", "Color2")),
     ("MIX", {"data_type": "RGBA", "blend_type": "MIX", "clamp_result": False}, ("Factor_Float", "A_Color", "B_Color")),
@@ -176,30 +176,33 @@ def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, l
     output = tree.get_output_node("CYCLES")
     if output is None:
         return (0.0, 0.0, 0.0), None, []
-    reasons = []
+    reasons: list[str] = []
     surface = nodes.source(_unmixed(Input(output.inputs["Surface"]), camera))
     if not isinstance(surface, Output):
         return (0.0, 0.0, 0.0), None, reasons
     if surface.node.type not in ("BACKGROUND", "EMISSION"):
         return tuple(world.color), None, [*reasons, f"has a node {surface.node.name!r} that is not modeled"]
-    color = _unmixed(surface.input("Color"), camera)
+    color = _unmixed(surface.required("Color"), camera)
     rgb = shaders.constant_color_of(color)
-    strength = shaders.constant_number_of(_unmixed(surface.input("Strength"), camera))
+    strength = shaders.constant_number_of(_unmixed(surface.required("Strength"), camera))
     wrapped = None
+    feeding = nodes.source(color)
     if rgb is None:
-        source, factor = _factored(nodes.source(color))
+        assert isinstance(feeding, Output)  # else it were constant
+        source, factor = _factored(feeding)
         wrapped = _wrapped(source)
-        rgb, reason = (factor, None) if wrapped else _mean(nodes.source(color), world)
+        rgb, reason = (factor, None) if wrapped else _mean(feeding, world)
         reasons += [reason] if reason else []
     if strength is None:
         strength = 1.0
         reasons.append("has a strength that varies")
-    radiance = shaders.possible(tuple(value * strength for value in rgb))
+    red, green, blue = (value * strength for value in rgb)
+    radiance = shaders.possible((red, green, blue))
     if radiance is None:
         return (0.0, 0.0, 0.0), None, [*reasons, f"has the color {tuple(rgb)} and the strength {strength:g}"]
     if wrapped and reasons:  # a constant world stands in
-        mean = images.mean(wrapped.image)
-        return tuple(a * b for a, b in zip(radiance, mean, strict=True)), None, reasons
+        red, green, blue = (a * b for a, b in zip(radiance, images.mean(wrapped.image), strict=True))
+        return (red, green, blue), None, reasons
     return radiance, wrapped, reasons
 
 
@@ -208,7 +211,7 @@ def _factored(source: Output) -> tuple[Output | Input, RGB]:
     if source.node.type == "VECT_MATH" and source.node.operation == "MULTIPLY":
         factor = shaders.constant_color(source, 1)
         if factor is not None:
-            return nodes.source(source.input(0)), factor
+            return nodes.source(source.required(0)), factor
     return source, (1.0, 1.0, 1.0)
 
 
@@ -225,7 +228,7 @@ def _wrapped(source: Output | Input) -> _Wrapped | None:
         or not shaders.maps_plainly(node)
     ):
         return None
-    rotation = _rotation(nodes.source(source.input("Vector")))
+    rotation = _rotation(nodes.source(source.required("Vector")))
     return rotation and _Wrapped(node.image.original, node.interpolation == "Closest", rotation)
 
 
@@ -238,11 +241,11 @@ def _rotation(vector: Output | Input) -> tuple[float, float, float] | None:
         return (0.0, 0.0, 0.0) if is_direction else None
     if vector.node.type != "MAPPING" or vector.node.vector_type not in ("POINT", "VECTOR"):
         return None
-    turns = [
+    turns: list[Any] = [
         shaders.constant_color(vector, name)
         for name in ("Location", "Rotation", "Scale")[vector.node.vector_type == "VECTOR" :]
     ]
-    inner = _rotation(nodes.source(vector.input("Vector")))
+    inner = _rotation(nodes.source(vector.required("Vector")))
     if None in turns or inner is None or any(inner) or turns[-1] != (1.0, 1.0, 1.0) or (len(turns) == 3 and any(turns[0])):
         return None
     return turns[-2]

@@ -6,6 +6,7 @@ renders. Both sides of a comparison are then shown the image and the lamps.
 
 import subprocess
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -63,7 +64,8 @@ def tells_rays_apart(world: bpy.types.World) -> bool:
 
 def _feeding(world: bpy.types.World) -> set[Output]:
     """All outputs that a world's surface is made of."""
-    return nodes.feeding(Input(versions.node_tree(world).get_output_node("CYCLES").inputs["Surface"]))
+    tree: Any = versions.node_tree(world)
+    return nodes.feeding(Input(tree.get_output_node("CYCLES").inputs["Surface"]))
 
 
 def rendered(world: bpy.types.World, scene: bpy.types.Scene) -> Rendered | None:

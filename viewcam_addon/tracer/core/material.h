@@ -27,18 +27,18 @@ struct Material {
 
     // The kinds of rays that its lobes scatter.
     uint32_t kinds() const { return kinds_; }
-    // Those among them that are scattered all over, but not as diffuse light is.
+    // The kinds among them that are scattered all over, but not as diffuse light is.
     uint32_t rough_kinds() const { return rough_kinds_; }
     bool scatters() const { return kinds_; }
     bool emits() const { return !is_black(mean_emission_); }
-    // Whether it may let light straight through.
+    // True if it may let light straight through.
     bool is_transparent() const { return transparent_; }
-    // Whether it has normals of its own.
+    // True if it has normals of its own.
     bool is_bumped() const { return bumped_; }
-    // Whether the BSDFs of four points can be made at once, and whether the points' own values are needed for that.
+    // True if the BSDFs of four points can be made at once, and whether the points' own values are needed for that.
     bool is_wide() const { return wide_ && scatters() && !emits() && !transparent_ && !VIEWCAM_ISA::is_bumped(normal); }
     bool varies() const { return varies_; }
-    // Whether it asks for the tangents of a UV map.
+    // True if it asks for the tangents of a UV map.
     bool needs_tangents() const {
         return normal_on_tangents || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.on_tangents; });
     }

@@ -50,7 +50,7 @@ struct alignas(64) Rays {
         for (int axis = 0; axis < 3; axis++) origin[axis][i] = ray.origin[axis], direction[axis][i] = ray.direction[axis];
         t_min[i] = ray.t_min, t_max[i] = ray.t_max;
     }
-    // The same of some of four rays from t = 0 on, one after the other from i on.
+    // Sets some of four rays from t = 0 on, one after the other from i on.
     void set(int i, unsigned lanes, const Vec3x4& origins, const Vec3x4& directions, double4 ends) {
         if (lanes == 15) {
             for (int axis = 0; axis < 3; axis++) store(origin[axis] + i, origins[axis]), store(direction[axis] + i, directions[axis]);

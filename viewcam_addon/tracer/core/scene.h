@@ -69,7 +69,7 @@ class Scene {
         intersect_instances<false>(ray, kind, nearest);
         return hit(nearest, ray);
     }
-    // Whether anything that a kind of ray sees stands in t_min < t < t_max.
+    // True if anything that a kind of ray sees stands in t_min < t < t_max.
     bool occluded(const Ray& ray, RayKind kind = SHADOW) const {
         Nearest nearest{ray.t_max};
         for (const Merged& some : merged_)
@@ -90,7 +90,7 @@ class Scene {
             return std::tie(a.t, a.object, a.primitive) < std::tie(b.t, b.object, b.primitive);
         });
     }
-    // The same as `closest` for up to 64 rays, as packets where enough of them go the same way.
+    // `closest` for up to 64 rays, as packets where enough of them go the same way.
     void closest(const Rays& rays, int count, RayKind kind, Hits& hits) const {
         intersect<false>(rays, count, kind, hits);
         for (int i = 0; i < count; i += 4) {
@@ -181,16 +181,16 @@ class Scene {
         const TriangleMesh& mesh = std::get<TriangleMesh>(geometries[objects[object].geometry]);
         for (int c = 0; c < 3; c++) corners[c] = objects[object].to_world.point(mesh.corner(triangle, c));
     }
-    // Whether the light of any object has blockers of its own.
+    // True if the light of any object has blockers of its own.
     bool is_shadow_linked() const {
         return std::any_of(objects.begin(), objects.end(), [](const Object& object) { return object.visible & SHADOW_LINKED; });
     }
-    // Whether an object is hidden from any kind of ray.
+    // True if an object is hidden from any kind of ray.
     bool hides_anything() const {
         return std::any_of(objects.begin(), objects.end(), [](const Object& object) { return (object.visible & 31) != 31; });
     }
 
-    // Of all hierarchies, beside the arrays that came from Python.
+    // The bytes of all hierarchies, beside the arrays that came from Python.
     size_t bytes() const {
         size_t sum = instances_.bytes() + objects.size() * sizeof(Object) + slots.size() * sizeof(Slot);
         for (const Merged& some : merged_) sum += some.triangles.bytes();
@@ -278,7 +278,7 @@ class Scene {
         }
     }
 
-    // Of what an instance's own hierarchy holds, in rendering space, and what rounding may move it.
+    // Bounds of what an instance's own hierarchy holds, in rendering space, and as far as rounding may move it.
     Bounds world_bounds(const Object& object) const {
         auto spheres = std::get_if<Spheres>(&geometries[object.geometry]);
         const Bvh& bvh = spheres ? spheres->bvh : triangles_[object.geometry].bvh;

@@ -68,7 +68,8 @@ class Picture:
     @classmethod
     def compact(cls, values: NDArray[np.float32], srgb: bool = False) -> "Picture":
         """The picture of some float32 values, in as few bytes as hold each of them to the bit. values : as `pixels`."""
-        return cls(next(filter(lambda exact: exact is not None, (_exactly(values, dtype) for dtype in _SMALLEST_FIRST))), srgb)
+        exact = (_exactly(values, dtype) for dtype in _SMALLEST_FIRST)
+        return cls(next(pixels for pixels in exact if pixels is not None), srgb)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -82,7 +83,7 @@ class Picture:
         return _values(self.pixels)
 
 
-_SMALLEST_FIRST = (np.dtype(np.uint8), RGBE, *map(np.dtype, (np.uint16, np.float16, np.float32)))
+_SMALLEST_FIRST: tuple[np.dtype, ...] = (np.dtype(np.uint8), RGBE, *map(np.dtype, (np.uint16, np.float16, np.float32)))
 
 
 def _values(pixels: NDArray) -> NDArray[np.float32]:
@@ -123,7 +124,8 @@ def _ends(pixels: NDArray) -> tuple[float, float]:
         return 0.0, 1.0
     if pixels.dtype == np.float16:  # whose bits are compared several times as fast: of either sign they grow with the size
         most = pixels.view(np.int16).max(), pixels.view(np.uint16).max()
-        return tuple(float(np.array(bits).astype(np.uint16).view(np.float16)) for bits in most)
+        least, largest = (float(np.array(bits).astype(np.uint16).view(np.float16)) for bits in most)
+        return least, largest
     return float(pixels.min()), float(pixels.max())
 
 

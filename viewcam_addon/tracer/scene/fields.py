@@ -12,7 +12,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ _COPIES = 2
 class Field:
     """A value, its name as a sentence says it ("eye of the camera") and the file that it comes from."""
 
-    def __init__(self, value: object, name: str, file: str) -> None:
+    def __init__(self, value: Any, name: str, file: str) -> None:
         self.value, self.name, self.file = value, name, file
 
     def fail(self, problem: str) -> NoReturn:
@@ -87,13 +87,13 @@ class Field:
             self.fail(f"is {_quoted(self.value)}: give a whole number of at least {least}")
         return self.value
 
-    def vector(self, count: int) -> tuple[float, ...]:
+    def vector(self, count: int) -> tuple[Any, ...]:
         if not isinstance(self.value, list) or len(self.value) != count or not all(map(_is_number, self.value)):
             self.fail(f"is {_quoted(self.value)}: give a list of {count} finite numbers")
         return tuple(map(float, self.value))
 
     def array(
-        self, arrays: "Arrays | None", dtype: type, shape: tuple[int | None, ...], kept: Sequence[np.dtype] = ()
+        self, arrays: "Arrays | None", dtype: Any, shape: tuple[int | None, ...], kept: Sequence[np.dtype] = ()
     ) -> NDArray:
         """A list of lists of numbers, or {"npz": key} where `arrays` are given; None in the shape stands for any number.
 
@@ -169,6 +169,7 @@ class Arrays:
     def _read(self, name: str) -> NDArray:
         damaged = f"{self._file}: the array {checks.quoted(name)} is damaged: export the scene again"
         member = self._members[name]
+        assert self._archive is not None and self._archive.fp is not None
         try:
             with self._archive.open(member) as file:
                 dtype, size = npy.header(file)
@@ -180,7 +181,7 @@ class Arrays:
             together = size + sum(array.nbytes for array in self._taken.values())
             machine.check(f"the arrays of {self._file}", _COPIES * together, "make the scene smaller")
             with self._archive.open(member) as file:
-                return np.lib.format.read_array(file, allow_pickle=False)
+                return np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
         except (
             OSError,
             ValueError,

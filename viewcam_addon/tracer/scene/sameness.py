@@ -5,6 +5,7 @@ compared to the last bit. Rejected: fingerprints, which read all of both scenes 
 """
 
 from dataclasses import fields, is_dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ def same_things(first: Scene, second: Scene) -> bool:
     return same(first.objects, second.objects) and same(first.geometries, second.geometries)
 
 
-def same(first: object, second: object) -> bool:
+def same(first: Any, second: Any) -> bool:
     """True if two values, of those that scenes are made of, are the same."""
     if first is second:
         return True

@@ -169,7 +169,7 @@ def _light(fields: dict[str, Field], arrays: Arrays) -> dict[str, Any]:
 def _version(field: Field) -> tuple[int, int]:
     if not re.fullmatch(r"[0-9]{1,2}\.[0-9]{1,2}", field.text()):
         field.fail(f'is {quoted(field.value)}: give a version of Blender, as "5.2"')
-    first, second = map(int, field.value.split("."))
+    first, second = map(int, field.text().split("."))
     return first, second
 
 
@@ -209,7 +209,7 @@ def _node_document(node: Node) -> dict[str, Any]:
         if isinstance(known, float) and isinstance(three, tuple) and three == (three[0],) * 3:
             return three[0]
         if known is value_nodes.IMAGE:
-            return value.image
+            return value.image if isinstance(value, Color) else value
         return _color_document(value) if isinstance(value, Color) else value
 
     return {"type": node.type} | {name: value_of(name, value) for name, value in node.inputs}
@@ -242,7 +242,7 @@ def _material(field: Field) -> Material:
         field.fail(f"has a surface beside {', '.join(beside)}: give one or the other")
     if "ior" in keys:
         stated["ior"] = keys["ior"].number()
-    trees = {name: _node(keys[name]) for name in ("surface", "displacement") if name in keys}
+    trees: dict[str, Any] = {name: _node(keys[name]) for name in ("surface", "displacement") if name in keys}
     if "transparent_shadow" in keys:
         trees["transparent_shadow"] = keys["transparent_shadow"].truth()
     try:
@@ -257,7 +257,7 @@ def _node(field: Field, deep: int = 1) -> Node:
     kind = field.fields(("type",), others=True)["type"]
     if kind.text() not in KINDS:
         kind.fail(f"is {quoted(kind.value)}: give one of {', '.join(KINDS)}")
-    known = KINDS[kind.value]
+    known = KINDS[kind.text()]
     keys = field.fields(("type",), tuple(known.inputs))
     try:
         stated = (
@@ -265,7 +265,7 @@ def _node(field: Field, deep: int = 1) -> Node:
             for name, default in known.inputs.items()
             if name in keys
         )
-        return Node(kind.value, tuple(stated))
+        return Node(kind.text(), tuple(stated))
     except InputError as error:
         field.hand_on(error)
 
@@ -304,7 +304,7 @@ def _lamp(field: Field) -> Lamp:
     kind = field.fields(("type", "name"), others=True)["type"]
     if kind.text() not in lamps.KINDS:
         kind.fail(f"is {quoted(kind.value)}: give one of {', '.join(lamps.KINDS)}")
-    lamp = lamps.KINDS[kind.value]
+    lamp = lamps.KINDS[kind.text()]
     declared = [each.name for each in dataclasses.fields(lamp) if each.name not in ("name", "matrix")]
     is_placed = len(declared) + 1 < len(dataclasses.fields(lamp))
     keys = field.fields(("type", "name"), (*declared, *(fields.PLACE_KEYS if is_placed else ())))

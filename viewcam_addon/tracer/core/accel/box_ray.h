@@ -21,13 +21,13 @@ constexpr float FLOAT_ROUNDING = 0x1p-24f;
 // Rounds a distance of at least 0 up to a float.
 inline float round_up(double distance) { return float(distance * (1 + 2.5e-7) + 1e-37); }
 
-// Which of a direction's components is the largest, given their sizes. No branch, which rays from surfaces would take at random.
+// The number of a direction's largest component, given their sizes. No branch, which rays from surfaces would take at random.
 inline int dominant_axis(double x, double y, double z) {
     int axis = !(x > y);
     return max(x, y) > z ? axis : 2;
 }
 
-// The same of four directions, given their sizes.
+// The largest components of four directions, given their sizes.
 struct DominantAxis {
     long4 x, y;  // whether it is that one
 
@@ -50,7 +50,7 @@ struct BoxRay {
 
 // The ray, no farther than t_max, for the boxes of `bvh`; false where it misses them all. origin_error: see LocalRay.
 inline bool enter(const Bvh& bvh, const Ray& ray, double t_max, double origin_error, BoxRay& box) {
-    // Of all these the fourth is what comes next in memory, and no matter.
+    // The fourth of all these is what comes next in memory, and no matter.
     double4 direction = load<double4>(&ray.direction.x), origin = load<double4>(&ray.origin.x);
     double4 size = abs(direction);
     int axis = dominant_axis(size[0], size[1], size[2]);

@@ -257,7 +257,7 @@ class Builder {
     std::atomic<int> spare_;
 };
 
-// Of a binary tree's nodes, those that become nodes of eight: the children of largest area are opened until there are eight.
+// A binary tree's nodes become nodes of eight: the children of largest area are opened until there are eight.
 inline void collapse(const Builder& builder, Bvh& bvh) {
     const Array<BinaryNode>& binary = builder.nodes;
     size_t leaf_count = 0;

@@ -39,7 +39,7 @@ struct Shear {
     return inside & long4(determinant != zero);
 }
 
-// Of N rays, or sets of rays, what box_ray.h explains, but for the origin, which is no product yet.
+// N rays, or sets of rays, as box_ray.h explains them, but for the origin, which is no product yet.
 template <int N> struct alignas(64) BoxRays {
     float near_origin[3][N], far_origin[3][N], near_reciprocal[3][N], far_reciprocal[3][N], far[N];
 };
@@ -166,7 +166,7 @@ inline void enter(const Bvh& bvh, const Rays& rays, const Hits& nearest, int cou
 template <bool ANY, class Visit> inline void traverse_packet(const Bvh& bvh, Packet& packet, const Visit& visit) {
     const int groups = (packet.count + 7) / 8;
     int near[3], far[3];
-    // Of each group's rays together, and of all: near planes from the origin farthest along, by the reciprocal of least size; far
+    // Bounds of each group's rays together, and of all: near planes from the origin farthest along, by the reciprocal of least size; far
     // planes the other way. Where there is no group, those of the last one, with an end before the start.
     BoxRays<8> each, all;
     int from[8];

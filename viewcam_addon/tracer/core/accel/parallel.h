@@ -46,7 +46,7 @@ template <class Work> void parallel_for(int threads, size_t count, const Work& w
     if (thrown) std::rethrow_exception(thrown);
 }
 
-// The same in pieces: work(begin, end) of [0, count).
+// In pieces: work(begin, end) of [0, count).
 template <class Work> void parallel_pieces(int threads, size_t count, size_t piece, const Work& work) {
     parallel_for(threads, (count + piece - 1) / piece,
                  [&](size_t i) { work(i * piece, std::min(count, (i + 1) * piece)); });

@@ -71,7 +71,7 @@ template <bool ANY, class Visit> inline bool traverse(const Bvh& bvh, BoxRay& ra
     }
 }
 
-// The same of a ray as it comes, no farther than t_max. origin_error: see LocalRay.
+// A ray as it comes, no farther than t_max. origin_error: see LocalRay.
 template <bool ANY, class Visit>
 inline bool traverse(const Bvh& bvh, const Ray& ray, double t_max, double origin_error, const Visit& visit) {
     BoxRay box;

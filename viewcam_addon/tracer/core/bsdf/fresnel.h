@@ -20,7 +20,7 @@ template <class T> inline Vec3Of<T> mix(Vec3Of<T> a, Vec3Of<T> b, Scalar<T> t) {
 inline Vec3 gray(double value) { return {value, value, value}; }
 inline Vec3x4 gray(double4 value) { return {value, value, value}; }
 
-// Of the index of refraction, what is reflected straight back; and the index that reflects so much.
+// The share that an index of refraction reflects straight back; and the index that reflects so much.
 template <class T> inline T f0_of(T ior) {
     T root = (ior - 1.0) / (ior + 1.0);
     return root * root;
@@ -49,7 +49,7 @@ template <class T> struct DielectricFresnelOf {
     Vec3Of<T> at(T cosine) const { return gray(fresnel(cosine, ratio)); }
 };
 
-// Of a surface that reflects nothing but where Snell's law lets no light through.
+// The Fresnel term of a surface that reflects nothing but where Snell's law lets no light through.
 template <class T> struct TotalReflectionOf {
     T ratio;
     Vec3Of<T> at(T cosine) const { return gray(select(Mask<T>(fresnel(cosine, ratio) < 1.0), T{}, splat<T>(1))); }

@@ -28,7 +28,10 @@ struct PrincipledClosure {
     uint32_t kinds() const { return transmission.is_black() ? DIFFUSE | GLOSSY : KINDS; }
     bool is_rough() const { return true; }
     bool lets_through() const { return alpha.varies() || alpha.rgb.x < 1; }
-    bool shines_evenly() const { return mean_emission({}).x == 0; }
+    bool shines_evenly() const {
+        bool layered = !(sheen_weight.is_black() && coat_weight.is_black());  // they leave less of it toward where it grazes
+        return emits_nothing() || !(layered || emission_color.varies() || emission_strength.varies() || alpha.varies());
+    }
     Vec3 mean_emission(const std::vector<Texture>& textures) const {
         double share = alpha.varies() ? 1 : unit_range(alpha.rgb.x);
         return emission_color.mean(textures) * emission_strength.mean(textures) * share;

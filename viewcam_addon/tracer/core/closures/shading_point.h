@@ -18,12 +18,12 @@ enum CyclesVersion { CYCLES_4_2 = 402, CYCLES_4_3 = 403, CYCLES_5_0 = 500, CYCLE
 // What values are: as a number, a color counts by its luminance and a vector by its mean.
 enum class Gives { NUMBER, COLOR, VECTOR };
 
-// Of Rec. 709's primaries.
+// Luminance by Rec. 709's primaries.
 inline double luminance(Vec3 rgb) { return 0.2126390 * rgb.x + 0.7151687 * rgb.y + 0.0721923 * rgb.z; }
 
 inline double number_of(Vec3 rgb) { return rgb.x == rgb.y && rgb.y == rgb.z ? rgb.x : luminance(rgb); }
 
-// Whether facets are so small that they are a mirror.
+// True if facets are so small that they are a mirror.
 template <class T> inline Mask<T> is_mirror(const MicrofacetsOf<T>& facets, int version) {
     return Mask<T>(facets.alpha_x * facets.alpha_y <= (version < CYCLES_4_3 ? 5e-7 : 2e-10));
 }
@@ -162,9 +162,9 @@ class Inputs {
     const Color& operator[](std::string_view name) const { return find(name).color; }
     const std::string& choice(std::string_view name) const { return find(name).choice; }
     bool flag(std::string_view name) const { return choice(name) == "true"; }
-    // Of what is the same everywhere.
+    // The number of an input that is the same everywhere.
     double number(std::string_view name) const { return find(name).color.rgb.x; }
-    // Whether any is made by a node of which that holds.
+    // True if any is made by a node of which that holds.
     template <class Holds> bool any_node(Holds&& holds) const {
         return std::any_of(inputs_.begin(), inputs_.end(), [&](const Input& input) { return input.color.node != NONE && holds(input.color.node); });
     }
@@ -181,7 +181,7 @@ class Inputs {
     std::vector<Input> inputs_;
 };
 
-// That of a variant's alternatives which has this NAME, made of `from`; std::invalid_argument if none has. what: they are.
+// The alternative of a variant that has this NAME, made of `from`; std::invalid_argument if none has. what: they are.
 template <class Kinds, size_t I = 0, class... From> Kinds of_name(const char* what, std::string_view name, const From&... from) {
     if constexpr (I == std::variant_size_v<Kinds>) {
         throw std::invalid_argument("no " + std::string(what) + " is called " + std::string(name));

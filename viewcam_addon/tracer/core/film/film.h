@@ -69,7 +69,7 @@ class Pixel {
     Vec3 sample_variance() const { return rgb(max((spread_ - differences_ * differences_ / double(count_)) / (count_ - 1.0), double4{})); }
 
     Vec3 combined(const FilmSettings& film) const { return rgb((first_ + differences_ / double(count_)) * film.exposure); }
-    // Of `combined`: that of the batches' means over their number, as if one that has begun had ended.
+    // The variance of `combined`: that of the batches' means over their number, as if one that has begun had ended.
     Vec3 variance(const FilmSettings& film, uint32_t batch_size) const {
         uint32_t batches = count_ / batch_size;
         double4 sums = (squares_ - before_ * before_ / double(batches)) / double(batches - 1);

@@ -78,7 +78,7 @@ class Filter {
     Vec2x4 offset(const Vec2x4& u) const { return places_ ? Vec2x4{offset(u.x), offset(u.y)} : u; }
 
    private:
-    // Of the mass to the nearer end, plus LEAST, the first binary digits tell the step.
+    // The first binary digits of the mass to the nearer end, plus LEAST, tell the step.
     static constexpr int DIGITS = 6, HALVINGS = 16, STEPS = (HALVINGS << DIGITS) + 1, DROPPED = 52 - DIGITS;
     static constexpr double LEAST = 0x1p-17;
 

@@ -173,7 +173,7 @@ class TileSampler {
         return {sample, sample / pixel.count(), mean(apart * apart) / 4 * exposure};
     }
 
-    // Of each pixel, the variance of its mean over s²/N, 1 at most.
+    // For each pixel, the variance of its mean over s²/N, 1 at most.
     static std::vector<double> efficiency(const Tile& tile, const std::vector<Spread>& spreads) {
         constexpr uint32_t BLOCKS = TILE / BLOCK;
         Spread total, block[BLOCKS * BLOCKS];

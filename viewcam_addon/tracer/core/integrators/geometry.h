@@ -143,7 +143,7 @@ inline void render_geometry(
     });
 }
 
-// Of each pixel of a camera whether its center shows anything at all.
+// Notes for each pixel of a camera whether its center shows anything at all.
 inline void silhouette(const Scene& scene, const Camera& camera, uint8_t* covered) {
     for_pixel_centers(camera, 0, camera.height, nullptr, [&](const Rays& rays, const size_t* pixels, int count) {
         bool found[PACKET];

@@ -110,7 +110,7 @@ class PathIntegrator {
         return pairs_;
     }
 
-    // Whether paths through the same point of the film may bring different light.
+    // True if paths through the same point of the film may bring different light.
     bool is_random() const {
         bool random = mixed_ || (kinds_ & GLOSSY && kinds_ & TRANSMISSION);
         for (RayKind kind : {DIFFUSE, GLOSSY, TRANSMISSION})
@@ -218,7 +218,7 @@ class PathIntegrator {
     PathLight& light_of(const Path& path, Block& block) const {
         return coincident_ > 0 && !path.coincident ? block.ignored : block.light[path.sample];
     }
-    // The same of light that a path has met at a distance, |cos| to the surface that shines, and that a shadow ray could have found, too.
+    // Light that a path has met at a distance, |cos| to the surface that shines, and that a shadow ray could have found, too.
     PathLight& light_of(const Path& path, double distance, double cosine, const Light* lamp, int depth, Block& block) const {
         if (coincident_ > 0 && sees_otherwise_ && !path.coincident && path.kind != CAMERA && path.pdf < INFINITE) {
             Ray ray = shadow_ray(block.points[path.from], {path.ray.direction, distance, {}, 0, cosine});
@@ -232,7 +232,7 @@ class PathIntegrator {
         Vec3 shadow{1, 1, 1}, scattered{1, 1, 1};
         bool differ() const { return !VIEWCAM_ISA::is_black(shadow - scattered); }
     };
-    // The same along a ray, and notes what makes the difference. lamp: null where a surface or the sky shines. state: of the scattered ray.
+    // What is left along a ray; notes what makes the difference. lamp: null where a surface or the sky shines. state: of the scattered ray.
     [[gnu::noinline]] LeftByKinds left_by_kinds(const Ray& ray, const Light* lamp, const RayState& state) const {
         static thread_local std::vector<Hit> hits;
         scene_.surfaces(ray, RayKind(state.kind | SHADOW), INFINITE, hits);
@@ -313,14 +313,14 @@ class PathIntegrator {
         bool singular = path.kind != CAMERA && path.pdf == INFINITE;
         return scene_.shading(point, incoming, {path.kind, path.diffuse, singular, depth, path.passed, path.scattered, point.t, path.width, path.spread});
     }
-    // The same where it arrives there, with the normal that its material gives the point.
+    // The point where the path arrives, with the normal that its material gives the point.
     ShadingPoint arriving(Interaction& point, const Path& path, int depth) const {
         ShadingPoint at = shading(point, path, path.ray.direction, depth);
         const Color& normal = material(point).normal;
         if (VIEWCAM_ISA::is_bumped(normal)) point.shading = at.normal(normal);
         return at;
     }
-    // Whether what a path has met has a wide material; `point` receives what scattering needs.
+    // True if what a path has met has a wide material; `point` receives what scattering needs.
     bool meets_wide(const Hit& hit, WidePoint& point) const {
         if (coincident_ > 0) return false;
         const Object& object = scene_.objects[hit.object];
@@ -350,7 +350,7 @@ class PathIntegrator {
     }
     bool has_ended(const Path& path) const { return path.passed > 0 && path.passed >= ended_after_; }
 
-    // Whether a path goes straight through a surface; what it brings from now on is weighted by the chance of that. u: a number in
+    // True if a path goes straight through a surface; what it brings from now on is weighted by the chance of that. u: a number in
     // [0, 1) that chooses, or −1 where none has been made yet.
     bool passes(Path& path, const BSDF& bsdf, int depth, double& u, const Block& block) const {
         double chance = path.last ? !is_black(bsdf.transparency()) : bsdf.chance_through();
@@ -576,7 +576,7 @@ class PathIntegrator {
         block.live = onwards;
     }
 
-    // The same of paths at wide materials, four of one at a time.
+    // Scatters paths at wide materials, four of one at a time.
     void scatter_wide(int depth, int& onwards, Block& block) const {
         for (uint64_t left = std::exchange(block.wide, 0); left;) {
             WidePaths four;

@@ -72,7 +72,7 @@ class Point {
     bool is_sized() const { return radius_ > 0; }
     Vec3 radiance() const { return radiance_; }
 
-    // Whether light comes from everywhere at a place.
+    // True if light comes from everywhere at a place.
     template <class T> Mask<T> is_around(Vec3Of<T> place) const {
         if (soft_ || radius_ == 0) return Mask<T>{};
         Vec3Of<T> way = splat<T>(center_) - place;
@@ -102,7 +102,7 @@ class Point {
         return 1 / (2 * PI * spread(from.position));
     }
 
-    // Whether a ray runs into the light. leaves: from inside, `only_outside` forbids what lies behind the middle.
+    // True if a ray runs into the light. leaves: from inside, `only_outside` forbids what lies behind the middle.
     bool intersect(const LightRay& ray, bool only_ahead, double& distance) const {
         Vec3 way = center_ - ray.origin;
         double along = dot(way, ray.direction), squared = dot(way, way);
@@ -218,14 +218,14 @@ class Spot {
    private:
     static constexpr double UNKNOWN = 2;  // more than any sphere fills
 
-    // Of a unit direction towards the spot.
+    // The spot's share in a unit direction towards it.
     double attenuation(Vec3 ahead) const {
         double x = dot(inverse_[0], ahead), y = dot(inverse_[1], ahead), z = dot(inverse_[2], ahead);
         double rise = (z / std::sqrt(x * x + y * y + z * z) - edge_) * slope_;
         rise = rise > 0 ? min(rise, 1.0) : 0;
         return rise * rise * (3 - 2 * rise);
     }
-    // Whether the sphere is so large, or near, that the spot's cone is narrower than it looks.
+    // True if the sphere is so large, or near, that the spot's cone is narrower than it looks.
     bool is_narrow(Vec3 place) const { return is_sized() && !point_.is_soft() && spread_ < point_.spread(place); }
     LightSample along_the_beam(const Interaction& from, Vec2 u) const {
         double short_of, radius = point_.radius();
@@ -402,7 +402,7 @@ class Area {
         T weight = min(cosine / (PI * squared), splat<T>(MOST_WEIGHT_OF_LIGHT)) * through_grid(cosine);
         return {ahead, distance, splat<T>(power_) * weight, squared / (cosine * area_), cosine};
     }
-    // Of the light, by the cosine of the angle at which it leaves: what falls off is the part that the grid's slats leave free, and
+    // The share of the light by the cosine of the angle at which it leaves: it falls off as the part that the grid's slats leave free, and
     // all of it together stays what it is without a grid (Blender D10594).
     template <class T> T through_grid(T cosine) const {
         if (focus_ == 0) return splat<T>(1);

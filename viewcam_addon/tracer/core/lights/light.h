@@ -39,7 +39,7 @@ class Light {
         if (emission_.varies() && !is_black(sample.weight)) sample.weight *= emission(from.position, sample.direction, sample.distance);
         return sample;
     }
-    // The same of some of four points, of which point_of(i) tells all.
+    // Samples for some of four points, of which point_of(i) tells all.
     template <class PointOf>
     LightSampleOf<double4> sample_li(const SurfacePoint<double4>& from, const PointOf& point_of, unsigned lanes, double4 part, const Vec2x4& u) const {
         return std::visit(

@@ -30,7 +30,7 @@ template <class T> struct LightSampleOf {
     T pdf = splat<T>(INFINITE);        // by solid angle; INFINITE of what has no size
     T cosine = splat<T>(1);            // under which the light's own surface is seen, of flat lights
 
-    // Of four, makes one of them this.
+    // Makes one of four this.
     void set(int i, const LightSampleOf<double>& one) {
         set_lane(direction, i, one.direction), set_lane(weight, i, one.weight);
         distance[i] = one.distance, pdf[i] = one.pdf, cosine[i] = one.cosine;

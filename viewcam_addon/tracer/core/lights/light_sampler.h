@@ -113,10 +113,10 @@ class LightSampler {
             visit(lights_[light], radiance * share(light, ray, from, pdf, seen, through), distance);
         });
     }
-    // Whether rays run into lamps that have blockers of their own.
+    // True if rays run into lamps that have blockers of their own.
     bool is_shadow_linked() const { return shadow_linked_; }
 
-    // Whether the receivers of a light, or of an object that shines, are all, or what a point is of is one of them.
+    // True if the receivers of a light, or of an object that shines, are all, or what a point is of is one of them.
     template <class Linked> bool reaches(const Linked& light, const Interaction& point) const {
         return !linked_ || light.receivers == EVERYTHING || point.object == NONE || light.receivers & (*objects_)[point.object].lit_by;
     }
@@ -128,7 +128,7 @@ class LightSampler {
     bool has_sky() const { return sky_ != NONE; }  // among them
     bool has_meshes() const { return size_t(count_) > lamps_; }
     bool is_random() const { return random_; }
-    // Whether rays of a kind run into lamps.
+    // True if rays of a kind run into lamps.
     bool meets_lamps(RayKind kind) const { return met_by_ & kind; }
 
     // The radiance of all lamps that a ray of a kind runs through.
@@ -190,7 +190,7 @@ class LightSampler {
         return 0;
     }
 
-    // The same of some of four points, by slot. point_of(i): all that is known of a point.
+    // Choices for some of four points, by slot. point_of(i): all that is known of a point.
     template <class PointOf> void choose(const PointOf& point_of, unsigned lanes, double4 u, bool seen, Choices (&choices)[ASKED], double4& brightest) const {
         brightest = double4{};
         if (count_ == 1 && !(asks_each() && seen)) {
@@ -230,7 +230,7 @@ class LightSampler {
     // samples: half as many of both take as long for the same error. A smaller chance than SMALLEST_CHANCE comes never.
     static constexpr double WORTH = 0.25, SMALLEST_CHANCE = 1e-80, BELOW_1 = 1 - 0x1p-53;
 
-    // Whether lamps and the sky are asked one by one where the eye sees points.
+    // True if lamps and the sky are asked one by one where the eye sees points.
     bool asks_each() const { return count_ <= ASKED && !has_meshes() && (count_ > 1 || !is_black(environment_->radiance)); }
 
     // What a light may bring to a point.
@@ -239,7 +239,7 @@ class LightSampler {
         double before = estimate(light, point, point.shading, point.normal);
         return through ? before + estimate(light, point, -point.shading, -point.normal) : before;
     }
-    // The same on one side. normal: the true one, for what the smooth one turns its back on.
+    // The estimate on one side. normal: the true one, for what the smooth one turns its back on.
     double estimate(uint32_t light, const Interaction& point, Vec3 shading, Vec3 normal) const {
         double brought = lights_[light].estimate(point.position, shading);
         return brought > 0 || is_black(shading - normal) ? brought : lights_[light].estimate(point.position, normal);
@@ -260,7 +260,7 @@ class LightSampler {
             reached_.push_back(reached += 0.5 * min(lights_[i].irradiance(), MOST) / total + 0.5 / double(apart_.size()));
         if (!reached_.empty()) reached_.back() = 1;
     }
-    // That of many lights one at infinity is picked: between one and three quarters, since the tree's part is only a bound, but where
+    // The chance that of many lights one at infinity is picked: between one and three quarters, since the tree's part is only a bound, but where
     // there is nothing else to pick.
     double chance_apart(const Interaction& point, bool through) const {
         if (apart_.empty()) return 0;

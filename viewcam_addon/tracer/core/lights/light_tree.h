@@ -1,6 +1,6 @@
 // Many lights as a binary tree: a point picks one in as many steps as the tree is deep, at each the side by what it may bring.
 //
-// Of a box round the point its own bound says little, and what is a level or two below is asked. Measured: under ten thousand lamps
+// For a box round the point its own bound says little, and what is a level or two below is asked. Measured: under ten thousand lamps
 // a tenth to a fifth less noise in a tenth to a sixth more time, and with one lamp near among many far ones a quarter of the
 // noise. Rejected: looking all the way down, which takes twice the time, and has less noise only in that last case.
 //

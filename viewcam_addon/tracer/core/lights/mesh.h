@@ -58,7 +58,7 @@ class MeshLight {
         if (!(pdf > LEAST_DENSITY && pdf < INFINITE)) return {ahead, distance, {}, INFINITE, 1};
         return {ahead, distance, radiance(material, triangle, from, to, ahead) / pdf, pdf, cosine};
     }
-    // Of a ray that meets a triangle, at a distance, under |cos| to its normal.
+    // The density of a ray that meets a triangle at a distance, under |cos| to its normal.
     double pdf_li(uint32_t material, double distance, double cosine) const {
         return cosine > 0 ? densities_[material] * distance * distance / cosine : 0;
     }

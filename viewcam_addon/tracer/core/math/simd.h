@@ -92,7 +92,7 @@ inline double4 abs(double4 a) { return (double4)((long4)a & splat4(INT64_MAX)); 
 inline double4 copysign(double4 size, double4 sign) {
     return (double4)(((long4)size & splat4(INT64_MAX)) | ((long4)sign & splat4(INT64_MIN)));
 }
-// The same of sizes that have no sign of their own.
+// Sizes that have no sign of their own get one.
 inline double4 with_sign(double4 size, double4 sign) { return (double4)((long4)size | ((long4)sign & splat4(INT64_MIN))); }
 inline double4 select(long4 mask, double4 a, double4 b) { return mask ? a : b; }
 

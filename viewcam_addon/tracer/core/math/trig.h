@@ -29,7 +29,7 @@ template <class T> struct SinCosOf {
 };
 using SinCos = SinCosOf<double>;
 
-// Of an angle in turns, |turns| < 2^30, or of four: no digit is lost to a multiple of π.
+// Sine and cosine of an angle in turns, |turns| < 2^30, or of four: no digit is lost to a multiple of π.
 template <class T> inline SinCosOf<T> sincos_of_turns(T turns) {
     constexpr double WHOLE = 0x1.8p52;  // what it is added to is rounded to a whole number, whose last binary digits are the sum's
     static constexpr double SIN[] = {6.283185307179586,  -41.34170224039976, 81.60524927607493,  -76.70585975299812,
@@ -68,7 +68,7 @@ template <class T> inline T asin_of_small(T x) {
 }
 }  // namespace detail
 
-// Of what is rounded to beyond ±1, as of ±1.
+// What is rounded to beyond ±1 counts as ±1.
 template <class T> inline T asin(T x) {
     T size = abs(x);
     Mask<T> is_small(size <= 0.5);

@@ -19,7 +19,7 @@ inline bool any(bool mask) { return mask; }
 inline bool all(bool mask) { return mask; }
 inline double abs(double a) { return std::fabs(a); }
 
-// Of numbers, or of double4 where four are computed at once (simd.h).
+// A vector of numbers, or of double4 where four are computed at once (simd.h).
 template <class T> struct Vec2Of {
     T x{}, y{};
 };

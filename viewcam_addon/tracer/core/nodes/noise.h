@@ -50,7 +50,7 @@ inline Vec3 hashed_color(const Place<4>& p) {
     return {hashed(p[0], p[1], p[2], p[3]), hashed(p[2], p[0], p[3], p[1]), hashed(p[3], p[2], p[1], p[0])};
 }
 
-// Of a lattice's corner: how noise rises from there.
+// The rise of noise from a lattice's corner.
 inline double gradient(uint32_t hash, const Place<1>& p) {
     hash &= 15;
     double steep = 1 + (hash & 7);

@@ -6,7 +6,7 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-// Of a black body, its luminance being 1. Planck's law as Cycles has it: fitted piece by piece, the same below 800 K and from 12,000 K on.
+// The color of a black body, its luminance being 1. Planck's law as Cycles has it: fitted piece by piece, the same below 800 K and from 12,000 K on.
 struct BlackbodyNode {
     static constexpr const char* NAME = "blackbody";
     static constexpr Gives GIVES = Gives::COLOR;
@@ -44,7 +44,7 @@ struct BlackbodyNode {
     }
 };
 
-// Of a wavelength in nanometers: the CIE's observer of 1931 (2°), every 5 nm from 380 on; straight between, black beyond.
+// The color of a wavelength in nanometers: the CIE's observer of 1931 (2°), every 5 nm from 380 on; straight between, black beyond.
 struct WavelengthNode {
     static constexpr const char* NAME = "wavelength";
     static constexpr Gives GIVES = Gives::COLOR;

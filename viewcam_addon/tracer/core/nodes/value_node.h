@@ -68,7 +68,7 @@ struct ValueNodes {
         all.push_back(made(name, inputs, textures));
         on_tangents_.push_back(tangents_asked(all.back()) != nullptr || need_tangents(inputs));
     }
-    // Whether what makes any of these asks for the tangents of a UV map; and the name of that which a node itself asks for.
+    // True if what makes any of these asks for the tangents of a UV map; and the name of that which a node itself asks for.
     bool need_tangents(const Inputs& inputs) const {
         return inputs.any_node([&](uint32_t node) { return on_tangents_[node]; });
     }
@@ -77,7 +77,7 @@ struct ValueNodes {
         if (auto tangent = std::get_if<TangentNode>(&node); tangent && !tangent->radial) return &tangent->uv;
         return nullptr;
     }
-    // The same, or the constant that a node has turned out to be.
+    // The color, or the constant that its node has turned out to be.
     Color resolved(Color color) const {
         if (color.node == NONE) return color;
         if (color.node >= all.size()) throw std::invalid_argument("an input names no node");
@@ -95,7 +95,7 @@ struct ValueNodes {
         else
             return kind.GIVES;
     }
-    // Whether the node itself knows that it depends on more than its inputs.
+    // True if the node itself knows that it depends on more than its inputs.
     template <class Kind> static bool varies(const Kind& kind) {
         if constexpr (requires { kind.varies(); })
             return kind.varies();

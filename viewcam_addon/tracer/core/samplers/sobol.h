@@ -77,7 +77,7 @@ class SobolSampler {
         return value;
     }
     uint4 digits(uint4 samples, int dimension) const {
-        // Those that follow one another stand so in the table.
+        // Dimensions that follow one another stand so in the table.
         int depth = dimension < FILM ? 0 : (dimension - FILM) / SCATTERING;
         if (depth < depths_ && samples[3] < tabulated_ && bits(int4(samples == samples[0] + uint4{0, 1, 2, 3})) == 15)
             return load<uint4>(&table_[(size_t(depth) * ROWS + dimension - depth * SCATTERING) * tabulated_ + samples[0]]);

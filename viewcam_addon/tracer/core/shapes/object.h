@@ -25,7 +25,7 @@ struct Object {
     double translation_error = 0;  // what that may be in object space, in each coordinate
 
     Vec3 to_object(Vec3 v) const { return product(inverse, v); }
-    // The same ray in object space; t stays what it is.
+    // The ray in object space; t stays what it is.
     LocalRay to_object(const Ray& ray) const {
         Vec3 apart = ray.origin - to_world.translation(), sizes = abs(apart);
         LocalRay local{{to_object(apart), to_object(ray.direction), ray.t_min, ray.t_max}};

@@ -103,7 +103,7 @@ struct UnitSphere {
     }
 };
 
-// Whether a ray in object space runs past a sphere, or away from it, by more than all that is rounded there: the way to the center by
+// True if a ray in object space runs past a sphere, or away from it, by more than all that is rounded there: the way to the center by
 // the origin's error and the center's own rounding, the direction, relatively, by four roundings times the matrix's condition. So
 // most spheres whose boxes are met are left without a division, and those that a ray has just left without the pairs of `take_care`.
 inline bool passes(const LocalRay& local, Vec3 center, double radius, double condition) {

@@ -130,7 +130,7 @@ class TriangleBvh {
         });
     }
 
-    // The same of a packet's rays, each with what `intersect` would find.
+    // A packet's rays, each with what `intersect` would find.
     template <bool ANY> void intersect(Packet& packet) const {
         if (bvh.root == NOTHING) return;
         const Shear& shear = packet.shear;
