@@ -38,8 +38,8 @@ def recognizes(source: Source) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    if source.xml.tag == "calibration":
-        return [_of_calibration(source, options)]
+    if source.xml is not None and source.xml.tag == "calibration":
+        return [_of_calibration(source.xml, source, options)]
     left_out, result, lost = LeftOut(), [], 0
     for chunk in source.xml.iter("chunk") if source.xml is not None else ():
         whole = _placed(chunk.find("transform"), "the chunk")
@@ -87,9 +87,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     return [camera.noted(*lost_note) for camera in result]
 
 
-def _of_calibration(source: Source, options: Options) -> Camera:
+def _of_calibration(root: ElementTree.Element, source: Source, options: Options) -> Camera:
     """The camera of a calibration that was saved alone, as Tools › Camera Calibration does: at the origin, looking along z."""
-    root = source.xml
     name = source.path.stem if source.path else "camera"
     sensor = ElementTree.Element("sensor", {"label": name, "type": (root.findtext("projection") or "frame").strip()})
     sides = {side: (root.findtext(side) or "").strip() for side in ("width", "height")}
