@@ -589,6 +589,9 @@ def test_arrays_of_poses_are_a_camera_each(tmp_path):
         assert [camera.pinhole.eye for camera in read_cameras] == [(0, 0, 0), (1, 0, 0), (2, 0, 0)]
     with pytest.raises(InputError, match="give --pose"):
         cameras.read(tmp_path / "scene.npz", options=VGA)
+    text = json.dumps({"mtx": K_ALONE, "dist": [0] * 5, **{name: value.tolist() for name, value in vectors.items()}})
+    read_cameras = cameras.read(text, options=VGA)
+    assert [camera.pinhole.eye for camera in read_cameras] == [(0, 0, 0), (1, 0, 0), (2, 0, 0)]
 
 
 MAIN_JS = """// Copyright
@@ -678,7 +681,7 @@ Tc_3  = [ -1.549437e+02 ; -1.595167e+02 ; 7.575891e+02 ];
 def test_pictures_of_the_calibration_toolbox_for_matlab_are_where_opencv_projects_them():
     cv2 = pytest.importorskip("cv2")
     read_cameras = cameras.read(TOOLBOX.replace("\n", "\r\n"))
-    assert [camera.name for camera in read_cameras] == ["image 1", "image 3"]
+    assert [camera.name for camera in read_cameras] == ["image_1", "image_3"]
     k = np.array([[657.395353340077460, 0, 302.983766534402610], [0, 658.763142353886830, 242.616284123219370], [0, 0, 1]])
     bent = np.array([-0.255835686105780, 0.127572945483490, -0.000208182110586, 0.000033353463620, 0.0])
     turns = ([1.654766, 1.651927, -0.6699815], [1.849011, 1.900554, -0.3970866])
@@ -707,7 +710,72 @@ def test_matrices_that_are_made_before_they_are_filled_and_names_of_two_words_ar
     assert camera.pinhole.eye == (0, 0, -2)
 
 
+CALIBRATION = """<?xml version="1.0" encoding="UTF-8"?>
+<calibration>
+  <projection>frame</projection>
+  <width>1384</width>
+  <height>1032</height>
+  <f>1278.25</f>
+  <cx>-10.5</cx>
+  <cy>-12.25</cy>
+  <k1>-0.1776</k1>
+  <k2>0.1568</k2>
+  <p1>0.000397</p1>
+  <p2>-8.5e-05</p2>
+  <date>2020-07-15T09:43:30Z</date>
+</calibration>
+"""
+
+
+def test_a_calibration_of_metashape_alone_is_a_camera_at_the_origin():
+    (camera,) = cameras.read(CALIBRATION)
+    pinhole = camera.pinhole
+    assert (pinhole.width, pinhole.height, pinhole.distance, pinhole.eye) == (1384, 1032, (1278.25, 1278.25), (0, 0, 0))
+    assert pinhole.principal_point == (692 - 10.5, 516 + 12.25)
+    assert camera.lens == distortion.opencv({"k1": -0.1776, "k2": 0.1568, "p1": -8.5e-05, "p2": 0.000397})
+    (camera,) = cameras.read(CALIBRATION.replace("frame", "fisheye"))
+    assert camera.lens.projection == "equidistant"
+    with pytest.raises(InputError, match="'spherical'"):
+        cameras.read(CALIBRATION.replace("frame", "spherical"))
+
+
+def test_the_world_of_nerfstudio_alone_says_where_it_belongs():
+    with pytest.raises(InputError, match=r"has no cameras.* beside camera_path.json"):
+        cameras.read(json.dumps({"transform": np.eye(4)[:3].tolist(), "scale": 0.5}))
+
+
+def test_a_list_of_cameras_is_one_of_each_by_its_name():
+    listed = [
+        {"name": f"00_0{i}", "type": "hd", "resolution": [640, 480], "K": K_ALONE, "distCoef": [0.1, 0, 0, 0, 0],
+         "R": np.eye(3).tolist(), "t": [[i], [0], [2]]}
+        for i in range(2)
+    ]  # fmt: skip
+    read_cameras = cameras.read(json.dumps({"calibDataSource": "160906", "cameras": listed}))
+    assert [camera.name for camera in read_cameras] == ["00_00", "00_01"]
+    assert [camera.pinhole.eye for camera in read_cameras] == [(0, 0, -2), (-1, 0, -2)]
+    assert read_cameras[0].lens == distortion.opencv({"k1": 0.1})
+
+
+@pytest.mark.parametrize("sign", ["=", " "])
+def test_options_of_f3d_are_a_camera_of_vtk(sign):
+    words = {"position": "7,-6,4", "focal-point": "0,0,1", "view-up": "0,0,1", "view-angle": "40"}
+    pinhole = read("f3d " + " ".join(f"--camera-{name}{sign}{value}" for name, value in words.items()) + " a.glb").pinhole
+    assert (pinhole.eye, pinhole.look_at, pinhole.up) == ((7, -6, 4), (0, 0, 1), (0, 0, 1))
+    assert pinhole.distance[1] == pytest.approx(240 / math.tan(math.radians(20)))
+
+
 def test_json_with_a_comma_before_the_closing_bracket_in_the_next_line_is_read():
     text = cameras.write([Camera("a", CAMERAS["shifted"])], "transforms").rstrip().removesuffix("}") + ",\n}\n"
     (camera,) = cameras.read(text)
     assert camera.pinhole == CAMERAS["shifted"]
+
+
+def test_cameras_that_their_file_does_not_name_are_called_so_that_colmap_can_name_their_pictures(tmp_path):
+    storage(
+        tmp_path / "intrinsics.yml", M1=np.array(K_ALONE, float), M2=np.array(K_ALONE, float), R=np.eye(3), T=np.ones((3, 1))
+    )
+    bundler = "# Bundle file v0.3\n1 0\n500 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 5\n"
+    for source in (tmp_path / "intrinsics.yml", bundler, TOOLBOX):
+        read_cameras = cameras.read(source, options=dataclasses.replace(VGA, without_distortion=True))
+        cameras.save(read_cameras, tmp_path / "model", "colmap")
+        assert [camera.name for camera in cameras.read(tmp_path / "model")] == [camera.name for camera in read_cameras]

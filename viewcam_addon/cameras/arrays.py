@@ -52,7 +52,7 @@ _TEMPLATE = re.compile(r"\s*<[\w\s,:]{0,60}>")
 _ORDER = re.compile(r"byrow\s*=\s*(?:TRUE|T)\b")
 _SCALARS = ("fx", "fy", "cx", "cy")
 _DIAGONAL = re.compile(r"\(\s*[1-4]\s*\)")
-_TOOLBOX = re.compile(r"^\s*(fc|cc|kc|nx|ny|alpha_c|omc_\d+|Tc_\d+)\s*=\s*\[?([^\]\n]*)\]?", re.MULTILINE)
+_TOOLBOX = re.compile(r"^[ \t]*(fc|cc|kc|nx|ny|alpha_c|omc_\d+|Tc_\d+)[ \t]*=[ \t]*\[?([^\]\n]*)\]?", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def _of_toolbox(text: str) -> dict[str, dict[str, Any]]:
     shared |= {own_name: stated[name][0] for name, own_name in (("nx", "width"), ("ny", "height")) if name in stated}
     turns = {name.removeprefix("omc_"): turn for name, turn in stated.items() if name.startswith("omc_")}
     posed = {
-        f"image {number}": {**shared, "rvec": turn, "t": stated[f"Tc_{number}"]}
+        f"image_{number}": {**shared, "rvec": turn, "t": stated[f"Tc_{number}"]}
         for number, turn in turns.items()
         if f"Tc_{number}" in stated and not any(map(math.isnan, turn))
     }

@@ -35,7 +35,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     blocks = rows.reshape(-1, 5, 3)
     listed = source.file("list.txt")
     paths = [line.split()[0] for line in listed.text.split("\n") if line.split()] if listed else []
-    paths = paths if len(paths) == len(blocks) else [f"camera {index}" for index in range(len(blocks))]
+    paths = paths if len(paths) == len(blocks) else [f"camera_{index}" for index in range(len(blocks))]
     names = naming.distinct(paths)
     placed = [index for index, (f, _, _) in enumerate(blocks[:, 0].tolist()) if f]
     lenses = {index: _lens(blocks[index, 0].tolist(), source, paths[index], names[index], options) for index in placed}

@@ -124,7 +124,7 @@ def _first_view(source: Source, options: Options) -> Camera:
     text = texts.without(_COMMENT, source.text)
     vectors = dict(_USUAL_VIEW)
     for key, name in _VIEWS.items():
-        listed = [match[1] for match in re.finditer(rf"\b{name}\b[\"']?\s*[:=]\s*\[([^\]]*)\]", text)]
+        listed = [match[1] for match in re.finditer(rf"\b{name}\b[\"']?\s*[:=]\s*\[([^\[\]]{{0,200}})\]", text)]
         if len({*listed}) > 1 or (not listed and name in text):
             raise InputError(f"{source.name} says {name} {len(listed)} times as three numbers: give a text that says it once")
         if listed:

@@ -5,6 +5,7 @@
     camera.SetPosition(7,-6,4); camera.SetFocalPoint(0,0,1); camera.SetViewUp(0,0,1); camera.SetViewAngle(40)      VTK, ParaView
     p.computeViewMatrix([7,-6,4], [0,0,1], [0,0,1]); p.computeProjectionMatrixFOV(40, 16/9, .1, 100)            PyBullet
     look_at_view_transform(dist=9, elev=20, azim=130); FoVPerspectiveCameras(fov=40)                             PyTorch3D
+    f3d --camera-position=7,-6,4 --camera-focal-point=0,0,1 --camera-view-up=0,0,1 --camera-view-angle=40                f3d
     plotter.camera_position = [(7,-6,4), (0,0,1), (0,0,1)]                                                          PyVista
     point3 lookfrom(7,-6,4); point3 lookat(0,0,1); vec3 vup(0,0,1); auto vfov = 40;                 Ray Tracing in One Weekend
     pinhole->set_eye(7,-6,4); pinhole->set_lookat(0,0,1); pinhole->set_view_distance(960); vp.set_hres(640);    textbooks
@@ -49,6 +50,7 @@ SUFFIX = ".txt"
 SEVERAL = "a text"
 
 _COMMENT = r"//[^\n]*|/\*.*?(?:\*/|\Z)|#(?!\s*define)[^\n]*"
+_OPTION = re.compile(r"--camera-(position|focal-point|view-up|view-angle)[= ]([-+\d.eE,]+)")
 _WINDOW = re.compile(r"renderer|ren\w{0,3}win|renderwindow")
 _MOST_CHARACTERS = 2**23
 _LIBRARIES = {"np", "numpy", "jnp", "torch", "Mat"}
@@ -178,11 +180,16 @@ def _code(text: str) -> "_Code":
     return _Code(text)
 
 
+def _assigned(option: re.Match) -> str:
+    """An option of f3d's command as an assignment."""
+    return f"\ncamera_{option[1].replace('-', '_')} = ({option[2]});\n"
+
+
 class _Code:
     """The statements of a text."""
 
     def __init__(self, text: str) -> None:
-        self.text = texts.without(_COMMENT, text).replace("−", "-")
+        self.text = texts.without(_COMMENT, _OPTION.sub(_assigned, text)).replace("−", "-")
         self._has_viewports = bool(re.search(r"\bSetViewport\s*\(", self.text))
         self._words, self._places = tokens.words(self.text)
         self._words += [""] * 8  # so that what stands before and behind a word can be asked for

@@ -32,10 +32,14 @@ _LENS = ("k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
 
 def recognizes(source: Source) -> bool:
     head = source.text[:4000]
+    if "<calibration" in head and "<projection" in head and source.xml is not None and source.xml.tag == "calibration":
+        return True
     return "<document" in head and "<chunk" in source.text and source.xml is not None and source.xml.tag == "document"
 
 
 def read(source: Source, options: Options) -> list[Camera]:
+    if source.xml is not None and source.xml.tag == "calibration":
+        return [_of_calibration(source.xml, source, options)]
     left_out, result, lost = LeftOut(), [], 0
     for chunk in source.xml.iter("chunk") if source.xml is not None else ():
         whole = _placed(chunk.find("transform"), "the chunk")
@@ -81,6 +85,18 @@ def read(source: Source, options: Options) -> list[Camera]:
         raise InputError(f"none of the {lost} cameras of {source.name} is aligned: align them in Metashape first")
     lost_note = (f"{lost} cameras that are not aligned were left out",) if lost else ()
     return [camera.noted(*lost_note) for camera in result]
+
+
+def _of_calibration(root: ElementTree.Element, source: Source, options: Options) -> Camera:
+    """The camera of a calibration that was saved alone, as Tools › Camera Calibration does: at the origin, looking along z."""
+    name = source.path.stem if source.path else "camera"
+    sensor = ElementTree.Element("sensor", {"label": name, "type": (root.findtext("projection") or "frame").strip()})
+    sides = {side: (root.findtext(side) or "").strip() for side in ("width", "height")}
+    sensor.extend([ElementTree.Element("resolution", sides), root])
+    plane, lens, notes = _plane(sensor, options)
+    pinhole, more = axes.pinhole(axes.of_opencv(np.eye(4)), plane, f"camera {checks.quoted(name)}")
+    note = "The calibration has no pose: the camera stands at the origin and looks along z, y down"
+    return Camera(name, pinhole, True, (*notes, note, *more), lens=lens)
 
 
 def _transform(camera: ElementTree.Element) -> str | None:

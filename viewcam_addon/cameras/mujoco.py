@@ -46,7 +46,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     model = _Model(root, ElementTree.Element("compiler") if compiler is None else compiler, options)
     left_out, cameras = LeftOut(), []
     for number, (element, matrix) in enumerate(itertools.islice(model.cameras(), _MOST)):
-        name = element.get("name") or f"camera {number}"
+        name = element.get("name") or f"camera_{number}"
         with left_out.unless_pinhole(name):
             cameras.append(model.camera(name, element, matrix))
     return left_out.with_notes(cameras)

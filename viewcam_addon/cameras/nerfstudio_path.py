@@ -34,10 +34,21 @@ _OF_NERFSTUDIO = f"The path is in the world that nerfstudio trains in: with {WOR
 
 def recognizes(source: Source) -> bool:
     path = source.document.get("camera_path")
+    if _is_world(source):
+        return True
     return isinstance(path, list) and bool(path) and isinstance(path[0], dict) and "camera_to_world" in path[0]
 
 
+def _is_world(source: Source) -> bool:
+    return source.document.keys() == {"transform", "scale"}
+
+
 def read(source: Source, options: Options) -> list[Camera]:
+    if _is_world(source):
+        raise InputError(
+            f"{source.name} has no cameras: it says how nerfstudio's world came of the data's; put it beside camera_path.json, "
+            "and choose the original world there"
+        )
     top = Record(source.document, source.name)
     kind = top.get("camera_type")
     size = top.size("render_width"), top.size("render_height")

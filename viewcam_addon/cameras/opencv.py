@@ -19,6 +19,7 @@ lines; K that means the corner where it is exactly half the size: the middle of 
 Source: OpenCV's modules/core/src/persistence_yml.cpp and calib3d's projectPoints.
 """
 
+import contextlib
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,6 +44,7 @@ _SAYS_K = re.compile(r"(?:[km][12lr]?|matrix_?\w{0,5}|intrinsics?|mtx|fx)[\s_$\"
 _PARTS_OF_K = (("fx",), ("fy",), ("cx", "ppx", "u0", "px"), ("cy", "ppy", "v0", "py"))
 _OF_CAMERA = re.compile(r"^camera1?(?=(?:[fc][xy]|[kp]\d|width|height|type)$)")  # ORB-SLAM's
 _INNER = ("projectionparameters", "distortionparameters", "distortion", *_K)
+_LISTS = ("cameras", "Cameras", "views")  # of CMU Panoptic's calibrations, and of many programs' own
 _STEREO = (("1", "2"), ("left", "right"), ("l", "r"))
 _OF_ONE = ("m", *_K)
 _BESIDE = "extrinsics.yml", "extrinsics.yaml", "extrinsics.xml"
@@ -218,12 +220,29 @@ def _cameras_in(source: Source) -> Iterator[tuple[str, dict[str, Any]]]:
         yield from pair
         return
     if _is_camera(by_name) or "mirrorparameters" in by_name:  # of VINS' MEI, which is refused by its name
-        yield (source.path.stem if source.path else "camera"), by_name
+        yield from _of_pictures(source.path.stem if source.path else "camera", by_name)
         return
     shared = {name: value for name, value in by_name.items() if not isinstance(value, dict)}
     for name, value in document.items():
         if isinstance(value, dict) and _is_camera(inner := _with_k(_by_name(value))):
             yield str(name), {**shared, **inner}
+        for i, each in enumerate(value if isinstance(value, list) and name in _LISTS else ()):
+            if isinstance(each, dict) and _is_camera(inner := _with_k(_by_name(each))):
+                yield str(each.get("name") or f"camera_{i}"), inner
+
+
+def _of_pictures(name: str, values: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The camera, or one for each picture where there is an rvec and a tvec of each, as `calibrateCamera` finds them."""
+    turns, places = (_first(values, names) for names in (_RVEC, _T))
+    if isinstance(turns, list) and isinstance(places, list):
+        with contextlib.suppress(InputError):
+            numbers = [np.array(flat("a vector", value)) for value in (turns, places)]
+            if len(numbers[0]) == len(numbers[1]) > 3 and len(numbers[0]) % 3 == 0:
+                for i, (turn, place) in enumerate(zip(*(each.reshape(-1, 3).tolist() for each in numbers), strict=True)):
+                    rest = {key: value for key, value in values.items() if key not in (*_RVEC, *_T)}
+                    yield f"{i:05d}", {**rest, "rvec": turn, "t": place}
+                return
+    yield name, values
 
 
 def _with_k(values: dict[str, Any]) -> dict[str, Any]:
@@ -258,7 +277,7 @@ def _stereo(values: dict[str, Any], source: Source) -> list[tuple[str, dict[str,
             if between is not None:
                 sides[0] |= {"r": np.eye(3).tolist(), "t": [0.0, 0.0, 0.0]}
                 sides[1] |= between
-            stem = f"{source.path.stem} " if source.path else "camera "
+            stem = f"{source.path.stem}_" if source.path else "camera_"
             return [(stem + name, side) for name, side in zip(names, sides, strict=True)]
     return []
 
@@ -297,7 +316,7 @@ def _document(source: Source) -> Mapping[str, Any]:
     if (k := _k_alone(source)) is not None:
         return {"k": k}
     if isinstance(source.json, list):
-        return {f"camera {i}": value for i, value in enumerate(source.json)}
+        return {f"camera_{i}": value for i, value in enumerate(source.json)}
     return _storage(source) if source.text.lstrip()[:1] == "<" or _SAYS_K.search(source.text) else {}
 
 
