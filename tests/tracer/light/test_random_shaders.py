@@ -120,6 +120,8 @@ def test_any_shaders_have_in_vectors_the_bits_that_they_have_path_by_path(random
         one_by_one = {
             name: Material(node("add", first=material.surface, second=black)) for name, material in scene.materials.items()
         }
-        in_vectors, in_turn = (render(replace(scene, materials=made), "path", 8) for made in (scene.materials, one_by_one))
+        in_vectors, in_turn = (
+            render(replace(scene, materials=materials), "path", 8) for materials in (scene.materials, one_by_one)
+        )
         for name, values in in_vectors.items():
             assert np.array_equal(values, in_turn[name], equal_nan=True), f"seed {each}, {name}"
