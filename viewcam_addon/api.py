@@ -77,8 +77,11 @@ def render(
             samples = round(float(passes["Sample Count"].mean(dtype=float)))
             attributes["error"] = str(error)
         attributes |= {"samples": str(samples), "seed": str(seed)}
-        if any(closure.node.is_tabulated for material in scene.materials.values() for closure in material.closures):
+        shaders = [closure.node for material in scene.materials.values() for closure in material.closures]
+        if any(shader.is_tabulated for shader in shaders):
             attributes["albedo tables"] = "yes"
+        if any(shader.is_shining for shader in shaders):
+            attributes["shining surfaces"] = "yes"
     return Image(passes, scene.camera, attributes)
 
 

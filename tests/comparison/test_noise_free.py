@@ -173,3 +173,15 @@ def test_albedos_from_tables_differ_by_a_ten_thousandth_and_by_no_more(paper_sce
         reference = replace(reference, attributes={**reference.attributes, "albedo tables": "yes"})
     test = replace(test, passes={**test.passes, "Diffuse Color": test["Diffuse Color"] * np.float32(factor)})
     assert compare(reference, [test], paper_scene.pinhole).passed == passed
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "passed"),
+    [("Diffuse Direct", 0.9995, True), ("Diffuse Direct", 0.997, False), ("Diffuse Color", 0.9995, False)],
+)
+def test_surfaces_that_shine_may_lose_a_thousandth_of_their_light_and_no_color(paper_scene, name, factor, passed):
+    reference, test = picture(paper_scene), rendered(paper_scene)
+    test = replace(test, passes={**test.passes, name: test[name] * np.float32(factor)})
+    assert not compare(reference, [test], paper_scene.pinhole).passed, "without such a surface"
+    reference = replace(reference, attributes={**reference.attributes, "shining surfaces": "yes"})
+    assert compare(reference, [test], paper_scene.pinhole).passed == passed

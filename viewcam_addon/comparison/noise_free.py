@@ -37,6 +37,7 @@ _BEYOND_COUNTING = 1e6
 _SHORT_NORMALS = (5, 2)
 _SHADED = ("Combined", "Diffuse Direct")
 _NOT_SCATTERED = ("Alpha", "Emission", "Environment")
+_UNLIT = (*_NOT_SCATTERED, "Diffuse Color", "Glossy Color", "Transmission Color")
 # Errors are told relative to the value, or to this share of the mean where the value is less.
 _DARK = 1e-3
 
@@ -101,6 +102,7 @@ class Rounding:
         # Diffuse Direct anywhere, in the surface's color.
         self._brightest: Array | float = 0.0
         self._tables = tolerances.ALBEDO_TABLES if "albedo tables" in reference.attributes else 0.0
+        self._triangles = tolerances.SHINING_TRIANGLES if "shining surfaces" in reference.attributes else 0.0
         self._storage = tolerances.NORMAL_STORAGE if _blender_of(test) >= _SHORT_NORMALS else 0.0
         if "Diffuse Direct" in reference.passes and "Diffuse Color" in reference.passes:
             lit = float(np.nan_to_num(reference["Diffuse Direct"]).max())
@@ -117,12 +119,14 @@ class Rounding:
         return Allowance(self._shift * slope, error, floor, self._shift)
 
     def _floor(self, name: str, value: Array) -> Array:
-        """The amount that albedos from tables may add, and the storage of smooth normals: the light from straight above times
-        the cosine's change."""
-        tables = np.zeros(value.shape) if name in _NOT_SCATTERED else self._tables * value
+        """The amount that albedos from tables and triangles that shine may add, and the storage of smooth normals: the light
+        from straight above times the cosine's change."""
+        share = 0.0 if name in _NOT_SCATTERED else self._tables
+        if name not in _UNLIT:
+            share += self._triangles
         if not self._storage or name not in _SHADED:
-            return tables
-        return tables + self._storage * np.sqrt(np.maximum(self._brightest**2 - value**2, 0.0))
+            return share * value
+        return share * value + self._storage * np.sqrt(np.maximum(self._brightest**2 - value**2, 0.0))
 
 
 def compare(sides: Sides, allowed: Allowance, belongs: NDArray) -> tuple[PassErrors, Edges, Array]:
