@@ -179,10 +179,14 @@ def test_escape_during_playback_ends_the_playback_and_not_the_comparison(monkeyp
         (
             {
                 "answer": "same_but",
-                "not_modeled": {"names": ["Hair"]},
+                "not_modeled": {"names": ["Hair"], "share": 0.125},
                 "quantities": [{"noise_free": None, "ratio_error": 3e-4}],
             },
-            "The same light, but for noise of 0.03 %, but for 1 object that is not modeled",
+            "The same light, but for noise of 0.03 %, but for 1 object that is not modeled (12 % of the picture)",
+        ),
+        (
+            {"answer": "same_but", "not_modeled": {"names": ["Fog"], "share": None}},
+            "Identical, but for 1 object that is not modeled",
         ),
         ({"answer": "different"}, "Cycles renders another picture"),
     ],

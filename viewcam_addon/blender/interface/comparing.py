@@ -23,7 +23,7 @@ from typing import Any
 import bpy
 
 from ... import child_process
-from ...comparison.answer import DIFFERENT, SAME_BUT, but_for
+from ...comparison.answer import DIFFERENT, SAME_BUT, but_for, percent_of
 from ...comparison.statistics import plain
 from ...errors import InputError
 from ...files import written_whole
@@ -274,7 +274,11 @@ def headline(result: dict[str, Any]) -> str:
     if result["answer"] == DIFFERENT:
         return "Cycles renders another picture"
     words = _agreement(result)
-    return f"{words}, {but_for(result['not_modeled'])}" if result["answer"] == SAME_BUT else words
+    if result["answer"] != SAME_BUT:
+        return words
+    share = result["not_modeled"]["share"]
+    measured = "" if share is None else f" ({percent_of(share)} of the picture)"
+    return f"{words}, {but_for(result['not_modeled'])}{measured}"
 
 
 def _agreement(result: dict[str, Any]) -> str:
