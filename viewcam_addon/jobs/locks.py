@@ -104,8 +104,7 @@ class Claims:
 
     def _be_the_only_one(self, folder: Path) -> None:
         try:
-            if sys.platform == "win32":
-                msvcrt.locking(self._file, msvcrt.LK_NBLCK, 1)
+            msvcrt.locking(self._file, msvcrt.LK_NBLCK, 1)  # type: ignore[name-defined, unused-ignore] # there on Windows alone
         except OSError as error:
             os.close(self._file)
             raise InputError(f"another batch works in {folder}: wait for it, or give another --out") from error
