@@ -764,6 +764,31 @@ def test_options_of_f3d_are_a_camera_of_vtk(sign):
     assert pinhole.distance[1] == pytest.approx(240 / math.tan(math.radians(20)))
 
 
+def test_options_of_openscad_are_its_eye_and_center():
+    pinhole = read("openscad --camera=7,-6,4,0,0,1 --imgsize=640,360 a.scad -o a.png").pinhole
+    assert (pinhole.eye, pinhole.look_at, pinhole.width, pinhole.height) == ((7, -6, 4), (0, 0, 1), 640, 360)
+    assert pinhole.distance[1] == pytest.approx(180 / math.tan(math.radians(11.25)))
+
+
+@pytest.mark.parametrize(
+    ("angles", "eye", "up"),
+    [
+        ("0,0,0", (1, 2, 143), (0, 1, 0)),  # from above
+        ("90,0,0", (1, -138, 3), (0, 0, 1)),  # from the front
+        ("90,0,90", (141, 2, 3), (0, 0, 1)),  # from the right
+    ],
+)
+def test_options_of_openscad_are_its_views(angles, eye, up):
+    pinhole = read(f"openscad --camera 1,2,3,{angles},140 --imgsize=640,360 a.scad").pinhole
+    assert pinhole.look_at == (1, 2, 3)
+    np.testing.assert_allclose((pinhole.eye, pinhole.up), (eye, up), atol=1e-13)
+
+
+def test_options_of_openscad_without_perspective_are_no_pinhole():
+    with pytest.raises(InputError, match="in parallel projection"):
+        read("openscad --camera=7,-6,4,0,0,1 --projection=o a.scad")
+
+
 def test_json_with_a_comma_before_the_closing_bracket_in_the_next_line_is_read():
     text = cameras.write([Camera("a", CAMERAS["shifted"])], "transforms").rstrip().removesuffix("}") + ",\n}\n"
     (camera,) = cameras.read(text)

@@ -6,6 +6,7 @@
     p.computeViewMatrix([7,-6,4], [0,0,1], [0,0,1]); p.computeProjectionMatrixFOV(40, 16/9, .1, 100)            PyBullet
     look_at_view_transform(dist=9, elev=20, azim=130); FoVPerspectiveCameras(fov=40)                             PyTorch3D
     f3d --camera-position=7,-6,4 --camera-focal-point=0,0,1 --camera-view-up=0,0,1 --camera-view-angle=40                f3d
+    openscad --camera=7,-6,4,0,0,1 --imgsize=640,480                                                                OpenSCAD
     plotter.camera_position = [(7,-6,4), (0,0,1), (0,0,1)]                                                          PyVista
     point3 lookfrom(7,-6,4); point3 lookat(0,0,1); vec3 vup(0,0,1); auto vfov = 40;                 Ray Tracing in One Weekend
     pinhole->set_eye(7,-6,4); pinhole->set_lookat(0,0,1); pinhole->set_view_distance(960); vp.set_hres(640);    textbooks
@@ -38,6 +39,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .. import rotation
 from ..errors import InputError
 from ..intrinsics import ViewPlane
 from . import axes, own, texts, tokens
@@ -50,7 +52,9 @@ SUFFIX = ".txt"
 SEVERAL = "a text"
 
 _COMMENT = r"//[^\n]*|/\*.*?(?:\*/|\Z)|#(?!\s*define)[^\n]*"
-_OPTION = re.compile(r"--camera-(position|focal-point|view-up|view-angle)[= ]([-+\d.eE,]+)")
+_OPTION = re.compile(
+    r"--(camera(?:-position|-focal-point|-view-up|-view-angle)?|imgsize|projection)[= ]([-+\d.eE,]+|o\w*)(?!\S)"
+)
 _WINDOW = re.compile(r"renderer|ren\w{0,3}win|renderwindow")
 _MOST_CHARACTERS = 2**23
 _LIBRARIES = {"np", "numpy", "jnp", "torch", "Mat"}
@@ -181,8 +185,33 @@ def _code(text: str) -> "_Code":
 
 
 def _assigned(option: re.Match) -> str:
-    """An option of f3d's command as an assignment."""
-    return f"\ncamera_{option[1].replace('-', '_')} = ({option[2]});\n"
+    """An option of f3d's or OpenSCAD's command as assignments; itself where it is another program's."""
+    name, value = option.groups()
+    if name == "projection":
+        return "\nparallel_projection = 1;\n"
+    if name in ("camera", "imgsize"):
+        try:
+            values = [*map(float, value.split(","))]
+        except ValueError:
+            return option[0]
+        if name == "imgsize" and len(values) == 2:
+            return "\nimage_width = {:g};\nimage_height = {:g};\n".format(*values)
+        return _of_openscad(values) if name == "camera" and len(values) in (6, 7) else option[0]
+    return f"\n{name.replace('-', '_')} = ({value});\n"
+
+
+def _of_openscad(values: Sequence[float]) -> str:
+    """The camera of OpenSCAD's command as assignments: its eye and center; or its center, angles in degrees and distance.
+
+    Its z is up, it turns about x, y and z in turn from a view from above, and it sees 22.5° upwards, its $vpf where nobody
+    sets that (GLView.cc, Camera.cc).
+    """
+    eye, target, up = values[:3], values[3:6], (0.0, 0.0, 1.0)
+    if len(values) == 7:
+        turn = rotation.from_euler([math.radians(angle) for angle in target], "XYZ")
+        target, eye, up = eye, (eye + values[6] * turn[:, 2]).tolist(), turn[:, 1].tolist()
+    vectors = zip(("lookfrom", "lookat", "vup"), (eye, target, up), strict=True)
+    return "".join(f"\n{name} = ({', '.join(map(repr, vector))});" for name, vector in vectors) + "\nvfov = 22.5;\n"
 
 
 class _Code:
