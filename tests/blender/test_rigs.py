@@ -7,6 +7,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+import addon_utils
+
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import datablocks, findings, pose, versions
 from viewcam_addon.blender.interface import panel
@@ -297,3 +299,29 @@ def test_an_eye_on_a_keyed_location_and_a_look_at_target_go_together(rigged, sce
         assert math.dist((column, row), (960, 540)) < 2e-3, f"frame {frame}"
         assert differences(camera_object, scene) == {}, f"frame {frame}"
     assert panel.notices(camera_object, scene) == [] and datablocks.animated_values(camera_object) == {"look_at"}
+
+
+def test_an_animated_camera_that_came_by_fbx_is_followed(camera_object, scene, empty, tmp_path):
+    """1e-5 : what FBX's angles and units leave in matrices of float32, calibrated."""
+    frames, path = (1, 60, 120), str(tmp_path / "camera.fbx")
+    keyed(camera_object, scene, empty)
+    scene.frame_end = frames[-1]
+    for each in scene.objects:
+        each.select_set(each == camera_object)
+
+    def matrices(of):
+        return np.array([(scene.frame_set(frame), np.array(of.matrix_world))[1] for frame in frames])
+
+    before = matrices(camera_object)
+    addon_utils.enable("io_scene_fbx")
+    bpy.ops.export_scene.fbx(filepath=path, use_selection=True, bake_anim_simplify_factor=0, object_types={"CAMERA"})
+    bpy.data.objects.remove(camera_object)
+    bpy.ops.import_scene.fbx(filepath=path)
+    (imported,) = (each for each in scene.objects if each.type == "CAMERA")
+    np.testing.assert_allclose(matrices(imported), before, atol=1e-5)
+    scene.camera, imported.virtual_pinhole.enabled = imported, True
+    for frame in frames:
+        scene.frame_set(frame)
+        stated = cameras.stated(imported, scene)
+        assert stated.eye == pytest.approx(tuple(imported.matrix_world.translation), abs=1e-6)
+        assert not any(finding.words for finding in cameras.check(imported, stated, scene))

@@ -651,6 +651,13 @@ def test_an_intrinsic_of_open3d_alone_has_its_columns_first():
     assert camera.pinhole.eye == (0, 0, 0) and camera.pinhole.basis()[1] == pytest.approx((0, -1, 0))
 
 
+@pytest.mark.parametrize("data", [b"Kaydara FBX Binary  \0\x1a\0", b"; FBX 7.4.0 project file\n", b"Ogawa\xff\0\1"])
+def test_what_blenders_own_importers_read_is_sent_there(tmp_path, data):
+    (tmp_path / "camera").write_bytes(data)
+    with pytest.raises(InputError, match="camera is read by Blender itself: import it there"):
+        cameras.read(tmp_path / "camera")
+
+
 def test_a_pointer_of_git_lfs_says_how_to_get_the_file():
     with pytest.raises(InputError, match="git lfs pull"):
         cameras.read("version https://git-lfs.github.com/spec/v1\noid sha256:997004fb\nsize 772721\n")

@@ -293,6 +293,10 @@ def _told_of_damage(source: Source, title: str) -> Iterator[None]:
         raise InputError(f"{source.name} is damaged where it says its cameras ({title}): export it again") from error
 
 
+_READ_BY_BLENDER = (b"Kaydara FBX Binary", b"; FBX ", b"Ogawa")
+"""The first bytes of FBX files and of Alembic's, whose cameras Blender's own importers read right, keyframes included."""
+
+
 def recognized(source: str | Path | Source) -> str:
     """The name of the format.
 
@@ -310,6 +314,8 @@ def recognized(source: str | Path | Source) -> str:
                 return name
     if source.data.startswith(b"version https://git-lfs"):
         raise InputError(f"{source.name} is Git LFS's pointer to the file, and not the file: get it by git lfs pull")
+    if source.data.startswith(_READ_BY_BLENDER):
+        raise InputError(f"{source.name} is read by Blender itself: import it there, save, and give the .blend")
     if source.json_problem:
         raise InputError(f"{source.name} looks like JSON and is none ({source.json_problem}): correct it")
     if source.path is None:
