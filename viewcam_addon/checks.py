@@ -99,7 +99,7 @@ def array(name: str, values: ArrayLike) -> NDArray[np.float64]:
             with warnings.catch_warnings():  # a masked element in a list becomes nan, with a warning
                 warnings.simplefilter("ignore")
                 values = np.asarray(values)
-        if np.ma.is_masked(values):  # type: ignore[no-untyped-call]
+        if np.ma.is_masked(values):  # type: ignore[no-untyped-call] # NumPy has no type for it
             raise TypeError
         if values.dtype == object:
             values = np.array([_real(value) for value in values.flat], dtype=np.float64).reshape(values.shape)
@@ -149,4 +149,4 @@ def _real(value: object) -> float:
     try:
         return float(value)
     except OverflowError:
-        return math.inf if value > 0 else -math.inf  # type: ignore[operator]
+        return math.inf if value > 0 else -math.inf  # type: ignore[operator] # a whole number beyond float64

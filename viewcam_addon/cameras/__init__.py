@@ -294,7 +294,7 @@ def _told_of_damage(source: Source, title: str) -> Iterator[None]:
 
 
 _READ_BY_BLENDER = (b"Kaydara FBX Binary", b"; FBX ", b"Ogawa")
-"""The first bytes of FBX files and of Alembic's, whose cameras Blender's own importers read right, keyframes included."""
+"""The first bytes of FBX files and of Alembic's, whose cameras Blender's own importers read."""
 
 
 def recognized(source: str | Path | Source) -> str:

@@ -53,7 +53,7 @@ SEVERAL = "a text"
 
 _COMMENT = r"//[^\n]*|/\*.*?(?:\*/|\Z)|#(?!\s*define)[^\n]*"
 _OPTION = re.compile(
-    r"--(camera(?:-position|-focal-point|-view-up|-view-angle)?|imgsize|projection)[= ]([-+\d.eE,]+|o\w*)(?!\S)"
+    r"--(camera(?:-position|-focal-point|-view-up|-view-angle)?|imgsize|projection)[= ]([-+\d.eE,]+|o|ortho)(?!\S)"
 )
 _WINDOW = re.compile(r"renderer|ren\w{0,3}win|renderwindow")
 _MOST_CHARACTERS = 2**23

@@ -255,7 +255,7 @@ class _Links:
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Links) and vars(self) == vars(other)
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None  # type: ignore[assignment] # equal by value, and changed later
 
     def receiving(self, name: str) -> int:
         """`Object::lit_by` of an object."""

@@ -181,7 +181,7 @@ class Arrays:
             together = size + sum(array.nbytes for array in self._taken.values())
             machine.check(f"the arrays of {self._file}", _COPIES * together, "make the scene smaller")
             with self._archive.open(member) as file:
-                return np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
+                return np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call] # no type in NumPy
         except (
             OSError,
             ValueError,
