@@ -301,9 +301,10 @@ def test_an_eye_on_a_keyed_location_and_a_look_at_target_go_together(rigged, sce
     assert panel.notices(camera_object, scene) == [] and datablocks.animated_values(camera_object) == {"look_at"}
 
 
-def test_an_animated_camera_that_came_by_fbx_is_followed(camera_object, scene, empty, tmp_path):
+@pytest.mark.parametrize("program", ["alembic", "fbx"])
+def test_an_animated_camera_that_blender_imports_is_followed(camera_object, scene, empty, tmp_path, program):
     """1e-5 : what FBX's angles and units leave in matrices of float32, calibrated."""
-    frames, path = (1, 60, 120), str(tmp_path / "camera.fbx")
+    frames, path = (1, 60, 120), str(tmp_path / {"alembic": "camera.abc", "fbx": "camera.fbx"}[program])
     keyed(camera_object, scene, empty)
     scene.frame_end = frames[-1]
     for each in scene.objects:
@@ -314,9 +315,15 @@ def test_an_animated_camera_that_came_by_fbx_is_followed(camera_object, scene, e
 
     before = matrices(camera_object)
     addon_utils.enable("io_scene_fbx")
-    bpy.ops.export_scene.fbx(filepath=path, use_selection=True, bake_anim_simplify_factor=0, object_types={"CAMERA"})
+    if program == "alembic":
+        bpy.ops.wm.alembic_export(filepath=path, selected=True, start=1, end=frames[-1])
+    else:
+        bpy.ops.export_scene.fbx(filepath=path, use_selection=True, bake_anim_simplify_factor=0, object_types={"CAMERA"})
     bpy.data.objects.remove(camera_object)
-    bpy.ops.import_scene.fbx(filepath=path)
+    if program == "alembic":
+        bpy.ops.wm.alembic_import(filepath=path, as_background_job=False)
+    else:
+        bpy.ops.import_scene.fbx(filepath=path)
     (imported,) = (each for each in scene.objects if each.type == "CAMERA")
     np.testing.assert_allclose(matrices(imported), before, atol=1e-5)
     scene.camera, imported.virtual_pinhole.enabled = imported, True
