@@ -104,12 +104,16 @@ class TileSampler {
     }
 
     // Takes samples begin … end of some pixels, in groups that fill a block with some samples of each: the closer together the rays of a
-    // block lie, the fewer boxes and triangles it meets. With up to 16 of a pixel, and not 4, 378,000 triangles under a sun take 0.9 of the time.
+    // block lie, the fewer boxes and triangles it meets. 378,000 triangles under a sun take 0.9 of the time with 16 of each of four pixels,
+    // and not 4 of 16, and 0.98 of that with 64 of one. Where so many would leave blocks half empty, fewer do: 20 of three pixels for 40 each.
     void sample(Tile& tile, const std::vector<uint16_t>& places, uint32_t begin, uint32_t end, uint32_t batch,
                 const volatile int* stop) const {
-        constexpr uint32_t MOST_AT_A_TIME = 16;
-        uint32_t rounds = (end - begin + MOST_AT_A_TIME - 1) / MOST_AT_A_TIME, at_a_time = (end - begin + rounds - 1) / rounds;
-        size_t size = PathIntegrator::MOST / at_a_time;
+        constexpr size_t MOST = PathIntegrator::MOST, CLOSE_ENOUGH = 16;
+        size_t count = end - begin, rounds = (count + MOST - 1) / MOST, at_a_time, size;
+        for (;; rounds++) {
+            at_a_time = (count + rounds - 1) / rounds, size = MOST / at_a_time;
+            if (at_a_time <= CLOSE_ENOUGH || 8 * count * size >= 7 * rounds * MOST) break;
+        }
         for (size_t i = 0; i < places.size(); i += size)
             sample_group(tile, &places[i], uint32_t(std::min(size, places.size() - i)), begin, end, batch, stop);
     }
