@@ -23,11 +23,17 @@ PNG = bytes.fromhex(
 ATTEMPTS = 2
 
 
-def test_handles_drag_eye_look_at_and_up_and_the_diagram_is_drawn_where_it_belongs(real_blender):
-    for _ in range(ATTEMPTS):
-        outcome = real_blender.run_in_a_window(HANDLES_SCRIPT, size=(1000, 700))
+def last_of(attempts):
+    """The first outcome that is well, or the last. What the others said is printed, so that it is seen which step failed."""
+    for outcome in attempts:
         if outcome.returncode == 0:
             break
+        print(outcome.stdout + outcome.stderr)
+    return outcome
+
+
+def test_handles_drag_eye_look_at_and_up_and_the_diagram_is_drawn_where_it_belongs(real_blender):
+    outcome = last_of(real_blender.run_in_a_window(HANDLES_SCRIPT, size=(1000, 700)) for _ in range(ATTEMPTS))
     output = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0 and "done: disable_and_enable" in output, output
     assert "Traceback" not in output, output  # what fails in a drawing or a handle is only printed
@@ -36,12 +42,11 @@ def test_handles_drag_eye_look_at_and_up_and_the_diagram_is_drawn_where_it_belon
 def test_what_an_artist_tries_on_the_first_day_goes_as_with_blenders_own_cameras(real_blender, tmp_path):
     """VIEWCAM_PICTURES : a folder for pictures of the window; without it none are taken."""
     folder = [each for each in [os.environ.get("VIEWCAM_PICTURES")] if each]
-    for attempt in range(ATTEMPTS):
-        (tmp_path / str(attempt)).mkdir()
-        script = Path(__file__).with_name("artist_in_a_window.py")
-        outcome = real_blender.run_in_a_window(script, tmp_path / str(attempt), *folder, scale=1 if folder else 0.5)
-        if outcome.returncode == 0:
-            break
+    script = Path(__file__).with_name("artist_in_a_window.py")
+    folders = [tmp_path / str(attempt) for attempt in range(ATTEMPTS)]
+    for each in folders:
+        each.mkdir()
+    outcome = last_of(real_blender.run_in_a_window(script, each, *folder, scale=1 if folder else 0.5) for each in folders)
     output = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0 and "done: the day" in output, output
     assert "Traceback" not in output, output
@@ -61,10 +66,7 @@ def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_
     (tmp_path / "cameras_of_colmap.json").write_text(json.dumps(eyes))
     folder = [each for each in [os.environ.get("VIEWCAM_PICTURES")] if each]
     script = Path(__file__).with_name("cameras_in_a_window.py")
-    for _ in range(ATTEMPTS):
-        outcome = real_blender.run_in_a_window(script, tmp_path, *folder)
-        if outcome.returncode == 0:
-            break
+    outcome = last_of(real_blender.run_in_a_window(script, tmp_path, *folder) for _ in range(ATTEMPTS))
     output = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0 and "done: paste_pbrt" in output, output
     assert "Traceback" not in output, output
@@ -80,10 +82,7 @@ def test_rounds_of_enabling_and_disabling_leave_nothing_behind_in_a_window(real_
 def test_compare_with_cycles_comes_to_a_verdict_and_ends_in_every_other_way_without_a_trace(real_blender, tmp_path):
     """With the extension as it is installed, wheels and all; the last one is on its way when Blender is quit."""
     real_blender.run_inside("make", tmp_path / "scene.blend")
-    for _ in range(ATTEMPTS):
-        outcome = real_blender.run_in_a_window(PROOF_SCRIPT, tmp_path / "scene.blend", tmp_path)
-        if outcome.returncode == 0:
-            break
+    outcome = last_of(real_blender.run_in_a_window(PROOF_SCRIPT, tmp_path / "scene.blend", tmp_path) for _ in range(ATTEMPTS))
     output = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0 and "done: write_the_labels" in output and "done: quit_while_it_runs" in output, output
     assert "Traceback" not in output, output
