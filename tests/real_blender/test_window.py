@@ -29,21 +29,21 @@ ATTEMPTS = 2
 TALL = (1600, 2000)
 
 
-def go_through(real_blender, name, *arguments, said="", attempts=ATTEMPTS, **options):
-    """Run the script NAME_in_a_window.py, which ends well, and has printed `said` by then."""
+def go_through(real_blender, name, *arguments, expected="", attempts=ATTEMPTS, **options):
+    """Run the script NAME_in_a_window.py, which ends well, and has printed `expected` by then."""
     for attempt in range(attempts):
         words = [each(attempt) if callable(each) else each for each in arguments]
         outcome = real_blender.run_in_a_window(Path(__file__).with_name(f"{name}_in_a_window.py"), *words, **options)
         if outcome.returncode == 0:
             break
     output = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and said in output, output
+    assert outcome.returncode == 0 and expected in output, output
     assert "Traceback" not in output, output  # what fails in a panel, a drawing or a handle is only printed
     return output
 
 
 def test_handles_drag_eye_look_at_and_up_and_the_diagram_is_drawn_where_it_belongs(real_blender):
-    go_through(real_blender, "handles", said="done: disable_and_enable", size=(1000, 700))
+    go_through(real_blender, "handles", expected="done: disable_and_enable", size=(1000, 700))
 
 
 def test_what_an_artist_tries_on_the_first_day_goes_as_with_blenders_own_cameras(real_blender, tmp_path):
@@ -51,7 +51,7 @@ def test_what_an_artist_tries_on_the_first_day_goes_as_with_blenders_own_cameras
         (path := tmp_path / str(attempt)).mkdir()
         return path
 
-    go_through(real_blender, "artist", folder, *PICTURES, said="done: the day", scale=1 if PICTURES else 0.5)
+    go_through(real_blender, "artist", folder, *PICTURES, expected="done: the day", scale=1 if PICTURES else 0.5)
 
 
 def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_a_paste(real_blender, tmp_path):
@@ -65,17 +65,17 @@ def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_
     for camera in around:  # what is not found would be told in a popup, which takes the keys
         (tmp_path / "sparse" / camera.image).write_bytes(PNG)
     (tmp_path / "cameras_of_colmap.json").write_text(json.dumps(eyes))
-    go_through(real_blender, "cameras", tmp_path, *PICTURES, said="done: paste_pbrt")
+    go_through(real_blender, "cameras", tmp_path, *PICTURES, expected="done: paste_pbrt")
 
 
 def test_rounds_of_enabling_and_disabling_leave_nothing_behind_in_a_window(real_blender):
-    go_through(real_blender, "leftovers", said="done: leave_nothing_behind", attempts=1, size=(1000, 700))
+    go_through(real_blender, "leftovers", expected="done: leave_nothing_behind", attempts=1, size=(1000, 700))
 
 
 def test_compare_with_cycles_comes_to_a_verdict_and_ends_in_every_other_way_without_a_trace(real_blender, tmp_path):
     """With the extension as it is installed, wheels and all; the last one is on its way when Blender is quit."""
     real_blender.run_inside("make", tmp_path / "scene.blend")
-    output = go_through(real_blender, "proof", tmp_path / "scene.blend", tmp_path, said="done: quit_while_it_runs")
+    output = go_through(real_blender, "proof", tmp_path / "scene.blend", tmp_path, expected="done: quit_while_it_runs")
     assert "done: write_the_labels" in output, output
     folder = (tmp_path / "last.txt").read_text()
     assert not Path(folder).exists()
