@@ -192,7 +192,8 @@ def of_windows(path: Path) -> str:
 def windows(blender: str, bare: bool = False) -> tuple[list[str], dict[str, str]]:
     """The command of Python for Windows and its environment variables.
 
-    blender : a version of BLENDERS. bare : with what that Blender's own Python has alone: neither this checkout nor tests.
+    blender : a version of BLENDERS.
+    bare : with what that Blender's own Python has alone: neither this checkout nor tests.
     """
     folders = [packages("windows-x64", f"blender-{blender}", *BLENDERS[blender], *WINDOWS_ALONE)]
     if not bare:

@@ -73,7 +73,8 @@ def module(name: str, *arguments: str | Path) -> list[str]:
 def environment(apart_from: str = "", **more: str) -> dict[str, str]:
     """The environment in which that process has the same modules in reach as this one.
 
-    apart_from : a folder whose modules it shall not have. more : further variables.
+    apart_from : a folder whose modules it shall not have.
+    more : further variables.
     """
     others = [path for path in sys.path if path and not (apart_from and Path(path).is_relative_to(apart_from))]
     return os.environ | {"PYTHONPATH": os.pathsep.join([str(_PACKAGE.parent), *others])} | more
@@ -183,8 +184,10 @@ class AnswerTimeout(InputError):
 class ServerProcess:
     """The process, as the one who asks has it: it ends with `close`, or with whoever started it.
 
-    name : what sentences call it. command : its handle is added as the last word, for `answer`. log : a file for what it
-    prints, nowhere by default. events : whoever is told what it tells on the way, nobody by default.
+    name : what sentences call it.
+    command : its handle is added as the last word, for `answer`.
+    log : a file for what it prints, nowhere by default.
+    events : whoever is told what it tells on the way, nobody by default.
 
     Raises
     ------
@@ -280,7 +283,9 @@ class ServerProcess:
 class ServerOnDemand:
     """A server process that is started with the first question, and again if it was lost.
 
-    name : what sentences call it. module : of this package, which serves when it is run. events : as of ServerProcess.
+    name : what sentences call it.
+    module : of this package, which serves when it is run.
+    events : as of ServerProcess.
     """
 
     def __init__(self, name: str, module: str, events: Events | None = None) -> None:
@@ -317,8 +322,9 @@ Tell = Callable[..., None]
 def serve(handle: str, answers: Callable[[dict[str, Any], Tell], Any], idle: float | None = None) -> None:
     """Answer what is asked, until nobody is left to ask.
 
-    handle : the last word of this process's command. answers : gives the answer to a request, which JSON can hold, and may tell
-    events meanwhile. idle : return as well when nothing was asked for so many seconds.
+    handle : the last word of this process's command.
+    answers : gives the answer to a request, which JSON can hold, and may tell events meanwhile.
+    idle : return as well when nothing was asked for so many seconds.
 
     A thread of its own listens, so that this process ends within a second of its asker also in the midst of an answer.
     """

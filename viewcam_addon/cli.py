@@ -31,7 +31,8 @@ _FOLDERS = ("yolo", "bop", "colmap", "kitti", "middlebury")
 def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False, ended_by: int | None = None) -> int:
     """Run one sub-command and return its exit status.
 
-    arguments : those of the shell by default. blend_is_open : inside Blender, where FILE.blend is the file that is open.
+    arguments : those of the shell by default.
+    blend_is_open : inside Blender, where FILE.blend is the file that is open.
     ended_by : the signal that has ended the process that ran it (crashes.py): then it is only told.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)

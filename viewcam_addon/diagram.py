@@ -31,7 +31,8 @@ class Diagram:
     grid : (n, 2, 3), n ≤ 30, lines between pixels, those across columns first.
     pyramid : (4, 2, 3), from the eye to the corners.
     view : (2, 3), from the eye to the look-at point.
-    axes : (3, 3), the tips of u, v and w. up : (3,), the tip of up.
+    axes : (3, 3), the tips of u, v and w.
+    up : (3,), the tip of up.
     """
 
     plane: Array

@@ -43,9 +43,11 @@ def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 def write(path: Path, words: str, status: int, result: Mapping[str, Any], seconds: float) -> None:
     """Write one suite: one test, or one for each of the result's `shots`.
 
-    path : the file. words : those of the command, the test's name, or the suite's of several. status : its exit status: 0
-    passed, 1 failed, 3 failed where there is an `answer`, another one an error. result : what --json writes, with `sentence` or
-    `error`. seconds : it took.
+    path : the file.
+    words : those of the command, the test's name, or the suite's of several.
+    status : its exit status: 0 passed, 1 failed, 3 failed where there is an `answer`, another one an error.
+    result : what --json writes, with `sentence` or `error`.
+    seconds : it took.
 
     Raises
     ------
@@ -73,7 +75,11 @@ def write(path: Path, words: str, status: int, result: Mapping[str, Any], second
 
 
 def _case(name: str, kind: str | None, sentence: str, figures: Mapping[str, Any], seconds: float) -> ElementTree.Element:
-    """One test. kind : "failure", "error" or "skipped", None where it passed. sentence : why."""
+    """One test.
+
+    kind : "failure", "error" or "skipped", None where it passed.
+    sentence : why.
+    """
     case = ElementTree.Element("testcase", classname="viewcam", name=_text(name), time=f"{seconds:.3f}")
     if named := properties({key: value for key, value in figures.items() if key != "timing"}):
         of_case = ElementTree.SubElement(case, "properties")

@@ -207,8 +207,9 @@ def has_inverse(matrix: Array) -> bool:
 class Channels(NamedTuple):
     """All that says where a Blender object stands relative to what carries it, as it is stored.
 
-    mode : an order of Euler angles, "QUATERNION" or "AXIS_ANGLE". rotation : its numbers in this mode, and delta_rotation those
-    that Blender applies after it; () for AXIS_ANGLE, for which it shows none.
+    mode : an order of Euler angles, "QUATERNION" or "AXIS_ANGLE".
+    rotation : its numbers in this mode, and delta_rotation those that Blender applies after it; () for AXIS_ANGLE, for which it
+        shows none.
     """
 
     mode: str

@@ -51,8 +51,9 @@ _TOO_MUCH = "OpenUSD needed more time or memory for it than its size accounts fo
 def read(name: str, path: Path | None, text: str, size: str, values: str) -> dict[str, Any]:
     """The cameras of the stage of a file, or of a text if `path` is None.
 
-    name : what sentences call it. size : the attribute of a camera that has the pixels of its picture. values : the key of its
-    customData that is wanted.
+    name : what sentences call it.
+    size : the attribute of a camera that has the pixels of its picture.
+    values : the key of its customData that is wanted.
 
     Returns
     -------

@@ -20,7 +20,11 @@ Passes = dict[str, NDArray[np.float32]]
 
 @dataclass(frozen=True)
 class Fault:
-    """family : of the chart. name : in words. of_scene : changes the scene; of_picture : the passes, with a generator."""
+    """family : of the chart.
+    name : in words.
+    of_scene : changes the scene.
+    of_picture : the passes, with a generator.
+    """
 
     family: str
     name: str

@@ -17,7 +17,9 @@ Sides = dict[str, dict[str, Runner]]
 
 @dataclass(frozen=True)
 class Still:
-    """A picture. wanted : error → how many times as fast as the rivals, as (picture, job), None where nothing is asked for.
+    """A picture.
+
+    wanted : error → how many times as fast as the rivals, as (picture, job), None where nothing is asked for.
 
     samples : a pixel, of each half of the reference, of the two sides that make it.
     """
@@ -39,7 +41,11 @@ class Still:
 
 @dataclass(frozen=True)
 class Figure:
-    """A duration that is compared. key : as contestants know it. name, seconds : as charts say it."""
+    """A duration that is compared.
+
+    key : as contestants know it.
+    name, seconds : as charts say it.
+    """
 
     key: str
     name: str

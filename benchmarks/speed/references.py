@@ -29,7 +29,9 @@ _SEEDS = (7001, 7002)
 
 @dataclass(frozen=True)
 class Half:
-    """samples : a pixel, of each of a side's two halves. error : of one half."""
+    """samples : a pixel, of each of a side's two halves.
+    error : of one half.
+    """
 
     side: str
     samples: int
@@ -38,8 +40,11 @@ class Half:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """picture : (height, width, 3) float64. error : its own RMSE. differ : RMS of the difference between the sides.
-    explained : what of it their noise explains."""
+    """picture : (height, width, 3) float64.
+    error : its own RMSE.
+    differ : RMS of the difference between the sides.
+    explained : what of it their noise explains.
+    """
 
     picture: NDArray[np.float64]
     error: float

@@ -137,7 +137,8 @@ def _hits_of_fans(size: float, fans: int, random: np.random.Generator) -> Iterat
 class _Fans:
     """Fans of six triangles, and rays at their common vertices and at the edges that meet there.
 
-    corners : (3, m, 3): [corner, triangle, axis], camera space; six triangles after another make a fan. x, y : (n,) rays.
+    corners : (3, m, 3): [corner, triangle, axis], camera space; six triangles after another make a fan.
+    x, y : (n,) rays.
     fan : (n,) which one each ray is aimed at.
     """
 

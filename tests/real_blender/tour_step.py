@@ -18,10 +18,12 @@ UPPER_PART = (0.0, 0.35, 1.0, 1.0)
 class Step:
     """One thing that an artist does.
 
-    picture : file in docs/images/artists, taken when the step is done. shows : "sidebar", "area" (the largest), "camera
-        view", or where in the largest area, as shares of it: left, bottom, right and top.
+    picture : file in docs/images/artists, taken when the step is done.
+    shows : "sidebar", "area" (the largest), "camera view", or where in the largest area, as shares of it: left, bottom, right
+        and top.
     with_before : the picture shows on its left what was there before.
-    edits : how many undo steps it makes; each is undone and redone. needs_a_window : there is nothing to it without one.
+    edits : how many undo steps it makes; each is undone and redone.
+    needs_a_window : there is nothing to it without one.
     """
 
     picture: str | None = None

@@ -366,8 +366,11 @@ class CameraSync:
     ) -> list["CameraSync"]:
         """Place n cameras that nothing carries by their new values.
 
-        mode : of their rotations. locations : (n, 3). axes : (n, 3, 3), u, v and w as columns. Returns those that have no such
-        lens.
+        mode : of their rotations.
+        locations : (n, 3).
+        axes : (n, 3, 3), u, v and w as columns.
+
+        Returns those that have no such lens.
         """
         left, cameras = [], [sync.camera_object for sync, *_ in stated]
         turns = pose.set_rotations(cameras, mode, rotation.numbers(axes, mode), axes)
@@ -476,8 +479,11 @@ class CameraSync:
         The look-at point keeps its distance to the eye, and up stays where it gives the picture. What follows an object or has
         a driver stays as that says, and the camera is brought back to it.
 
-        depsgraph : in which the camera was evaluated just now. since : the values before some were edited, where the camera
-            does not stand there yet. edited : the names of these, which stay. Returns whether there was anything to adopt.
+        depsgraph : in which the camera was evaluated just now.
+        since : the values before some were edited, where the camera does not stand there yet.
+        edited : the names of these, which stay.
+
+        Returns whether there was anything to adopt.
 
         Raises
         ------

@@ -43,8 +43,11 @@ class Button(enum.Enum):
 class Cause:
     """Something that may keep a camera from being what its four values say.
 
-    clause : who does what, in words. acts_on : some of EYE, VIEW, DISTANCE, CENTER.
-    remedy : what to do. always : told even where nothing differs yet. mended_by : the button that does it, if there is one.
+    clause : who does what, in words.
+    acts_on : some of EYE, VIEW, DISTANCE, CENTER.
+    remedy : what to do.
+    always : told even where nothing differs yet.
+    mended_by : the button that does it, if there is one.
     """
 
     clause: str
@@ -56,7 +59,11 @@ class Cause:
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding about a camera. cause : None where the words say all. differing : in words, what of the camera it explains."""
+    """A finding about a camera.
+
+    cause : None where the words say all.
+    differing : in words, what of the camera it explains.
+    """
 
     words: str = ""
     cause: Cause | None = None
@@ -84,7 +91,8 @@ def differences(
 ) -> dict[str, str]:
     """The differences beyond what Blender's float32 storage explains: its name → the figures, in words. Pure.
 
-    reach : the largest coordinate that went into the camera's location, world units. length : a length in words, with its unit.
+    reach : the largest coordinate that went into the camera's location, world units.
+    length : a length in words, with its unit.
     """
     result = {}
     apart = math.dist(wanted.eye, read_back.eye)

@@ -106,7 +106,8 @@ def raw(camera_object: bpy.types.Object) -> Raw | None:
 def animated(before: CameraValues, changed: Raw) -> CameraValues:
     """The values of a camera of which curves alone can have changed any: `before` itself if none has.
 
-    before : values that follow no target. changed : what is held of them now, by `raw`.
+    before : values that follow no target.
+    changed : what is held of them now, by `raw`.
     """
     rounded, exact, zoom = changed
     zoom = before.zoom if zoom is None else zoom
@@ -120,7 +121,8 @@ def animated(before: CameraValues, changed: Raw) -> CameraValues:
 def _numbers(text: str, rounded: tuple[float, ...]) -> tuple[tuple[float, ...], bool]:
     """Eye, look-at, up and distance, ten numbers, and whether all of them are known in float64.
 
-    text : `exact` of the camera. rounded : the ten numbers of its properties.
+    text : `exact` of the camera.
+    rounded : the ten numbers of its properties.
     """
     exact = _parsed(text, 10)
     if not exact:

@@ -77,8 +77,9 @@ def still_of_one_layer(
     """Make `bpy.ops.render.render` render this view layer through this camera, sharp, and nothing after it.
 
     What both sides of a comparison have in common: compositor and sequencer, motion blur, stereo and Freestyle are off, and a
-    render border is cropped to. Simplify stays as the artist has it. camera_object : the one that Blender chooses itself, as
-    markers bind it, where None. keep : whether what Blender and Cycles have built is kept, for the next render.
+    render border is cropped to. Simplify stays as the artist has it.
+    camera_object : the one that Blender chooses itself, as markers bind it, where None.
+    keep : whether what Blender and Cycles have built is kept, for the next render.
     """
     render = scene.render
     overrides.set(render, "use_persistent_data", keep)

@@ -222,7 +222,8 @@ def pass_name(name: str) -> str:
 def linear_keyframes(block: bpy.types.ID, path: str, at: Sequence[float], values: NDArray[np.float64]) -> None:
     """Put keyframes in the place of a property's curves; a single one for a number that stands still.
 
-    at : frames, of the curves. values : (frames, numbers of the property).
+    at : frames, of the curves.
+    values : (frames, numbers of the property).
     """
     remove_curves(block, path)
     for index, column in enumerate(values.T):

@@ -88,8 +88,10 @@ def view_plane(f_x: float, f_y: float, c_x: float, c_top: float, size: tuple[int
 def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False) -> tuple[Pinhole, tuple[str, ...]]:
     """The camera of a matrix, and what is to be said of it.
 
-    matrix : 3 × 4 or 4 × 4, for column vectors, from camera to world as `camera_to_world` has it. plane : its view plane.
-    what : whose matrix, as a sentence names it. scaled : whether the format lets nodes be scaled without scaling the camera.
+    matrix : 3 × 4 or 4 × 4, for column vectors, from camera to world as `camera_to_world` has it.
+    plane : its view plane.
+    what : whose matrix, as a sentence names it.
+    scaled : whether the format lets nodes be scaled without scaling the camera.
 
     The look-at point, which no matrix says, lies as far before the eye as the eye from the origin, at least 1: so its rounding
     does not turn the view by more than 2⁻⁵².
@@ -131,7 +133,8 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
 def pinholes(matrices: np.ndarray, planes: Sequence[ViewPlane], whats: Sequence[str]) -> list[tuple[Pinhole, tuple[str, ...]]]:
     """The results of `pinhole` for many matrices: for files of thousands of poses, in a tenth of the time.
 
-    matrices : (n, 3, 4), finite. planes, whats : of each.
+    matrices : (n, 3, 4), finite.
+    planes, whats : of each.
     """
     turn, eye = matrices[:, :, :3], matrices[:, :, 3]
     with np.errstate(all="ignore"):
@@ -316,7 +319,9 @@ def leveled(cameras: Sequence[Camera]) -> list[Camera]:
 def turned_up(cameras: Sequence[Camera], up: Sequence[float], what: str, rise: float = 0.0) -> list[Camera]:
     """The cameras in a world that is turned by the least angle after which `up` is z, and then moved up; each says so.
 
-    up : of length 1. what : it, as the note calls it. rise : along z.
+    up : of length 1.
+    what : it, as the note calls it.
+    rise : along z.
     """
     x, y, z = up
     rows = np.diag([1.0, -1.0, -1.0])  # of the world that is upside down

@@ -106,7 +106,8 @@ class _Image(NamedTuple):
 class Tracks(NamedTuple):
     """Points in world space, and where pictures show them.
 
-    positions : (n, 3). colors : (n, 3), 0 … 255.
+    positions : (n, 3).
+    colors : (n, 3), 0 … 255.
     observations : of each picture the numbers of the points that it shows, (m,) from 0, and their places, (m, 2): x to the
         right and y down from the picture's corner.
     """

@@ -33,9 +33,14 @@ _STEP = 1e-6  # of the differences that make its Jacobian: they are right to 1e-
 class Lens:
     """The lens: how it bends a pinhole's picture.
 
-    terms : (name, value) of its coefficients, as its program calls them. projection : one of PROJECTIONS, and parameters its
-    own. radial : of r², r⁴, … of the polynomial. divisor : the same of what divides it. tangential : OpenCV's p1, p2. prism :
-    its s1, s2 (across) and s3, s4 (down), on r² and r⁴. tilt : its τx and τy, radians. skew : what is added to x, times y.
+    terms : (name, value) of its coefficients, as its program calls them.
+    projection : one of PROJECTIONS, and parameters its own.
+    radial : of r², r⁴, … of the polynomial.
+    divisor : the same of what divides it.
+    tangential : OpenCV's p1, p2.
+    prism : its s1, s2 (across) and s3, s4 (down), on r² and r⁴.
+    tilt : its τx and τy, radians.
+    skew : what is added to x, times y.
     radial_first : whether the tangential and prism terms are of the point that the radial ones have moved.
     """
 
@@ -188,8 +193,9 @@ _COUNTS = {"parameters": 0, "radial": 0, "divisor": 0, "tangential": 2, "prism":
 def view_plane(pinhole: Pinhole, lens: Lens | None, columns: ArrayLike, rows: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """The view plane's points that places in the photograph show: as Pinhole.view_plane has them, x and y at distance 1.
 
-    pinhole : of the photograph's own plane. columns, rows : of the photograph, from its left and bottom edge; broadcast where
-    there is a lens. NaN where it shows nothing.
+    pinhole : of the photograph's own plane.
+    columns, rows : of the photograph, from its left and bottom edge; broadcast where there is a lens. NaN where it shows
+        nothing.
     """
     x, y = pinhole.view_plane(columns, rows)
     if lens is None:
@@ -201,7 +207,8 @@ def view_plane(pinhole: Pinhole, lens: Lens | None, columns: ArrayLike, rows: Ar
 def project(pinhole: Pinhole, lens: Lens | None, points: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The places in the photograph at which points appear, and their depths, as Pinhole.project has them.
 
-    pinhole : of the photograph's own plane. points : (..., 3), world space. NaN where the lens folds: it shows no point there.
+    pinhole : of the photograph's own plane.
+    points : (..., 3), world space. NaN where the lens folds: it shows no point there.
     """
     column, row, depth = pinhole.project(points)
     if lens is None:
@@ -275,7 +282,8 @@ def _tilted(tau_x: float, tau_y: float) -> np.ndarray:
 def settle(lens: Lens, plane: ViewPlane, what: str, left_out: bool) -> tuple[Lens | None, tuple[str, ...]]:
     """The lens that a camera has, None where that is none that a picture shows; and notes.
 
-    what : whose, as a sentence names it. left_out : whether it is not wanted.
+    what : whose, as a sentence names it.
+    left_out : whether it is not wanted.
     """
     if lens.projection == "pinhole" and not any(value for _, value in lens.terms):
         return None, ()

@@ -22,7 +22,10 @@ _OUTSIDE = re.compile(r"[\"'()\[\]{},;]")
 
 
 class Token(NamedTuple):
-    """kind : "name", "number", "sign", or "" at the text's end. text : its characters. start, end : its place."""
+    """kind : "name", "number", "sign", or "" at the text's end.
+    text : its characters.
+    start, end : its place.
+    """
 
     kind: str
     text: str

@@ -88,7 +88,8 @@ def document(
     """The content of the file, frames in the order of the cameras.
 
     aabb_scale : for instant-ngp alone: how many times the unit cube it looks for the scene in. Not said if None.
-    more : further keys at the top. of_frames : further keys of each frame.
+    more : further keys at the top.
+    of_frames : further keys of each frame.
 
     Raises
     ------

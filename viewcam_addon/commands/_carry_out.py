@@ -34,8 +34,11 @@ _OPEN_TO_ALL = "whoever reaches {} can run any program on its workers: docs/farm
 
 @dataclasses.dataclass(frozen=True)
 class _WorkList:
-    """jobs : those of this run. all_jobs : those of a dataset, or of this run. made_from : all but the job that decides a
-    picture; settings : the hash of what each of all_jobs is made from, by its name."""
+    """jobs : those of this run.
+    all_jobs : those of a dataset, or of this run.
+    made_from : all but the job that decides a picture.
+    settings : the hash of what each of all_jobs is made from, by its name.
+    """
 
     all_jobs: Sequence[Job]
     jobs: Sequence[Job]
@@ -68,8 +71,9 @@ def carry_out(
 ) -> Summary:
     """Carry out jobs of one file, here or on a cluster, and tell what it came to.
 
-    jobs_of : a renderer (BlenderRenderer) → the jobs. complete : gives each what it does not say itself. source : the list that
-    they are from.
+    jobs_of : a renderer (BlenderRenderer) → the jobs.
+    complete : gives each what it does not say itself.
+    source : the list that they are from.
 
     Raises
     ------

@@ -29,8 +29,10 @@ class NotModeled:
     """The part of a picture that the answer says nothing of.
 
     names : of the objects, those that the ledger has as approximated or skipped and that are in the picture, or may be, and
-    those whose light is a renderer's choice. share : of the pixels, 0 to 1: those that show them or differ by them; None where
-    that was not measured. visible : those that show them alone. in_one_place : of the names those of surfaces in one place.
+        those whose light is a renderer's choice.
+    share : of the pixels, 0 to 1: those that show them or differ by them; None where that was not measured.
+    visible : those that show them alone.
+    in_one_place : of the names those of surfaces in one place.
     seen_otherwise : those whose shadows not all kinds of rays see.
     """
 
@@ -60,7 +62,9 @@ class NotModeled:
 class Answer:
     """The answer of comparing two pictures.
 
-    answer : one of ANSWERS. headline : a few words. text : the figures that stand for it, or what differs.
+    answer : one of ANSWERS.
+    headline : a few words.
+    text : the figures that stand for it, or what differs.
     not_modeled : of the picture, whatever the answer.
     """
 
@@ -106,7 +110,8 @@ def exit_status(answer: str, strict: bool) -> int:
 def answered(same: bool, headline: str, text: str, not_modeled: NotModeled) -> Answer:
     """The answer, whose headline names what is not modeled where the rest is the same.
 
-    same : whether nothing differs. headline : without what is not modeled.
+    same : whether nothing differs.
+    headline : without what is not modeled.
     """
     if not same:
         return Answer(DIFFERENT, headline, text, not_modeled)
@@ -120,9 +125,11 @@ def in_the_picture(
 ) -> NotModeled:
     """The part of a picture that is not modeled.
 
-    names : of the objects that are not. surfaces : name → (height, width), the pixels that show it, of those that are surfaces
-    in the scene. changed : (height, width), those where the picture with everything is another than the one with stand-ins;
-    None where there is none. is_lit : whether light is compared, so that what is not seen may still light what is.
+    names : of the objects that are not.
+    surfaces : name → (height, width), the pixels that show it, of those that are surfaces in the scene.
+    changed : (height, width), those where the picture with everything is another than the one with stand-ins; None where there
+        is none.
+    is_lit : whether light is compared, so that what is not seen may still light what is.
     """
     if changed is not None and not is_lit:  # bits tell what a stand-in changes, where there is no noise
         surfaces = {name: pixels & changed for name, pixels in surfaces.items()}

@@ -63,7 +63,9 @@ class Edges:
 class Allowance:
     """The allowance for rounding in one quantity, each (height, width), the largest of its channels.
 
-    moved : by the shift of the picture, for one rounding. value : by one rounding of its own figures. floor : by storage.
+    moved : by the shift of the picture, for one rounding.
+    value : by one rounding of its own figures.
+    floor : by storage.
     shift : pixels, that of the picture for one rounding.
     """
 
@@ -86,7 +88,8 @@ class Allowance:
 class Rounding:
     """The rounding of the light of a picture.
 
-    test : one of the test pictures, which tells its Blender. samples : of each picture, the most.
+    test : one of the test pictures, which tells its Blender.
+    samples : of each picture, the most.
     belongs : (height, width) the object of each pixel, 0 for none or where nobody knows.
     rest : what is compared where light comes by surfaces in one place, else None.
     """
@@ -132,7 +135,8 @@ class Rounding:
 def compare(sides: Sides, allowed: Allowance, belongs: NDArray) -> tuple[PassErrors, Edges, Array]:
     """The figures of all pixels, those on edges, and the error of each pixel in roundings.
 
-    allowed : of these sides. belongs : the object of each pixel.
+    allowed : of these sides.
+    belongs : the object of each pixel.
 
     Returns the row, relative errors; the edges; (height, width) float64.
     """

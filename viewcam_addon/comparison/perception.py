@@ -19,7 +19,8 @@ from .tolerances import Array
 
 @dataclass(frozen=True)
 class Appearance:
-    """relmse : of Combined. expected_relmse : that of the noise that both sides tell of, None where one does not tell.
+    """relmse : of Combined.
+    expected_relmse : that of the noise that both sides tell of, None where one does not tell.
 
     flip : mean over the picture, 0 to 1; None where the package flip-evaluator is not installed.
     """

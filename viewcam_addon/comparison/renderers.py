@@ -35,8 +35,10 @@ MARK = "viewcam"
 class Renderer:
     """The deviations of a renderer by design, beside its roundings.
 
-    center : pixels that its rays are beside the pixels' centers. edges : pixels that its edges are beside the scene's. normal :
-    radians that its storage turns a normal by. near : of the depth buffer that its depths come from, world units; or None.
+    center : pixels that its rays are beside the pixels' centers.
+    edges : pixels that its edges are beside the scene's.
+    normal : radians that its storage turns a normal by.
+    near : of the depth buffer that its depths come from, world units; or None.
     """
 
     name: str

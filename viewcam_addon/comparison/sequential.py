@@ -48,8 +48,9 @@ _MEANS = ("Combined", "Emission", "Environment", "Diffuse Color")
 class Rounds:
     """The pictures of all rounds so far, each the mean over all of its samples.
 
-    samples : of each side. reference, tests, everything : as of radiance.compare and everything.not_modeled. Each of the tests
-    has had a share of every round, so that they are alike and independent, and their spread tells their noise as ever.
+    samples : of each side.
+    reference, tests, everything : as of radiance.compare and everything.not_modeled. Each of the tests has had a share of every
+        round, so that they are alike and independent, and their spread tells their noise as ever.
     """
 
     samples = 0

@@ -40,9 +40,10 @@ class Sides:
     """One quantity on both sides, each (height, width, channels) float64, rows from the bottom.
 
     test_variance : of `test`, which is a mean, from the test pictures' differences; inf where there is one picture only.
-    variance : variance of `reference`; inf where it is not known. broken : (height, width) bool, no number on one side or both;
-    there both are 0. shared : variance of `reference` that its pixels may have shared with their neighbors, or 0. certain :
-    (height, width, 1) bool, pixels that have no noise, whatever is beside them.
+    variance : variance of `reference`; inf where it is not known.
+    broken : (height, width) bool, no number on one side or both; there both are 0.
+    shared : variance of `reference` that its pixels may have shared with their neighbors, or 0.
+    certain : (height, width, 1) bool, pixels that have no noise, whatever is beside them.
     """
 
     name: str

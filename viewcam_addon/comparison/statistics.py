@@ -55,7 +55,8 @@ class PassErrors:
 def measure(name: str, unit: str, errors: Array, one_rounding: Array, floor: Array | float = 0.0) -> PassErrors:
     """Errors against their tolerances.
 
-    errors : (n,) in `unit`, finite. one_rounding : (n,) in `unit`, what one rounding causes at each pixel.
+    errors : (n,) in `unit`, finite.
+    one_rounding : (n,) in `unit`, what one rounding causes at each pixel.
     floor : in `unit`, what storage alone may cause at every percentile; (n,) or one number.
     """
     if not len(errors):

@@ -176,7 +176,8 @@ def radiance_error(value: Array, brightest: Array | float, samples: int) -> Arra
 def slopes(values: NDArray, belongs: NDArray) -> Array:
     """The change of a pass from pixel to pixel: the largest distance to the four neighbors that show the same object.
 
-    values : (height, width, channels). belongs : (height, width), the object of each pixel, negative for none.
+    values : (height, width, channels).
+    belongs : (height, width), the object of each pixel, negative for none.
 
     Returns (height, width) float64, in the pass's unit a pixel.
     """

@@ -25,8 +25,10 @@ _WHOLE = ("frame", "samples", "seed", "threads")
 class Check:
     """The result of `check`, or of a comparison of files.
 
-    passed : whether Cycles renders the camera, or the pictures are the same. sentence : by how much. figures : all that --json
-    writes. answer : one of "same", "same_but" (the same, but for objects that are not modeled) and "different".
+    passed : whether Cycles renders the camera, or the pictures are the same.
+    sentence : by how much.
+    figures : all that --json writes.
+    answer : one of "same", "same_but" (the same, but for objects that are not modeled) and "different".
     """
 
     passed: bool
@@ -96,7 +98,9 @@ def compare(
 ) -> Check:
     """Compare EXRs of one camera, in a process of its own; see tracing.compare_files.
 
-    channels : by pass, or as the command line has them. report : a folder for the HTML page. difference : a PNG.
+    channels : by pass, or as the command line has them.
+    report : a folder for the HTML page.
+    difference : a PNG.
     strict : whether pictures that are the same but for what is not modeled fail.
 
     Raises

@@ -113,7 +113,8 @@ class Cluster:
     ) -> Work:
         """The work of the workers on one file; the same bytes as one.in_turn's but for `timing`.
 
-        settings : the shots' hashes, by name. made_from : what the file is made from, which must be the same for each worker.
+        settings : the shots' hashes, by name.
+        made_from : what the file is made from, which must be the same for each worker.
 
         The work raises InputError if no worker can render any of the shots. If all are lost later, the shots in flight fail
         and no more are taken.

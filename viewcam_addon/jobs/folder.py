@@ -30,9 +30,11 @@ _TEMPORARY = re.compile(r"\.(.+)-[0-9a-f]{8}\.(?:exr|png|json|html|txt|labels)")
 class Outputs:
     """The files that a batch makes of each shot, beside its sidecar.
 
-    picture : EXR and preview. check : whether it is compared with the tracer: of a picture its geometry, else the job's engine
-    at its level. labels : kinds of labels.KINDS. depth_steps : of the labels' 16-bit depth, in a scene unit. report : whether a
-    check without a picture writes its page and a thumbnail.
+    picture : EXR and preview.
+    check : whether it is compared with the tracer: of a picture its geometry, else the job's engine at its level.
+    labels : kinds of labels.KINDS.
+    depth_steps : of the labels' 16-bit depth, in a scene unit.
+    report : whether a check without a picture writes its page and a thumbnail.
     """
 
     picture: bool = True
@@ -76,7 +78,8 @@ class Folder:
     def refuse_what_is_in_the_way(self, shots: Iterable[str], outputs: Outputs) -> None:
         """Raise InputError where a folder, or anything else that is no file, has the name of a file that a batch would write.
 
-        shots : their names. outputs : what is made of each.
+        shots : their names.
+        outputs : what is made of each.
         """
         endings = ["json", *(("exr", "png") if outputs.picture else ()), *(("html", SIDES["test"]) if outputs.report else ())]
         if outputs.labels:

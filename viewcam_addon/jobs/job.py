@@ -51,7 +51,11 @@ BESIDE_THEM = ("principal_point", "pixel_aspect", "mirrored")
 
 
 def _option(words: str, default: Any = None, **how: Any) -> Any:
-    """A field that commands have an option for. words : its help. how : more of what argparse's add_argument takes."""
+    """A field that commands have an option for.
+
+    words : its help.
+    how : more of what argparse's add_argument takes.
+    """
     return dataclasses.field(default=default, metadata={"help": words, **how})
 
 
@@ -197,8 +201,8 @@ class Job:
 def conflicts(values: Mapping[str, object], in_list: bool = False) -> list[tuple[tuple[str, ...], str]]:
     """The conflicts among the values of one job: (fields, sentence) of each problem.
 
-    values : what is stated, by field; None where it is wrong already, and no more is to be told of it. in_list : whether it is
-    one of several, which needs a name, and a camera that is not the scene's own.
+    values : what is stated, by field; None where it is wrong already, and no more is to be told of it.
+    in_list : whether it is one of several, which needs a name, and a camera that is not the scene's own.
     """
     result: list[tuple[tuple[str, ...], str]] = []
     if "name" not in values and in_list:

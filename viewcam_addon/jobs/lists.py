@@ -47,8 +47,11 @@ class Cell(NamedTuple):
 class Row:
     """One row.
 
-    place : "line 17" of a CSV, say. kind : "column" or "key". cells : by column, those that say something. columns : all that
-    the row could have had. excused : fields whose lack is told elsewhere.
+    place : "line 17" of a CSV, say.
+    kind : "column" or "key".
+    cells : by column, those that say something.
+    columns : all that the row could have had.
+    excused : fields whose lack is told elsewhere.
     """
 
     place: str

@@ -22,7 +22,8 @@ _RANGE = re.compile(r"([-+]?\d{1,9})\.\.([-+]?\d{1,9})", re.ASCII)
 class _Made(Sequence[Job]):
     """Shots that are made when they are asked for: of a million views, one of many machines renders a few.
 
-    make : a number → its shot. numbers : those of the shots, in their order.
+    make : a number → its shot.
+    numbers : those of the shots, in their order.
     """
 
     def __init__(self, make: Callable[[int], Job], numbers: range) -> None:

@@ -26,13 +26,15 @@ class Plan:
     out : the folder.
     outputs : what is made of each job.
     blend, trust : of the file, as of Job.
-    resume : whether what is there from the same settings is kept; resume_known the same, unless what it was made from can't
-        all be known; overwrite : nothing is kept. With none of them nothing may be there.
+    resume : whether what is there from the same settings is kept; resume_known the same, unless what it was made from can't all
+        be known.
+    overwrite : nothing is kept. With none of them nothing may be there.
     shard : "I/N", every N-th job from the I-th on.
-    transforms : "png" or "exr", the pictures of a dataset that is written of all jobs. test : those that it holds out for
-        tests, as dataset.write has them.
+    transforms : "png" or "exr", the pictures of a dataset that is written of all jobs.
+    test : those that it holds out for tests, as dataset.write has them.
     time_limit : seconds that a job may take.
-    workers : in so many processes of this machine. scheduler : on a Dask cluster, "" for one of this machine.
+    workers : in so many processes of this machine.
+    scheduler : on a Dask cluster, "" for one of this machine.
     command : the one that sentences are said of.
     """
 

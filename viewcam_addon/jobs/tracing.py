@@ -44,8 +44,11 @@ SIDES = {"test": "test.png", "reference": "reference.png", "everything": "everyt
 class Written:
     """The files of one comparison beside its result.
 
-    report : the folder of the HTML page. difference : a PNG of what differs. sides : a folder for PNGs of both sides.
-    reference : an EXR of the tracer's picture. command : what the page tells to repeat the comparison.
+    report : the folder of the HTML page.
+    difference : a PNG of what differs.
+    sides : a folder for PNGs of both sides.
+    reference : an EXR of the tracer's picture.
+    command : what the page tells to repeat the comparison.
     """
 
     report: str | None = None
@@ -137,8 +140,11 @@ class Tracing(child_process.ServerOnDemand):
 
     @staticmethod
     def frame(scene: Path, camera: Pinhole, clip: tuple[float, float]) -> dict[str, Any]:
-        """The frame as the camera sees it. scene : a file; the same path is the same scene. camera, clip : whatever the file's
-        are."""
+        """The frame as the camera sees it.
+
+        scene : a file; the same path is the same scene.
+        camera, clip : whatever the file's are.
+        """
         return {"scene": str(scene), "camera": dataclasses.asdict(camera), "clip": list(clip)}
 
     def label(
@@ -153,8 +159,9 @@ class Tracing(child_process.ServerOnDemand):
     ) -> list[str]:
         """Write the labels beside a picture (labels.files); the names of the files.
 
-        frames : "here", and of flow "previous" and "next" as well. lens : what bends the picture, whose own plane all cameras
-        have. annotations : as of `label` in labels/scene_labels.py.
+        frames : "here", and of flow "previous" and "next" as well.
+        lens : what bends the picture, whose own plane all cameras have.
+        annotations : as of `label` in labels/scene_labels.py.
 
         Raises
         ------
@@ -231,7 +238,9 @@ class _Server:
         self._rounds: Rounds | None = None
 
     def answer(self, request: dict[str, Any], tell: Callable[..., None]) -> Any:
-        """request : {what is asked for: its arguments}. tell : tells an event to whoever asks."""
+        """request : {what is asked for: its arguments}.
+        tell : tells an event to whoever asks.
+        """
         ((name, arguments),) = request.items()
         if name == "label":
             return self._label(**arguments)

@@ -52,7 +52,8 @@ def write(
     """Write a new folder of all pictures' labels, whole or not at all.
 
     folder : of label files that have depth, masks and amodal masks, and pictures as PNG or JPEG beside them, if there are any.
-    output : must not be there yet, or be empty. progress : is told the share of the pictures that are written.
+    output : must not be there yet, or be empty.
+    progress : is told the share of the pictures that are written.
     overwrite : whether `output` may be a scene that was written so.
 
     Returns how many images, instances and objects there are, and how many of the images have a picture in rgb.
@@ -155,7 +156,10 @@ class _Objects:
 
 
 class _Object(NamedTuple):
-    """box : as the label has it. stretch : S. figures : of both, in two rows of nine."""
+    """box : as the label has it.
+    stretch : S.
+    figures : of both, in two rows of nine.
+    """
 
     box: dict[str, Any]
     stretch: NDArray

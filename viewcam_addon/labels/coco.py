@@ -17,7 +17,9 @@ Document = dict[str, Any]
 
 
 def instances(folder: Path, amodal: bool = False) -> Document:
-    """COCO's instances, as in instances_train2017.json. amodal : masks and boxes of whole objects, not of what is visible.
+    """COCO's instances, as in instances_train2017.json.
+
+    amodal : masks and boxes of whole objects, not of what is visible.
 
     folder : of label files; `file_name` is the picture's that they belong to. Raises InputError as `read_pictures` does.
     """

@@ -30,7 +30,9 @@ _MASK = 0xFFFFFFFF
 class Coverage:
     """The coverage of a picture's instances.
 
-    passes : its Cryptomatte layers. names, areas : of each instance, in the layers, and in pixels. header : their attributes.
+    passes : its Cryptomatte layers.
+    names, areas : of each instance, in the layers, and in pixels.
+    header : their attributes.
     """
 
     passes: dict[str, NDArray[np.float32]]

@@ -51,8 +51,9 @@ def of_picture(path: Path, ending: str) -> Path:
 def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[Path]:
     """Write the labels of a picture beside it.
 
-    path : the picture's. depth_steps : of the 16-bit PNG, in a scene unit; what is nearer than half a step or farther than
-    65535 of them is 0, as is a pixel that shows nothing.
+    path : the picture's.
+    depth_steps : of the 16-bit PNG, in a scene unit; what is nearer than half a step or farther than 65535 of them is 0, as is
+        a pixel that shows nothing.
 
     Returns the files, the JSON last.
 

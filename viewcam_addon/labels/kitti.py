@@ -38,7 +38,9 @@ _FLOW_STEPS, _NO_FLOW = 64.0, 2.0**15
 def write(folder: Path, output: Path, overwrite: bool = False, words: stereo.Words | None = None) -> dict[str, int]:
     """Write a new folder of what each picture's labels have of depth and forward flow, whole or not at all.
 
-    folder : of label files. output : must not be there yet, or be empty. overwrite : whether it may be what was written so.
+    folder : of label files.
+    output : must not be there yet, or be empty.
+    overwrite : whether it may be what was written so.
     words : where there are stereo pairs, as for `stereo.pairs`.
 
     Returns how many pictures have which.

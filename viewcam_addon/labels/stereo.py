@@ -51,9 +51,12 @@ _LEVEL = 0.01
 class Pair:
     """Two pictures of one moment, the left one first in each field.
 
-    paths : of the label files. photographs : of the PNG or JPEG of each, if there is one. cameras : with the same axes.
-    baseline : between the eyes, scene units, > 0. disparities : (height, width) each, float64, pixels, rows from the **top**;
-    nan where nothing is. seen_by_both : (height, width) each.
+    paths : of the label files.
+    photographs : of the PNG or JPEG of each, if there is one.
+    cameras : with the same axes.
+    baseline : between the eyes, scene units, > 0.
+    disparities : (height, width) each, float64, pixels, rows from the **top**; nan where nothing is.
+    seen_by_both : (height, width) each.
     """
 
     paths: tuple[Path, Path]
@@ -149,8 +152,10 @@ def _agree(disparity: NDArray[np.float64], other: NDArray[np.float64], sign: int
 def write(folder: Path, output: Path, overwrite: bool = False, words: Words = WORDS) -> dict[str, int]:
     """Write a new folder with Middlebury's folder of each pair, whole or not at all.
 
-    folder : of label files with depth. output : must not be there yet, or be empty. overwrite : whether it may be what was
-    written so. words : as for `pairs`.
+    folder : of label files with depth.
+    output : must not be there yet, or be empty.
+    overwrite : whether it may be what was written so.
+    words : as for `pairs`.
 
     Returns how many pairs there are.
 

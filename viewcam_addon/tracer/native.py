@@ -388,7 +388,8 @@ class CoreScene:
         bottom.
 
         eye, axes : (3,) and (3, 3), where the camera's eye and its right, up and forward are in the scene's world, as they may
-        be in an object's space. window : the first column, the first row, columns and rows.
+            be in an object's space.
+        window : the first column, the first row, columns and rows.
         """
         covered = np.empty((window[3], window[2]), np.bool_)
         described = self._described_camera(camera, clip, eye, axes, window)
@@ -508,8 +509,8 @@ class CoreScene:
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """All surfaces at n places in the picture that lie up to `within` times the nearest one's depth beyond it.
 
-        passes : (m, channels) each, of the first place's surfaces, the nearest first, then the next one's. counts : (n,), how
-        many each has, of `surface_counts`.
+        passes : (m, channels) each, of the first place's surfaces, the nearest first, then the next one's.
+        counts : (n,), how many each has, of `surface_counts`.
 
         Returns (m,) objects, −1 where nothing is, and (2, m) how much UV and normal change there with each pixel.
         """
@@ -555,7 +556,8 @@ class CoreScene:
         """Rays to lights that leave what n rays meet, rendering space: points and normals (n, 3), t (n,) of the surface
         along rays, starts (n, 3) and lengths (n,) of those to the lights.
 
-        directions : (n, 3), unit. distances : of the lights, which face the rays. nan where nothing is met.
+        directions : (n, 3), unit.
+        distances : of the lights, which face the rays. nan where nothing is met.
         """
         rays = array(rays, np.float64, (None, 8))
         lights, rows = np.ones((len(rays), 5)), np.empty((len(rays), 11))

@@ -67,7 +67,9 @@ OBJECT = "ShaderNodeTexCoord", "Object"
 
 
 def bump(material, mapped, vector=OBJECT, filter_width=1.0, invert=False, first=None, texture=None, **inputs):
-    """first : of a normal map before. texture : (class, its properties), which makes the height instead of hills."""
+    """first : of a normal map before.
+    texture : (class, its properties), which makes the height instead of hills.
+    """
     tree = material.node_tree
     source = tree.nodes.new(vector[0])
     if vector[0] == "ShaderNodeVertexColor":

@@ -95,7 +95,9 @@ class OddRow:
     """A row of docs/odd-blender.md, and the scene that holds it to its word.
 
     sticks : whether the pose sticks right after `apply`, later, in the render; None where nothing is said of it.
-    sentences : what the panel says in the end. folder : for files. draw : draws the panels of what is active.
+    sentences : what the panel says in the end.
+    folder : for files.
+    draw : draws the panels of what is active.
     """
 
     sticks: tuple[bool | None, bool | None, bool | None]

@@ -19,9 +19,11 @@ from .operators import NamesCamera
 class Background:
     """One kind.
 
-    running : that on its way, with `poll` (what it came to, None while it runs), `wait` and `cancel`; or None. latest : what
-    the last one came to, or None. seconds : between two looks. looked : is called after each, with what it came to or None, and
-    when it is canceled. discard : is called with what the last one came to before that is forgotten.
+    running : that on its way, with `poll` (what it came to, None while it runs), `wait` and `cancel`; or None.
+    latest : what the last one came to, or None.
+    seconds : between two looks.
+    looked : is called after each, with what it came to or None, and when it is canceled.
+    discard : is called with what the last one came to before that is forgotten.
     """
 
     def __init__(self, seconds: float, looked: Callable[[Any], None], discard: Callable[[Any], None] = lambda _: None) -> None:

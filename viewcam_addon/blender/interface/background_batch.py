@@ -41,8 +41,10 @@ def shot(camera_object: bpy.types.Object, scene: bpy.types.Scene, name: str, fra
 class BackgroundBatch:
     """One on its way, from the moment it is made.
 
-    into : where a folder is made for it, named by file, `what` and time. shots : the list. files : what each shot that is done
-    has one of there. outputs : what is made of each shot.
+    into : where a folder is made for it, named by file, `what` and time.
+    shots : the list.
+    files : what each shot that is done has one of there.
+    outputs : what is made of each shot.
 
     Raises
     ------

@@ -46,10 +46,17 @@ _COMPRESSED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 class Outcome:
     """The outcome of a comparison.
 
-    what : of what it was: camera, frame and level. camera : the camera's name. seen : the camera then, None if it was none.
-    answer : one of comparison/answer.py's, None where there is none. verdict : one sentence. headline : a few words of it.
-    rows : (label, text) of the figures. lacking : (object, sentence) of what is not modeled as it is.
-    folder : that of the report. colors : what those of the difference say. scale : their ends, as difference.write has them.
+    what : of what it was: camera, frame and level.
+    camera : the camera's name.
+    seen : the camera then, None if it was none.
+    answer : one of comparison/answer.py's, None where there is none.
+    verdict : one sentence.
+    headline : a few words of it.
+    rows : (label, text) of the figures.
+    lacking : (object, sentence) of what is not modeled as it is.
+    folder : that of the report.
+    colors : what those of the difference say.
+    scale : their ends, as difference.write has them.
     temporary : what `discard` removes.
     """
 
@@ -98,9 +105,12 @@ class Outcome:
 class RunningComparison:
     """One comparison on its way, from the moment it is made.
 
-    scene : the one of the window. level : one of film.LEVELS, or "auto". find : for light, the bias that is to be found, as of
-    Job. clay : whether one matte material covers everything. keep_in : a folder that gets one for each report, named by file,
-    camera, frame and time; by default the report is gone with Blender.
+    scene : the one of the window.
+    level : one of film.LEVELS, or "auto".
+    find : for light, the bias that is to be found, as of Job.
+    clay : whether one matte material covers everything.
+    keep_in : a folder that gets one for each report, named by file, camera, frame and time; by default the report is gone with
+        Blender.
 
     Raises
     ------
@@ -353,8 +363,8 @@ def start(
 ) -> child_process.ProcessGroup:
     """Start a process that carries out jobs on a copy, in this same Blender.
 
-    log : what it prints, its events among it; the folder of this file has all else that it needs for a while. plan, files : as
-    of plan.write.
+    log : what it prints, its events among it; the folder of this file has all else that it needs for a while.
+    plan, files : as of plan.write.
 
     Raises
     ------

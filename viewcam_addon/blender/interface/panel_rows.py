@@ -102,7 +102,8 @@ def point(
 ) -> None:
     """A point's three numbers, and beside them below its name what it may follow; in a narrow panel one below the other.
 
-    is_free : whether the numbers can be edited. followers : (property, name, `among` of `field`) of each.
+    is_free : whether the numbers can be edited.
+    followers : (property, name, `among` of `field`) of each.
     """
     if not column.use_property_split:
         rows = column.column()

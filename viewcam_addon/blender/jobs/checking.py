@@ -48,7 +48,8 @@ _AS_THE_SCENE_STANDS: dict[str, Any] = {"width": None, "height": None, "principa
 class Checker:
     """Checks jobs of one file after another; a context manager.
 
-    tracing : the process that traces and compares. events : whoever is told how far it is.
+    tracing : the process that traces and compares.
+    events : whoever is told how far it is.
 
     The file must stay as it is between two checks but for cameras and what jobs say.
     """
@@ -68,8 +69,9 @@ class Checker:
     ) -> dict[str, Any]:
         """Compare what Cycles renders through a camera, as the scene stands, with what `pinhole` sees.
 
-        pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from. Of the scene's
-        own camera Blender chooses once more which that is: a picture of another one is a difference.
+        pinhole : the camera of the picture, as its sidecar has it.
+        stated : the four values it was made from. Of the scene's own camera Blender chooses once more which that is: a picture
+            of another one is a difference.
 
         Returns `passed`, `answer`, `verdict`, `not_modeled` and `figures` as Tracing.compare has them, and in `ledger` what
         both sides leave out or replace, a sentence for each of the first few.
@@ -111,8 +113,9 @@ class Checker:
     ) -> dict[str, Any]:
         """Compare what the job's engine renders, as the scene stands, with what the tracer makes of the scene at a level.
 
-        notes : sentences of the file as a whole, for the ledger. written : files beside the result. keep : a folder for scene
-        and pictures: scene.json, cycles.exr or another engine's, of several with numbers.
+        notes : sentences of the file as a whole, for the ledger.
+        written : files beside the result.
+        keep : a folder for scene and pictures: scene.json, cycles.exr or another engine's, of several with numbers.
 
         Returns as `check_picture` does, and `result`, all that --json has, `lines` for a terminal, `level`,
         with `reason` where it was chosen, and the `seconds` of both sides.
@@ -197,7 +200,11 @@ class Checker:
         stage.render(job, paths, lighting, rendering, keep=True, everything=everything if has_more else None)
 
     def _forecast(self, undecided: dict[str, Any], taken: int, latest: int, seconds: float) -> None:
-        """Tell how much longer a search for a bias takes. taken : samples so far. latest, seconds : of the last round."""
+        """Tell how much longer a search for a bias takes.
+
+        taken : samples so far.
+        latest, seconds : of the last round.
+        """
         if self._events:
             left = seconds * (undecided["expected"] - taken) / latest
             following = undecided["following"]

@@ -40,7 +40,9 @@ def engine_name(engine: str) -> str:
 
 
 class JobSettings:
-    """A scene while a batch has it. warnings : a sentence for each thing that is another in a render by itself.
+    """A scene while a batch has it.
+
+    warnings : a sentence for each thing that is another in a render by itself.
 
     off : what is off because the file is not trusted (opening.py).
     """

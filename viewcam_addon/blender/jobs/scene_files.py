@@ -23,7 +23,9 @@ _THINGS = [each.name for each in fields(Scene) if each.name not in ("camera", "s
 
 @dataclass(frozen=True, eq=False)
 class Export:
-    """state : of Blender, when the scene was exported. ledger : what it found, with the remedies for Cycles."""
+    """state : of Blender, when the scene was exported.
+    ledger : what it found, with the remedies for Cycles.
+    """
 
     state: tuple
     scene: Scene

@@ -77,10 +77,12 @@ class Stage:
     ) -> None:
         """Write the pictures of the job's engine.
 
-        paths : of several, which share the samples; their seeds count from that of the job. light : as exported, of a stage
-        that is lit. rendering : is told of each, by its number from 1 on, before it is rendered. keep : as of cycles.render.
+        paths : of several, which share the samples; their seeds count from that of the job.
+        light : as exported, of a stage that is lit.
+        rendering : is told of each, by its number from 1 on, before it is rendered.
+        keep : as of cycles.render.
         everything : for one more picture of Cycles, like the first but with all that has a stand-in, or is left out, in the
-        others.
+            others.
         """
         camera = self.camera if self.is_chosen or self.file_ledger else None
         share = max((job.samples or SAMPLES) // len(paths), 1)
@@ -109,7 +111,8 @@ def staged(
 ) -> Iterator[Stage]:
     """Give the scene as a job's comparison wants it.
 
-    notes : sentences of the file as a whole, for the ledger. whole : whether a border that does not crop counts for nothing.
+    notes : sentences of the file as a whole, for the ledger.
+    whole : whether a border that does not crop counts for nothing.
     """
     layer, ledger = rendered_layer(scene), Ledger()
     for sentence in notes:

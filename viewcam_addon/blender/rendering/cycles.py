@@ -89,10 +89,13 @@ def render(
 ) -> None:
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
 
-    camera_object : the one that Blender chooses itself, as markers bind it, where None. remedies : what to take out for the
-        time of the render (ledger.py). threads : all by default. light : for a picture of light in place of the passes of
-        geometry. keep : whether Cycles keeps what it has built, for the next render. everything : with hair, volumes and
-        whatever else the tracer does not model. lasting : of all renders that share what remedies make.
+    camera_object : the one that Blender chooses itself, as markers bind it, where None.
+    remedies : what to take out for the time of the render (ledger.py).
+    threads : all by default.
+    light : for a picture of light in place of the passes of geometry.
+    keep : whether Cycles keeps what it has built, for the next render.
+    everything : with hair, volumes and whatever else the tracer does not model.
+    lasting : of all renders that share what remedies make.
 
     Raises
     ------

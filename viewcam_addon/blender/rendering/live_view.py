@@ -44,8 +44,10 @@ _SECONDS = 1 / 60  # between two looks whether there is another picture
 class LiveView:
     """The picture of one viewport.
 
-    picture : (height, width, 4) float32, scene linear, rows from the bottom; None until there is one. number : of the picture,
-    which counts them. samples : of light that it has, 0 where it shows surfaces. message : why there is none.
+    picture : (height, width, 4) float32, scene linear, rows from the bottom; None until there is one.
+    number : of the picture, which counts them.
+    samples : of light that it has, 0 where it shows surfaces.
+    message : why there is none.
     """
 
     _all: ClassVar[WeakSet["LiveView"]] = WeakSet()

@@ -35,8 +35,9 @@ _SHEAR = 1e-5
 class _Kind:
     """One of Blender's lights as a lamp of the tracer.
 
-    lamp : what it is there. settings : of its numbers → Blender's property. size : the property that is above 0 where it has a
-    size.
+    lamp : what it is there.
+    settings : of its numbers → Blender's property.
+    size : the property that is above 0 where it has a size.
     """
 
     lamp: type[Lamp]
@@ -299,7 +300,8 @@ class _LampReader(shaders.Tree):
     A lamp of the tracer has no space of its own: what Blender's nodes say in a light's is computed from places and directions
     of the world, as Cycles has them (shader_setup_from_sample, and the files of intern/cycles/kernel/light).
 
-    matrix : (4, 4), the light's space to the world's. uv : makes what its UV is.
+    matrix : (4, 4), the light's space to the world's.
+    uv : makes what its UV is.
     """
 
     def __init__(self, light: bpy.types.Light, matrix: np.ndarray, uv: UVMaker) -> None:

@@ -176,7 +176,11 @@ class Adder:
         self.values: dict[object, bpy.types.Node] = {}
 
     def add(self, kind: str, *linked: bpy.types.NodeSocket, **values: object) -> bpy.types.Node:
-        """A node of this class. linked : outputs for its first inputs. values : of its inputs, by name."""
+        """A node of this class.
+
+        linked : outputs for its first inputs.
+        values : of its inputs, by name.
+        """
         node = self._tree.nodes.new(kind)
         self._added.append(node)
         for number, socket in enumerate(linked):

@@ -76,7 +76,8 @@ _FRAME = (
 class Recentered:
     """A scene to render in place of the file's.
 
-    origin : the file's point that is the origin here: the eye. names : object here → the object in the file that it shows.
+    origin : the file's point that is the origin here: the eye.
+    names : object here → the object in the file that it shows.
     """
 
     scene: bpy.types.Scene
@@ -87,7 +88,11 @@ class Recentered:
 
 @dataclass(frozen=True, eq=False)
 class _Copy:
-    """A geometry of the file, moved. points : (n, 3) float32, as the file has them. anchor : (3,), what was taken off them."""
+    """A geometry of the file, moved.
+
+    points : (n, 3) float32, as the file has them.
+    anchor : (3,), what was taken off them.
+    """
 
     data: Geometry
     points: NDArray[np.float32]
@@ -96,7 +101,11 @@ class _Copy:
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Something in the file, once. data : what is shown. matrix : (4, 4), of `data` relative to the eye."""
+    """Something in the file, once.
+
+    data : what is shown.
+    matrix : (4, 4), of `data` relative to the eye.
+    """
 
     name: str
     data: bpy.types.ID
@@ -108,7 +117,11 @@ class _Placed:
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """The file's camera. actual : the pinhole to render; claimed : what it is said to be. Both in the file's world space."""
+    """The file's camera.
+
+    actual : the pinhole to render.
+    claimed : what it is said to be. Both in the file's world space.
+    """
 
     actual: Pinhole
     claimed: Pinhole
@@ -123,8 +136,8 @@ def recentered(
 ) -> Iterator[Recentered]:
     """Give what a render of this view layer shows, as a scene whose origin is the eye; it is gone at the end of the block.
 
-    ledger : notes what could not come, as `export.survey` does. lit : whether what only other rays than the camera's see comes
-        along, for the levels above geometry.
+    ledger : notes what could not come, as `export.survey` does.
+    lit : whether what only other rays than the camera's see comes along, for the levels above geometry.
 
     Raises
     ------

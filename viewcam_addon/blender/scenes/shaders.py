@@ -150,7 +150,8 @@ def _viewport_color(material: bpy.types.Material) -> Color:
 class Tree:
     """Follows the nodes to a tree of shader nodes, and gathers what they ask for.
 
-    viewport : what stands in for a color that is not modeled. shines : whether it gives off light.
+    viewport : what stands in for a color that is not modeled.
+    shines : whether it gives off light.
     """
 
     def __init__(self, viewport: Color, shines: bool = False) -> None:

@@ -31,8 +31,10 @@ def world_of(
 ) -> tuple[World, tuple[Sun, ...]]:
     """The tracer's world, and suns that are part of it. What it approximates, Cycles is shown likewise.
 
-    scene : evaluated. pictures : receives its images. render : whether it may take the seconds in which another Blender renders
-    what is not modeled; without, what is returned stands for that.
+    scene : evaluated.
+    pictures : receives its images.
+    render : whether it may take the seconds in which another Blender renders what is not modeled; without, what is returned
+        stands for that.
     """
     if world is None:
         return World(), ()

@@ -103,8 +103,8 @@ class Object:
     hidden_from : which rays don't see it (lights.RAYS).
     receivers, blockers : where it shines, names of the objects that it lights, and of those that can stand in that light; None
         is all objects. The eye sees it whatever it lights.
-    color : red, green, blue and alpha, that materials may ask for. random : (n,) float32, 0 to 1, of each instance likewise, or
-        None, which is 0.
+    color : red, green, blue and alpha, that materials may ask for.
+    random : (n,) float32, 0 to 1, of each instance likewise, or None, which is 0.
     """
 
     name: str

@@ -133,8 +133,10 @@ def _ends(pixels: NDArray) -> tuple[float, float]:
 class Color:
     """A color, the same everywhere or times what an image or the mesh's own colors say.
 
-    rgb : factors, not negative. image : key in `Scene.images`, looked up at the mesh's UV, or None. closest : the nearest pixel
-    of the image instead of a linear interpolation between four. vertex : times the mesh's `corner_colors`.
+    rgb : factors, not negative.
+    image : key in `Scene.images`, looked up at the mesh's UV, or None.
+    closest : the nearest pixel of the image instead of a linear interpolation between four.
+    vertex : times the mesh's `corner_colors`.
     """
 
     rgb: tuple[float, float, float]

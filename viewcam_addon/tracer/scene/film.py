@@ -57,10 +57,11 @@ def _bounces(name: str, value: object) -> object:
 
 @dataclass(frozen=True)
 class Film:
-    """filter : over which pixels spread their samples. filter_width : pixels, as Cycles counts
-    them; BOX is one pixel wide.
+    """filter : over which pixels spread their samples.
+    filter_width : pixels, as Cycles counts them; BOX is one pixel wide.
 
-    transparent : whether the world behind the scene leaves pixels see-through. exposure : factor on all light.
+    transparent : whether the world behind the scene leaves pixels see-through.
+    exposure : factor on all light.
     """
 
     filter: str = values.value("BLACKMAN_HARRIS", _filter, "text")

@@ -22,7 +22,11 @@ _MOST = 1 << 20  # angles
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Light by directions. across : about the axis z, up : from −z upwards, degrees, ascending. watts : (across, up)."""
+    """Light by directions.
+
+    across : about the axis z, up : from −z upwards, degrees, ascending.
+    watts : (across, up).
+    """
 
     across: NDArray[np.float64]
     up: NDArray[np.float64]

@@ -88,9 +88,12 @@ def sum_of(
     """The material whose light is the sum of components; without any it is black.
 
     ior : of glass and refraction, inside over outside.
-    components : of `COMPONENTS`. diffuse : albedo of a Lambert surface, both of its sides. emission : radiance, of both sides.
-        mirror : reflectance of a perfect mirror. glass : color of what is reflected and refracted by a clear dielectric, shared
-        out by Fresnel's equations. refraction : color of what is refracted, nothing being reflected.
+    components : of `COMPONENTS`.
+    diffuse : albedo of a Lambert surface, both of its sides.
+    emission : radiance, of both sides.
+    mirror : reflectance of a perfect mirror.
+    glass : color of what is reflected and refracted by a clear dielectric, shared out by Fresnel's equations.
+    refraction : color of what is refracted, nothing being reflected.
     """
     ior = checks.number("ior of a material", ior, LEAST_IOR, MOST_IOR)
     surface: Node | None = None

@@ -123,7 +123,10 @@ KINDS: dict[str, Kind] = {
 class Shader:
     """A type of shader node as Blender has it.
 
-    kind : the node's type. inputs : ours → theirs. words : ours → the property that has the word. neutral : as of `Kind`.
+    kind : the node's type.
+    inputs : ours → theirs.
+    words : ours → the property that has the word.
+    neutral : as of `Kind`.
     """
 
     kind: str
@@ -168,9 +171,10 @@ MOST_DEEP = 250
 class Node:
     """A node, and through its inputs all that feed it.
 
-    type : one of `KINDS`. inputs : (name, value) of those that are not what they are by default. Of a shader a `Color`, a
-    word, or a `Node`: a shader where one belongs, else one that makes values. Of that also whether something holds, and in
-    place of constant colors three numbers, which may be negative.
+    type : one of `KINDS`.
+    inputs : (name, value) of those that are not what they are by default. Of a shader a `Color`, a word, or a `Node`: a shader
+        where one belongs, else one that makes values. Of that also whether something holds, and in place of constant colors
+        three numbers, which may be negative.
     """
 
     type: str

@@ -71,7 +71,8 @@ LIGHT_PATH = (
 class BlenderNode:
     """A node of Blender's that makes a value.
 
-    kind : its type; name : its class, without "ShaderNode".
+    kind : its type.
+    name : its class, without "ShaderNode".
     outputs : the identifier of theirs → our word for it, None where we have one output.
     inputs : ours → the identifier of theirs; where a row leaves one out it is our name as a title.
     words, flags, names, numbers : ours → the property.
@@ -582,7 +583,11 @@ KINDS: dict[str, ValueNode] = {
 
 
 def attributes_of(kind: str, value_of: Callable[[str], Any]) -> Iterator[str]:
-    """The names of the attributes that a node asks meshes for. kind : its type. value_of : input → its value."""
+    """The names of the attributes that a node asks meshes for.
+
+    kind : its type.
+    value_of : input → its value.
+    """
     if kind == "attribute":
         yield value_of("name")
     if kind == "normal_map" and value_of("space") == "tangent" and value_of("uv"):

@@ -17,8 +17,11 @@ LARGEST = 1e18
 
 
 def value(default: Any, check: Callable[[str, Any], Any] | None, *read: Any) -> Any:
-    """Any value. check : its name and what is given → what it is, or InputError. read : how `scene_file` reads it, a method
-    of `Field` and its arguments, or another word."""
+    """Any value.
+
+    check : its name and what is given → what it is, or InputError.
+    read : how `scene_file` reads it, a method of `Field` and its arguments, or another word.
+    """
     return field(default=default, metadata={"check": check, "read": read})
 
 
