@@ -153,7 +153,8 @@ class CameraSync:
     def edited(self, scene: bpy.types.Scene, names: frozenset[str] = ALL) -> None:
         """Move an enabled camera to where its values, edited or not, say; a held roll is carried along (hold.py).
 
-        names : of the values that count, wherever Blender has moved the camera since its last update; the others follow it.
+        names : the names of the values that count where Blender has moved the camera since its last update; the others follow
+            it.
 
         Raises
         ------
@@ -366,8 +367,8 @@ class CameraSync:
     ) -> list["CameraSync"]:
         """Place n cameras that nothing carries by their new values.
 
-        mode : of their rotations.
-        locations : (n, 3).
+        mode : their rotation mode.
+        locations : their places, (n, 3).
         axes : (n, 3, 3), u, v and w as columns.
 
         Returns those that have no such lens.
@@ -719,7 +720,7 @@ def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use
     """The pinhole that `adopt` states, unstated: the camera as it stands, with a look-at point and an up that people would
     choose.
 
-    in_use : whether the look-at point has the distance from the eye that the values say, if they say any.
+    in_use : true to put the look-at point as far from the eye as the values say, if they say anything.
 
     Raises
     ------

@@ -157,7 +157,10 @@ def _drivers(camera_object: bpy.types.Object) -> Iterator[Cause]:
 def keyed(
     camera_object: bpy.types.Object, curves: Callable[[bpy.types.ID], list[bpy.types.FCurve]]
 ) -> list[tuple[bpy.types.ID, str]]:
-    """The camera's own channels that keyframes set: (object or data, data path). curves : of a datablock."""
+    """The camera's own channels that keyframes set: (object or data, data path).
+
+    curves : a function: datablock → its curves.
+    """
     blocks = camera_object, camera_object.data
     return [(block, path) for block in blocks for path in _paths(curves(block)) if _channel(path)[0] not in (None, CENTER)]
 

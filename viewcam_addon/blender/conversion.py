@@ -41,10 +41,10 @@ def place(
 ) -> None:
     """Move a perspective camera to `pinhole`, without reading back.
 
-    pinhole : of the picture that `scene` renders, world space.
-    depsgraph : where to look up what carries the camera; None: that of the scene. A camera whose pose tells what carries it is
-        then placed once more from there, since it may have been far away.
-    parts : those of PARTS to set; the others stay as they are.
+    pinhole : the camera of the picture that `scene` renders, in world space.
+    depsgraph : the depsgraph in which to look up what carries the camera; the scene's where None. A camera whose pose tells
+        what carries it is then placed once more from there, since it may have been far away.
+    parts : the PARTS to set; the others stay as they are.
     parent : `parent_matrix`, where that is known.
 
     Raises

@@ -43,10 +43,10 @@ class Button(enum.Enum):
 class Cause:
     """Something that may keep a camera from being what its four values say.
 
-    clause : who does what, in words.
+    clause : a clause that says what does this, such as "The shift was changed since".
     acts_on : some of EYE, VIEW, DISTANCE, CENTER.
-    remedy : what to do.
-    always : told even where nothing differs yet.
+    remedy : a sentence that says what to do about it.
+    always : true to tell it even where nothing differs yet.
     mended_by : the button that does it, if there is one.
     """
 

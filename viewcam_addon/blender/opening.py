@@ -39,8 +39,8 @@ _Put = Callable[[bpy.types.bpy_struct, str, Any], None]
 def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterator[tuple[Overrides, tuple[str, ...]]]:
     """Open a .blend, or take the file that is open (None), for the time of a job.
 
-    trust : whether what is in it may run and write. A file that is open was opened by Blender, by its own `--enable-autoexec`
-    or preference; here only the rest is decided.
+    trust : true if its scripts may run and write. A file that is open was opened by Blender, by its own `--enable-autoexec` or
+        preference; here only the rest is decided.
 
     Gives a Overrides, and a sentence for each thing that is off and might be seen, or that Blender could not read.
 

@@ -106,8 +106,8 @@ def raw(camera_object: bpy.types.Object) -> Raw | None:
 def animated(before: CameraValues, changed: Raw) -> CameraValues:
     """The values of a camera of which curves alone can have changed any: `before` itself if none has.
 
-    before : values that follow no target.
-    changed : what is held of them now, by `raw`.
+    before : the values before, which follow no target.
+    changed : the numbers that Blender holds of them now, see `raw`.
     """
     rounded, exact, zoom = changed
     zoom = before.zoom if zoom is None else zoom

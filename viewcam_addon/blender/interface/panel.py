@@ -30,7 +30,7 @@ class Notice:
 
     remedy : (operator, its button's text) that mends it and nothing else, if there is one.
 
-    is_mended_by_applying : whether setting the camera by its values again brings them together.
+    is_mended_by_applying : true if setting the camera by its values again mends it.
     """
 
     sentence: str

@@ -16,7 +16,7 @@ class Readout(NamedTuple):
     """A row.
 
     texts : one text, or three for the vectors.
-    exact : what is copied, with all digits and without units.
+    exact : the text that is copied, with all digits and without units.
     """
 
     label: str

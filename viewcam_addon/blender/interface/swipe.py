@@ -50,8 +50,8 @@ void main() {
 class _Swipe:
     """A swipe over one viewport.
 
-    at : the line, from 0 at the left to 1.
-    is_held : whether it is dragged.
+    at : the line's place, from 0 at the left to 1.
+    is_held : true while it is dragged.
     """
 
     def __init__(self, area: bpy.types.Area, scene: bpy.types.Scene) -> None:

@@ -182,7 +182,8 @@ class Checker:
     def both_sides(self, stage: Stage, job: Job, paths: Sequence[Path], everything: Path | None = None) -> Scene:
         """The scene for the tracer, and the engine's pictures at these paths, from one state of the file.
 
-        everything : as of Stage.render, written where there is any such thing. A recentered scene has none of it.
+        everything : a path for the picture with everything, see Stage.render; written where there is more to be seen. A
+            recentered scene has none of it.
         """
 
         exported = stage.export()
@@ -202,8 +203,8 @@ class Checker:
     def _forecast(self, undecided: dict[str, Any], taken: int, latest: int, seconds: float) -> None:
         """Tell how much longer a search for a bias takes.
 
-        taken : samples so far.
-        latest, seconds : of the last round.
+        taken : the number of samples so far.
+        latest, seconds : the samples and the seconds of the last round.
         """
         if self._events:
             left = seconds * (undecided["expected"] - taken) / latest
@@ -220,7 +221,10 @@ class Checker:
 
 
 def _round(job: Job, number: int, samples: int) -> Job:
-    """A round of the search for a bias, of seeds of its own; of any other job itself. samples : of this round."""
+    """A round of the search for a bias, of seeds of its own; of any other job itself.
+
+    samples : the number of samples of this round.
+    """
     if job.find is None:
         return job
     return dataclasses.replace(job, samples=samples, seed=((job.seed or 0) + number * seeds(LEVELS[-1], samples)) % 2**31)

@@ -238,7 +238,8 @@ def _imports() -> Iterator[tuple[str, str]]:
 def _imports_in(tree: bpy.types.NodeTree, outer: Any) -> Iterator[tuple[bpy.types.Node, str | None]]:
     """Each node of the tree that reads a file, and its path, None where that can't be known.
 
-    outer : what gives the tree its inputs, a modifier, or (the group's node, what gives that one's tree its inputs).
+    outer : the giver of the tree's inputs: a modifier, or (the group's node, the giver of the inputs of the tree that this one
+        is in).
     """
     for node in tree.nodes:
         if node.bl_idname.startswith("GeometryNodeImport"):

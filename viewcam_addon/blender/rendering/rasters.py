@@ -55,7 +55,7 @@ def render(
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
 
     engine : "EEVEE" or "WORKBENCH".
-    camera_object, remedies, threads : as cycles.render has them.
+    camera_object, remedies, threads : see cycles.render.
 
     Raises
     ------

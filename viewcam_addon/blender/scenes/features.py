@@ -53,9 +53,9 @@ def note_render(
 class Placed(NamedTuple):
     """An object in the depsgraph, each of the three evaluated.
 
-    evaluated : what is placed, and its data.
+    evaluated : the placed object, and its data.
     real : the object in the file that it comes from.
-    parent : what places it; for an object that is no instance all three are the same.
+    parent : the object that places it; for an object that is no instance all three are the same.
     """
 
     evaluated: bpy.types.Object
@@ -114,7 +114,7 @@ def note_object(
     """Note what a visible surface is beyond its geometry.
 
     slots : its materials.
-    used : the indices of those that are seen.
+    used : the indices of the materials that are seen.
     """
     evaluated, real, parent = placed
     name = placed.name

@@ -35,8 +35,8 @@ _SHEAR = 1e-5
 class _Kind:
     """One of Blender's lights as a lamp of the tracer.
 
-    lamp : what it is there.
-    settings : of its numbers → Blender's property.
+    lamp : the tracer's lamp.
+    settings : name of one of its numbers → Blender's property.
     size : the property that is above 0 where it has a size.
     """
 
@@ -301,7 +301,7 @@ class _LampReader(shaders.Tree):
     of the world, as Cycles has them (shader_setup_from_sample, and the files of intern/cycles/kernel/light).
 
     matrix : (4, 4), the light's space to the world's.
-    uv : makes what its UV is.
+    uv : a function that makes its UV.
     """
 
     def __init__(self, light: bpy.types.Light, matrix: np.ndarray, uv: UVMaker) -> None:

@@ -103,7 +103,7 @@ class _Copy:
 class _Placed:
     """Something in the file, once.
 
-    data : what is shown.
+    data : the datablock that is shown.
     matrix : (4, 4), of `data` relative to the eye.
     """
 
@@ -120,7 +120,7 @@ class _View:
     """The file's camera.
 
     actual : the pinhole to render.
-    claimed : what it is said to be. Both in the file's world space.
+    claimed : the pinhole that it is said to be. Both are in the file's world space.
     """
 
     actual: Pinhole
@@ -136,8 +136,8 @@ def recentered(
 ) -> Iterator[Recentered]:
     """Give what a render of this view layer shows, as a scene whose origin is the eye; it is gone at the end of the block.
 
-    ledger : notes what could not come, as `export.survey` does.
-    lit : whether what only other rays than the camera's see comes along, for the levels above geometry.
+    ledger : receives what could not come, see `export.survey`.
+    lit : true to bring along what only other rays than the camera's see, for the levels above geometry.
 
     Raises
     ------
@@ -164,7 +164,9 @@ def recentered(
 def as_in_file(objects: Iterable[Object], names: Mapping[str, str]) -> tuple[Object, ...]:
     """The objects of an exported `Recentered` as the file's own export has them: by their names there, instances as one object.
 
-    Here each place has an object of its own, and so a name of its own, that the exporter keeps apart. names : of `Recentered`.
+    Here each place has an object of its own, and so a name of its own, that the exporter keeps apart.
+
+    names : see `Recentered`.
     """
     result: dict[tuple, list[Object]] = {}
     for placed in (replace(each, name=names[each.name]) for each in objects):

@@ -74,8 +74,8 @@ class Reading:
     """A Blender material as the tracer has it.
 
     images : key in `Color.image` → the image.
-    texts : of IES files, where nodes are made that show them.
-    reasons : why it is approximated, one clause each, about the material.
+    texts : the texts of IES files, where nodes are made that show them.
+    reasons : clauses about the material that say why it is approximated.
     """
 
     material: Material = PLAIN
@@ -150,8 +150,8 @@ def _viewport_color(material: bpy.types.Material) -> Color:
 class Tree:
     """Follows the nodes to a tree of shader nodes, and gathers what they ask for.
 
-    viewport : what stands in for a color that is not modeled.
-    shines : whether it gives off light.
+    viewport : the color that stands in for one that is not modeled.
+    shines : true if the material gives off light.
     """
 
     def __init__(self, viewport: Color, shines: bool = False) -> None:
