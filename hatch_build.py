@@ -82,7 +82,7 @@ def build_core(platform: str, flags: tuple[str, ...] = (), travels: bool = False
     """The library for a platform, compiled where it is not there yet.
 
     flags : more of them, as sanitizers need.
-    travels : by ziglang, for machines whose C library is older than this one's.
+    travels : true to compile by ziglang, for machines whose C library is older than this one's.
     """
     compiler = system_compiler() if platform == this_platform() and not travels else None
     library, options = _place(platform, compiler, flags)

@@ -54,14 +54,15 @@ _PACKAGES = ("numpy", "embreex", "bpy", "mitsuba")
 class Curve:
     """One method on a chart.
 
-    x, y : as many numbers each. y = 0 lies on the lower edge; nan and inf mean that the method has no answer there.
-    ours : whether it is the method in use.
+    x, y : the points' numbers, as many of each. y = 0 lies on the lower edge; nan and inf mean that the method has no answer
+        there.
+    ours : true for the method in use.
     league : curves compete with those of the same league only (a method that computes in float64 does not compete with what
         Blender stores in float32).
     tie : errors up to this count as equal, the chart's own tie if it is None.
     limit : no method, but what the others of its league must not exceed.
     spread : the least and the most of each x, where it was measured several times.
-    minor : whether it stays in the background.
+    minor : true to draw it in the background.
     """
 
     name: str
@@ -83,11 +84,11 @@ class Curve:
 class Chart:
     """A sweep: one curve for each method.
 
-    name : of its file, without subject and extension.
+    name : the name of its file, without subject and extension.
     reading : a sentence that says what to read off.
     tie : errors up to this count as equal, inf where nothing is judged.
     reverse : the failure lies at small x, and x falls to the right.
-    log_x, log_y : whether the axes are logarithmic.
+    log_x, log_y : true for a logarithmic axis.
     levels : heights that methods are compared at.
     rows : a row for each method, named at its left, with y written at its right: where methods have a point or two each. They
         are what the points of a row are, the first filled and the second hollow.
@@ -190,7 +191,7 @@ def _processor() -> str:
 def draw(charts: Sequence[Chart], path: Path, command: str, measured_on: str = "") -> None:
     """Write charts, one above the other, as one SVG, whole or not at all.
 
-    command : what measures them again, for the captions.
+    command : the command that measures them again, for the captions.
     measured_on : the machine and versions, those here if it is empty.
 
     Raises

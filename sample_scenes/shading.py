@@ -17,7 +17,7 @@ class Shading:
         """Add a shader node; returns the first output that is in use, or that of a name.
 
         kind : its class, without "ShaderNode".
-        inputs : by identifier or name; sockets, numbers, or colors as hex codes.
+        inputs : sockets, numbers, or colors as hex codes, by the input's identifier or name.
         """
         node = self.tree.nodes.new(f"ShaderNode{kind}")
         for name, value in properties.items():
@@ -137,7 +137,7 @@ def outdoors(sun: float = 400.0, elevation: float = 35.0, bearing: float = 0.3, 
     """An HDRI: a sky with a sun that fades at its edge, clouds and brown earth.
 
     sun : its radiance.
-    bearing : of the picture's width.
+    bearing : the sun's place, as a share of the picture's width.
     width : the sun's, in degrees.
     """
     u, v = _grid(256, 128)

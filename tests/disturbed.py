@@ -60,7 +60,7 @@ class Command:
     """A command line of `viewcam batch`.
 
     words : up to its options.
-    variables : of the environment, beside this one's.
+    variables : variables of its environment, beside this one's.
     """
 
     def __init__(self, words: Sequence[str | Path], variables: Mapping[str, str]) -> None:

@@ -325,9 +325,10 @@ def test_an_import_of_what_is_not_there_is_seen():
 
 
 def vague_beginnings(source: str) -> list[str]:
-    """The docstrings that begin with a word after which their subject is still unknown, those of constants among them."""
-    words = "As|How|Of|That of|The same|Those|What|When|Where|Whether|Which|Who"
-    return re.findall(rf'(?m)^ *r?"""((?:{words})\b.*?)(?:"""|$)', source)
+    """The docstrings, and their parameters, that begin with a word after which their subject is still unknown."""
+    words = "As|How|Of|That of|The same|Those|What|When|Where|Whether|Which|Who|Whose"
+    parameters = re.findall(rf'(?m)^ *(?:""")?([\w`*, ]+ : (?:{words.lower()})\b.*)', source)
+    return parameters + re.findall(rf'(?m)^ *r?"""((?:{words})\b.*?)(?:"""|$)', source)
 
 
 NO_NAMES = "found|given|made|one|said|shown|some|told"
@@ -394,6 +395,7 @@ def test_names_say_what_a_value_is_and_are_spelled_as_blender_spells():
 def test_a_docstring_that_begins_without_its_subject_is_seen():
     source = 'def a():\n    """Of a picture."""\n\ndef b():\n    """The area of a picture."""\n\nc = 1\n"""Those\nof it."""\n'
     assert vague_beginnings(source) == ["Of a picture.", "Those"]
+    assert vague_beginnings('    """A box.\n\n    size : what it is.\n    edge : its length.\n') == ["size : what it is."]
 
 
 @pytest.mark.parametrize(

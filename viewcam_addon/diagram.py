@@ -51,8 +51,8 @@ class Diagram:
 def diagram(pinhole: Pinhole, up: Triple, share: float) -> Diagram:
     """The figure of a pinhole.
 
-    up : what the artist calls up; the pinhole's own may have been turned by a roll.
-    share : where the view plane is drawn on the way from the eye (0) to the look-at point (1).
+    up : the artist's up; the pinhole's own may have been turned by a roll.
+    share : the view plane's place in the drawing, between the eye (0) and the look-at point (1).
     """
     towards = np.subtract(pinhole.look_at, pinhole.eye)
     depth = share * math.hypot(*towards.tolist())

@@ -65,7 +65,7 @@ class Frame:
     percentage : whole per cent.
     pixel_aspect_x, pixel_aspect_y : width and height of a pixel, of which only the ratio counts.
     border : (left, bottom, right, top) as fractions of the picture, or None for the whole.
-    crop : whether only the border is kept.
+    crop : true to keep only the border.
 
     Raises
     ------

@@ -50,12 +50,12 @@ class Match:
     """A camera that was found.
 
     pinhole : the camera.
-    precision : how well the pixels were known, one standard deviation.
+    precision : the standard deviation with which the pixels were known.
     error : root mean square in pixels of what is left, 0 where there was nothing to spare.
     distance_between : d with a probability of 68 %, lowest and highest.
     eye_error : one standard deviation along each axis, world units; None where the eye is not asked.
     principal_point_error : one standard deviation of column and row, pixels; None where it was fixed.
-    pixels : by how many pixels the picture moves as each value goes off by one standard deviation: "look_at" (where its middle
+    pixels : the pixels by which the picture moves as each value goes off by one standard deviation: "look_at" (where its middle
         is), "up" (the roll, at the corners), "distance" (the lens, at the corners), and "eye" and "principal_point" where they
         are asked.
     """
@@ -96,7 +96,7 @@ class KnownEdge:
 
     edge : its number among the edges.
     length : world units, > 0.
-    start : where it begins, world space.
+    start : the place where it begins, world space.
     """
 
     edge: int
@@ -118,10 +118,11 @@ def from_edges(
     axis : "X", "Y" or "Z".
     start, end : (2,) pixels, drawn towards where the axis points.
     like : its eye, distance to the look-at point, size and principal point are kept.
-    precision : of start and end, pixels, one standard deviation.
+    precision : the standard deviation of start and end, pixels.
     distance : d in pixels where the lens is known.
-    known : the edge whose length and place say how far away the camera stands, and where; without it its eye is kept.
-    is_principal_point_free : it is asked as well, which takes edges along all three axes; else that of `like` is kept.
+    known : an edge whose length and place say how far away the camera stands, and where; without it its eye is kept.
+    is_principal_point_free : true to find the principal point as well, which takes edges along all three axes; else that of
+        `like` is kept.
 
     Raises
     ------
@@ -185,7 +186,7 @@ def from_points(
     points : (n, 3) world space; at least four in one plane, or six.
     pixels : (n, 2), where they are in the picture.
     like : its size, principal point and distance to the look-at point are kept.
-    precision : of pixels, as for from_edges.
+    precision : the standard deviation of pixels.
     distance : d in pixels where the lens is known.
 
     Raises
@@ -251,10 +252,11 @@ def solve_edges(
     """The cameras of edges, and whether those that were drawn are of a mirrored picture.
 
     ends : (..., n, 2, 2): edge, end, pixels from the principal point.
-    axes : (n,) which of the world's axes each runs along.
-    half : of the picture's larger side, pixels.
+    axes : (n,), the number of the world's axis along which each runs.
+    half : half of the picture's larger side, pixels.
     known_distance : d in pixels where the lens is known.
-    is_principal_point_free : it is asked as well, of edges along all three axes; `ends` count from where it may be.
+    is_principal_point_free : true to find the principal point as well, from edges along all three axes; `ends` count from where
+        it may be.
     """
     present = np.unique(axes)
     scaled = np.concatenate([ends / half, np.ones((*ends.shape[:-1], 1))], axis=-1)
@@ -306,10 +308,10 @@ def solve_points(points: Array, pixels: Array, half: float, is_flat: bool, known
 
     points : (..., n, 3).
     pixels : (..., n, 2) from the principal point.
-    half : see above.
+    half : see `solve_edges`.
 
-    is_flat : whether the points lie in a plane, where four are enough.
-    known_distance : see above.
+    is_flat : true if the points lie in a plane, where four are enough.
+    known_distance : see `solve_edges`.
     """
     center = points.mean(axis=-2, keepdims=True)
     scale = np.sqrt(((points - center) ** 2).sum(axis=-1).mean(axis=-1))[..., None, None]
@@ -501,7 +503,10 @@ def _solved(matrix: Array, vector: Array) -> Array:
 
 
 def _pose_of_a_plane(points: Array, pixels: Array) -> tuple[Array, Array, Array]:
-    """Rotation, R (center − eye) and d of points in a plane, from their homography. pixels : of half the picture."""
+    """Rotation, R (center − eye) and d of points in a plane, from their homography.
+
+    pixels : (..., n, 2), in units of half the picture.
+    """
     _, _, within = np.linalg.svd(points)
     frame = within[..., :2, :]  # two directions in the plane
     flat = np.einsum("...ij,...nj->...ni", frame, points)

@@ -93,7 +93,7 @@ class Pinhole:
     width, height : pixels of the picture, whole numbers ≥ 1.
     principal_point : (c_x, c_y), where the view axis meets the picture, in pixels from its left and its bottom edge. The
         picture's center if it is None.
-    mirrored : whether u points left in the picture.
+    mirrored : true if u points left in the picture.
 
     Raises
     ------
@@ -149,7 +149,7 @@ class Pinhole:
         """Many pinholes of arrays: each as its constructor makes it, in a tenth of the time.
 
         eye, look_at, up : (n, 3) float64, world space.
-        planes : of each.
+        planes : the view plane of each.
 
         Raises
         ------

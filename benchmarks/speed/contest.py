@@ -21,12 +21,12 @@ Error = Callable[[Path], float]
 class Method:
     """One curve.
 
-    side : whose it is, a key of the contestants.
-    sampling : what the parameters are, as the contestant knows it.
-    parameters : of rising effort.
-    ours : whether it is this project's, as it is meant to be used.
-    rival : whether ours has to be ahead of it.
-    job : whether its job is measured too, beside the picture.
+    side : the side that it is on, a key of the contestants.
+    sampling : the kind of the parameters, as the contestant knows it.
+    parameters : parameters of rising effort.
+    ours : true for this project's method, as it is meant to be used.
+    rival : true if ours has to be ahead of it.
+    job : true to measure its job too, beside the picture.
     """
 
     name: str
@@ -82,7 +82,7 @@ def measure(
 
     sides : side → figure → a function of sampling, parameter, seed and path, that returns its seconds and leaves a picture at
         the path.
-    path : where pictures may be written.
+    path : a folder in which pictures may be written.
     """
     tracks: Tracks = {}
     for method in methods:

@@ -43,8 +43,8 @@ class Still:
 class Figure:
     """A duration that is compared.
 
-    key : as contestants know it.
-    name, seconds : as charts say it.
+    key : its name among contestants.
+    name, seconds : its name and its unit on charts.
     """
 
     key: str
@@ -62,7 +62,7 @@ def charts(
 ) -> tuple[Chart, Chart]:
     """The picture, and the job around the errors that are asked for.
 
-    path : where pictures may be written.
+    path : a folder in which pictures may be written.
     """
     enough = max(0.9 * min(still.wanted), reference.error)
     effort = Effort(rounds=1, enough=enough, longest=1) if quick else Effort(rounds=3, enough=enough, longest=8)

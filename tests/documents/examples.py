@@ -62,7 +62,9 @@ WRITTEN = {
 
 @dataclass(frozen=True)
 class Example:
-    """page : relative to the project.
+    """A command, or a block of code, that a page shows.
+
+    page : relative to the project.
     text : a command or a whole block.
     output : the block behind it, which it prints.
     """
@@ -115,10 +117,10 @@ def _commands(block: str) -> list[str]:
 class Reader:
     """A reader who follows the pages: folder for its work, and the Blender that it has.
 
-    blender, viewcam : what these commands are, in a shell's words.
+    blender, viewcam : these commands, in a shell's words.
     python : the command that runs a program with `bpy`.
     environment : more variables.
-    package : what the add-on is called there.
+    package : the add-on's name there.
     extension : the zip to install, where one can be.
     """
 

@@ -425,7 +425,10 @@ def call(operator, where=VIEWPORT, **properties):
 
 
 def until(is_so, what, steps=_STEPS, seconds=0):
-    """Steps until something has happened: none is counted on to take a time. seconds : of each, where it does take some."""
+    """Steps until something has happened: none is counted on to take a time.
+
+    seconds : the seconds of each, where it does take some.
+    """
     for _ in range(steps):
         if is_so():
             return
@@ -454,7 +457,7 @@ def hide_the_sidebar(hidden=True):
 def photograph(where, path, share=100, pointer=None):
     """Save what the screen shows of (left, bottom, width, height), in percent of its size and few colors.
 
-    pointer : where the mouse is, window coordinates, and its arrow is drawn: simulated events move none.
+    pointer : the mouse's place, window coordinates, at which its arrow is drawn: simulated events move none.
     """
     left, bottom, width, height = map(int, where)
     screen = ("import", "-window", "root", "-crop", f"{width}x{height}+{left}+{SCREEN_HEIGHT - bottom - height}", "+repage")

@@ -19,10 +19,10 @@ class Step:
     """One thing that an artist does.
 
     picture : file in docs/images/artists, taken when the step is done.
-    shows : "sidebar", "area" (the largest), "camera view", or where in the largest area, as shares of it: left, bottom, right
-        and top.
+    shows : the part of the window, "sidebar", "area" (the largest), "camera view", or where in the largest area, as shares of
+        it: left, bottom, right and top.
     with_before : the picture shows on its left what was there before.
-    edits : how many undo steps it makes; each is undone and redone.
+    edits : the number of undo steps that it makes; each is undone and redone.
     needs_a_window : there is nothing to it without one.
     """
 

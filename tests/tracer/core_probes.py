@@ -134,7 +134,7 @@ class ScatteredBy:
 
     incoming, direction : (3, n), unit; incoming goes downwards.
     u : (3, n) numbers.
-    behind : whether the floor is met so.
+    behind : true if the floor is met from behind.
     """
 
     def __init__(self, shader, incoming, direction, u, behind=False, version=502) -> None:

@@ -89,9 +89,9 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
     """The camera of a matrix, and what is to be said of it.
 
     matrix : 3 × 4 or 4 × 4, for column vectors, from camera to world as `camera_to_world` has it.
-    plane : its view plane.
-    what : whose matrix, as a sentence names it.
-    scaled : whether the format lets nodes be scaled without scaling the camera.
+    plane : the camera's view plane.
+    what : the matrix' owner, as a sentence names it.
+    scaled : true if the format lets nodes be scaled without scaling the camera.
 
     The look-at point, which no matrix says, lies as far before the eye as the eye from the origin, at least 1: so its rounding
     does not turn the view by more than 2⁻⁵².
@@ -134,7 +134,7 @@ def pinholes(matrices: np.ndarray, planes: Sequence[ViewPlane], whats: Sequence[
     """The results of `pinhole` for many matrices: for files of thousands of poses, in a tenth of the time.
 
     matrices : (n, 3, 4), finite.
-    planes, whats : of each.
+    planes, whats : the view plane and the owner's name of each.
     """
     turn, eye = matrices[:, :, :3], matrices[:, :, 3]
     with np.errstate(all="ignore"):
@@ -157,7 +157,9 @@ def _lengths(vectors: np.ndarray) -> np.ndarray:
 def rotation(rows: Sequence[Sequence[float]], what: str, scaled: bool = False) -> tuple[tuple[Triple, ...], tuple[str, ...]]:
     """The three columns of a rotation's rows, each of length 1, and notes; they may be left-handed.
 
-    In plain floats, which for nine numbers are ten times as fast as arrays. scaled : as of `pinhole`.
+    In plain floats, which for nine numbers are ten times as fast as arrays.
+
+    scaled : see `pinhole`.
 
     Raises
     ------
@@ -250,7 +252,10 @@ def rotation_of(quaternion: Sequence[float], what: str) -> np.ndarray:
 
 
 def rotations_of(quaternions: np.ndarray, whats: Sequence[str]) -> np.ndarray:
-    """(n, 3, 3) of many quaternions (n, 4), finite, as `rotation_of` has them. whats : of each."""
+    """(n, 3, 3) of many quaternions (n, 4), finite, as `rotation_of` has them.
+
+    whats : the owner's name of each.
+    """
     lengths = np.sqrt((quaternions * quaternions).sum(axis=-1))
     for i in np.flatnonzero(~(np.abs(lengths - 1) <= _NO_QUATERNION)):
         _check_length(lengths[i], whats[i])
@@ -319,9 +324,9 @@ def leveled(cameras: Sequence[Camera]) -> list[Camera]:
 def turned_up(cameras: Sequence[Camera], up: Sequence[float], what: str, rise: float = 0.0) -> list[Camera]:
     """The cameras in a world that is turned by the least angle after which `up` is z, and then moved up; each says so.
 
-    up : of length 1.
-    what : it, as the note calls it.
-    rise : along z.
+    up : a vector of length 1.
+    what : `up`, as the note calls it.
+    rise : the distance along z by which they move.
     """
     x, y, z = up
     rows = np.diag([1.0, -1.0, -1.0])  # of the world that is upside down

@@ -940,8 +940,8 @@ def _part_of_picture(
 ) -> tuple[ViewPlane, bool, tuple[str, ...]]:
     """The view plane of three.js' setViewOffset(fullWidth, fullHeight, x, y, width, height), x and y from the top left.
 
-    size : of the picture that shows this part; by default its own.
-    fov_y : radians, of the full picture. As of `_plane`.
+    size : the size of the picture that shows this part; by default the part's own.
+    fov_y : the full picture's vertical angle of view, radians. See `_plane`.
     """
     place = scene.values["view_offset"][1]
     part = _known(scene.values, "view_offset", text, "give six plain numbers: fullWidth, fullHeight, x, y, width, height")

@@ -139,7 +139,7 @@ def comment(pinhole: Pinhole) -> str:
 def beginning(camera: Camera, sign: str) -> list[str]:
     """The lines with which a camera's code begins where that of others stands before or after it: its name and its values.
 
-    sign : of a comment.
+    sign : the characters with which a comment begins.
     """
     return [f"{sign} {KEY} of {json.dumps(camera.name)}", f"{sign} {comment(camera.pinhole)}"]
 

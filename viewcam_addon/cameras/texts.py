@@ -88,7 +88,7 @@ class Film:
 
     width, height : pixels.
     pixel_aspect : width of a pixel over its height.
-    is_stated : whether the text says the pixels.
+    is_stated : true if the text says the pixels.
     """
 
     width: int
@@ -169,7 +169,7 @@ def posed(
 ) -> Pinhole:
     """The pinhole of a look-at and a view plane; the numbers of the look-at stay as they are.
 
-    may_be_singular : whether the program knows the canonical axes of a view along up, as the text's own does.
+    may_be_singular : true if the program knows the canonical axes of a view along up, as ours does.
 
     Raises
     ------

@@ -22,7 +22,9 @@ _OUTSIDE = re.compile(r"[\"'()\[\]{},;]")
 
 
 class Token(NamedTuple):
-    """kind : "name", "number", "sign", or "" at the text's end.
+    """A piece of a text.
+
+    kind : "name", "number", "sign", or "" at the text's end.
     text : its characters.
     start, end : its place.
     """

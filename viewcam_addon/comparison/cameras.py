@@ -32,7 +32,7 @@ class ConversionError:
     """Stated camera against camera read back, in pixels.
 
     largest : the largest displacement over corners, edges and center of the picture, at the depths seen.
-    tolerance : what the float32 storage of matrix and lens allows at that place.
+    tolerance : the displacement that the float32 storage of matrix and lens allows there.
     share : the worst displacement / tolerance.
     """
 

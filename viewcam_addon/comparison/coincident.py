@@ -98,9 +98,10 @@ MakeCoincidentLight = Callable[[], CoincidentLight]
 class TakenOut:
     """The pixels that were taken out of a comparison of light.
 
-    pixels : (height, width) bool, that show surfaces in one place or are lit by them, or past what not all kinds of rays see.
-    pairs, seen_otherwise : as of CoincidentLight.
-    share_of_lit : of the pixels that have light on either side, 0 to 1.
+    pixels : (height, width) bool, true for pixels that show surfaces in one place or are lit by them, or past what not all
+        kinds of rays see.
+    pairs, seen_otherwise : see CoincidentLight.
+    share_of_lit : their share among the pixels that have light on either side, 0 to 1.
     """
 
     pixels: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((1, 1), bool))

@@ -33,9 +33,9 @@ def not_modeled(
 ) -> NotModeled:
     """The part of a picture that is not modeled.
 
-    names : of the objects that are not.
-    pixels : name → (height, width), the pixels that show it, of those that are surfaces in the scene.
-    reference, tests : what was compared.
+    names : the names of the objects that are not modeled.
+    pixels : name → (height, width), true for pixels that show the object, of those that are surfaces in the scene.
+    reference, tests : the pictures that were compared.
     everything : Cycles' picture of the seed of the first test, with as many samples, or None where there is none.
     pinhole : the camera where light was compared, None where geometry was.
     """

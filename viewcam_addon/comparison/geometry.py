@@ -60,9 +60,9 @@ def compare(
     pinhole : the camera that traced the reference.
     surfaces_at : re-traces sub-pixel positions of the reference's scene; without it no mismatch can be explained.
     stated : the camera as the four values state it; with it the conversion's error is measured too.
-    origin : that of both pictures, in the world.
-    renderer : the test's.
-    partial : whether the test may lack passes, all but one of Depth, Distance and Position; they are not judged then.
+    origin : the point of the world from which both pictures count.
+    renderer : the renderer that made the test picture.
+    partial : true to let the test lack passes, all but one of Depth, Distance and Position; they are not judged then.
 
     Whatever float32 can hold may stand in the pictures: what can't be computed with is not within tolerance.
 

@@ -136,7 +136,7 @@ class HypothesisTest:
 def run(sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: float) -> tuple[HypothesisTest, ...]:
     """All sizes, asked so that chance makes any of them fail with the probability `level` at most.
 
-    allowed : what rounding may do to these sides.
+    allowed : the allowance for rounding on these sides.
     freedom : the degrees of freedom of both sides' variances.
     level : shared out evenly over the sizes, and over the tiles and channels of each after Šidák.
     """

@@ -56,8 +56,8 @@ def compare(
     """Compare one reference with one test picture or with several of different seeds.
 
     pinhole : the camera of the reference, which must have the passes Combined and Depth.
-    test_samples : of each test picture, where that is not what its file tells (Cycles counts a first sample that it leaves
-        out).
+    test_samples : the samples of each test picture, where its file does not tell them (Cycles counts a first sample that it
+        leaves out).
     make_coincident : traces the light that is a renderer's choice, which is taken out; asked where the pictures differ.
     trace_anew : traces the reference with SEEDS other seeds; asked where they still differ, and not beyond doubt.
     false_alarms : the probability, at most, that two sides of the same light are called different.
@@ -104,9 +104,9 @@ def compare(
 class QuantityComparison:
     """The arrays that the verdict stands on.
 
-    combined : both sides of it.
-    samples : of the reference, and of each test picture.
-    rows, equal, maps : as in RadianceComparison, but no map of what an eye sees.
+    combined : both sides of Combined.
+    samples : the samples of the reference, and of each test picture.
+    rows, equal, maps : see RadianceComparison; but there is no map of what an eye sees.
     """
 
     combined: Sides
@@ -129,7 +129,7 @@ def compare_quantities(
 ) -> QuantityComparison:
     """`compare` without what decides nothing.
 
-    rest : what is compared where light is a renderer's choice.
+    rest : the rest that is compared where light is a renderer's choice.
     anew : the reference with several other seeds.
     """
     quantities = list(all_sides(reference, tests, anew))

@@ -43,7 +43,7 @@ class Legend:
     strip : the scale, as a data: URI.
     figures : numbers along it, from end to end, each after its place, 0 to 1.
     limits : words for what is allowed, after their places.
-    unit : of the numbers.
+    unit : the unit of the numbers.
     """
 
     strip: str
@@ -56,8 +56,8 @@ class Legend:
 class Tab:
     """One of the pictures to choose from.
 
-    name : in the page's address.
-    words : what it shows.
+    name : its name in the page's address.
+    words : the button's text, which says what it shows.
     caption : a sentence.
     pictures : data: URIs by side, "image", or "reference" and "test", which are swapped.
     """
@@ -82,7 +82,7 @@ def write(folder: str | os.PathLike[str], template: str, values: Mapping[str, An
     """Write folder/index.html and return its path.
 
     template : report_geometry.html or report_light.html.
-    values : what it names, those of `common` among them.
+    values : values for the names in it, those of `common` among them.
 
     Raises
     ------
@@ -108,9 +108,9 @@ def common(
 ) -> dict[str, Any]:
     """The values that both reports give report.html; the views, the crops and their own parts are added to it.
 
-    comparison : whose `answer` is told, with its `pinhole`, `stated` and `renderer`.
+    comparison : the comparison whose `answer` is told, with its `pinhole`, `stated` and `renderer`.
     ledger : the scene's entries, with `object`, `status` and `reason`.
-    command : what repeats the comparison.
+    command : the command that repeats the comparison.
     origin : the point of the world that the camera's coordinates are counted from.
     """
     answer = comparison.answer
@@ -181,8 +181,10 @@ def _strip(scale: NDArray[np.uint8] | None = None) -> str:
 
 
 def _camera(pinhole: Pinhole, stated: Pinhole | None, origin: Sequence[float]) -> dict[str, Any]:
-    """pinhole : as it was read back.
-    stated : as it was typed, None where nobody did.
+    """The rows of the page's table of the camera.
+
+    pinhole : the camera as it was read back.
+    stated : the camera as it was typed, None where nobody did.
     """
     angle = f"{math.degrees(math.asin(min(pinhole.sine_to_up, 1.0))):.4g}° from up"
     return {
@@ -225,7 +227,7 @@ def write_geometry(
     """Write folder/index.html and return its path.
 
     ledger : the scene's entries, with `object`, `status` and `reason`.
-    command : what repeats the comparison.
+    command : the command that repeats the comparison.
 
     Raises
     ------
@@ -297,7 +299,7 @@ def write_light(
     """Write folder/index.html and return its path.
 
     tests : the pictures that were compared, in any number.
-    ledger, command : as for common.
+    ledger, command : see common.
 
     Raises
     ------

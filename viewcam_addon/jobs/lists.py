@@ -47,10 +47,10 @@ class Cell(NamedTuple):
 class Row:
     """One row.
 
-    place : "line 17" of a CSV, say.
-    kind : "column" or "key".
-    cells : by column, those that say something.
-    columns : all that the row could have had.
+    place : its place in the list, "line 17" of a CSV, say.
+    kind : the word for a field in this list, "column" or "key".
+    cells : the cells that say something, by column.
+    columns : the columns that the row could have had.
     excused : fields whose lack is told elsewhere.
     """
 

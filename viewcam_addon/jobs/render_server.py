@@ -43,7 +43,10 @@ class _Served:
         self._events = _Asker()
 
     def answer(self, request: dict[str, Any], tell: child_process.Tell) -> Any:
-        """request : {what is asked for: its arguments}."""
+        """The answer to one request of the client.
+
+        request : {what is asked for: its arguments}.
+        """
         ((name, arguments),) = request.items()
         self._events.tell = tell
         return _ANSWERS[name](self, **arguments)

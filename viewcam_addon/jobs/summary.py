@@ -63,11 +63,11 @@ def results(folder: Folder, settings: Mapping[str, str], outputs: Outputs, error
 class Summary:
     """A batch at its end.
 
-    rendered : how many shots this run rendered.
-    kept : were there already.
-    elsewhere : another batch did meanwhile.
-    seconds : it took.
-    signal : the number of the one that ended it.
+    rendered : the number of shots that this run rendered.
+    kept : the number that were there already.
+    elsewhere : the number that another batch did meanwhile.
+    seconds : the seconds that it took.
+    signal : the number of the signal that ended it.
     finished : the time of its end.
     """
 

@@ -113,9 +113,9 @@ class Labels:
 
     image : the passes that were asked for, rows from the bottom, with the camera; docs/labels.md says what each holds.
     instances : plain JSON values of each instance of which a pixel is shown or, with amodal masks, would be if it stood alone,
-    or with coverage is shown in part.
-    lost : of the other frames, "forward" and "backward": names of visible objects that have no counterpart there.
-    lens : what bends the picture.
+        or with coverage is shown in part.
+    lost : "forward" and "backward", the other frames → names of visible objects that have no counterpart there.
+    lens : the lens that bends the picture.
     """
 
     image: Image
@@ -138,10 +138,10 @@ def label(
 
     The other parameters are those of api.label.
 
-    keepers : of what other scenes share with it.
-    lens : what bends the picture of all frames, whose cameras have its own plane.
-    annotations : by the names of objects their `category`, `keypoints`, which are (x, y, z) in the object's coordinates by
-        their names, and `bones`: of a keypoint's name that of the one which it hangs on.
+    keepers : keep what other scenes share with this one.
+    lens : the lens that bends the picture of all frames, whose cameras have its own view plane.
+    annotations : an object's name → its `category`, its `keypoints`, which are (x, y, z) in the object's coordinates by their
+        names, and its `bones`: a keypoint's name → the name of the one that it hangs on.
     """
     if unknown := [kind for kind in kinds if kind not in KINDS]:
         raise InputError(f"there is no label {unknown[0]!r}: give some of {', '.join(KINDS)}")

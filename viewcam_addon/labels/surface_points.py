@@ -42,9 +42,9 @@ EVENLY = 0.7548776662466927, 0.5698402909980532
 class Sampled(NamedTuple):
     """Points, each array with as many rows.
 
-    source : which picture they come from.
-    depth : there.
-    state : as of `planes`.
+    source : the picture that each point comes from.
+    depth : the point's depth in that picture.
+    state : see `planes`.
     """
 
     positions: Array
@@ -59,7 +59,7 @@ def planes(
 ) -> tuple[Array, NDArray[np.int64], NDArray[np.float32]]:
     """(height, width) each, rows from the top: depth; which instance in which state, −1 where nothing is; its id.
 
-    states : of all pictures, numbered as they are met.
+    states : the states in all pictures, numbered as they are met.
     state_of : the text of an instance's state.
 
     Raises InputError if the picture has no depth or masks.
@@ -93,8 +93,8 @@ def sampled(
 ) -> Sampled:
     """Points of a picture, as many as are asked for if it shows so much, evenly over what it shows.
 
-    number : the picture's.
-    depth, state : as of `planes`.
+    number : the picture's number.
+    depth, state : see `planes`.
     colors : (height, width, 3), rows from the top.
     """
     rows, columns = np.nonzero(state >= 0)

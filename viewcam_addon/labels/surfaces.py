@@ -115,7 +115,10 @@ class Keeper:
 
 
 class Keepers:
-    """The keepers of the last few scenes. most : how many."""
+    """The keepers of the last few scenes.
+
+    most : the number of keepers.
+    """
 
     def __init__(self, most: int = 1, threads: int | None = None) -> None:
         self._most, self._threads = most, threads
@@ -133,10 +136,10 @@ class Surfaces:
 
     depth : (height, width) planar depth z = −w·(P − e), inf where nothing is.
     instance, primitive : (height, width), −1 there: indices into `instances` and of the geometry's triangles or spheres.
-    passes : those of level `geometry` that were named when it was made, of the same points.
+    passes : passes of level `geometry` at the same points, those that were named when it was made.
 
-    lens : what bends the picture, whose own plane the scene's camera then has; each of its pixels is one ray through the place
-    that the lens shows there.
+    lens : the lens that bends the picture, whose own view plane the scene's camera then has; each of its pixels is one ray
+        through the place that the lens shows there.
     """
 
     def __init__(
@@ -237,7 +240,7 @@ class Surfaces:
         """True where the camera sees points of its scene's surfaces: (n,) bool, False beside the picture and beyond the clip.
 
         points : (n, 3), world space, each on the primitive of the instance that it is given with.
-        slack : how much nearer than a point, as a share of its depth, its own surface may be found.
+        slack : the distance by which its own surface may be found nearer than a point, as a share of its depth.
         """
         column, row, depth = self.project(points)
         with np.errstate(invalid="ignore"):

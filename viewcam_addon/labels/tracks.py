@@ -31,9 +31,9 @@ POINTS = 2048
 def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
     """Write the tracks of points that each picture shows, whole or not at all.
 
-    folder : of label files that have depth and masks, their pictures in the order of their names.
-    output : an .npz.
-    points : how many there are, an equal share of each picture, evenly over what it shows; fewer where pictures show less.
+    folder : a folder of label files that have depth and masks, their pictures in the order of their names.
+    output : the .npz to write.
+    points : the number of points, an equal share of each picture, evenly over what it shows; fewer where pictures show less.
 
     Returns how many pictures and points there are, and how often a picture shows one.
 

@@ -37,8 +37,8 @@ class Watcher(Protocol):
 class Progress:
     """A watcher that tells `progress`, with the share of the rows that are done, at each whole percent.
 
-    tell : is told the event's name and fields.
-    rows : how many the picture has.
+    tell : called with the event's name and fields.
+    rows : the number of the picture's rows.
     """
 
     def __init__(self, tell: Callable[..., None], rows: int) -> None:

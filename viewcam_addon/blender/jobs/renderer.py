@@ -193,7 +193,7 @@ class BlenderRenderer:
 
         has_picture : true to check camera and geometry of the picture that was just rendered; false to check the job's engine
             at the job's level.
-        written, keep : for the latter, see Checker.check.
+        written, keep : see Checker.check; for the latter only.
 
         Raises
         ------

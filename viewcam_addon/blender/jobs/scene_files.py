@@ -23,7 +23,9 @@ _THINGS = [each.name for each in fields(Scene) if each.name not in ("camera", "s
 
 @dataclass(frozen=True, eq=False)
 class Export:
-    """state : Blender's state when the scene was exported.
+    """An exported scene, as long as Blender's state is the same.
+
+    state : Blender's state when the scene was exported.
     ledger : the export's ledger, with the remedies for Cycles.
     """
 

@@ -46,7 +46,9 @@ _OF_DATA = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height")
 
 @dataclass(frozen=True)
 class ImportedCameras:
-    """objects : the new cameras.
+    """The result of `import_cameras`.
+
+    objects : the new cameras.
     pictures : the number of cameras that have their picture as background.
     notes : sentences for a reader, each once.
     """

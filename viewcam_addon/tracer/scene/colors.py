@@ -67,7 +67,10 @@ class Picture:
 
     @classmethod
     def compact(cls, values: NDArray[np.float32], srgb: bool = False) -> "Picture":
-        """The picture of some float32 values, in as few bytes as hold each of them to the bit. values : as `pixels`."""
+        """The picture of some float32 values, in as few bytes as hold each of them to the bit.
+
+        values : an array like `pixels`.
+        """
         exact = (_exactly(values, dtype) for dtype in _SMALLEST_FIRST)
         return cls(next(pixels for pixels in exact if pixels is not None), srgb)
 

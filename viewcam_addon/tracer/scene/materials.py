@@ -23,7 +23,7 @@ class Material:
     """The light of a surface.
 
     surface : its shader, None where it gives no light at all.
-    transparent_shadow : whether shadow rays go through it where it is transparent.
+    transparent_shadow : true if shadow rays go through it where it is transparent.
     displacement : a node that makes a height, world units, whose slope turns the normals; nothing moves.
     """
 
@@ -87,8 +87,8 @@ def sum_of(
 ) -> Material:
     """The material whose light is the sum of components; without any it is black.
 
-    ior : of glass and refraction, inside over outside.
-    components : of `COMPONENTS`.
+    ior : the index of refraction of glass and refraction, inside over outside.
+    components : their colors, by the names in `COMPONENTS`.
     diffuse : albedo of a Lambert surface, both of its sides.
     emission : radiance, of both sides.
     mirror : reflectance of a perfect mirror.

@@ -29,9 +29,9 @@ class Kind:
     inputs : name → its default; a number, a color, words to choose from (the first is the default), or None for a shader; of a
         node that makes values also what value_nodes.py says.
     scatters : the kinds of bounces (film.Bounces) that its light is counted as.
-    is_value : whether it makes a value, and is no shader.
+    is_value : true if it makes a value, and is no shader.
     node : the type of Blender's shader node, where it is not BSDF_ and our name.
-    names : of inputs that Blender calls otherwise → what, or their number.
+    names : our name of an input → Blender's, or its number, where they differ.
     neutral : Blender's name of an input that is not modeled → the value without which the shader is only approximated.
     """
 
@@ -126,7 +126,7 @@ class Shader:
     kind : the node's type.
     inputs : ours → theirs.
     words : ours → the property that has the word.
-    neutral : as of `Kind`.
+    neutral : see `Kind`.
     """
 
     kind: str

@@ -73,13 +73,13 @@ class BlenderNode:
 
     kind : its type.
     name : its class, without "ShaderNode".
-    outputs : the identifier of theirs → our word for it, None where we have one output.
-    inputs : ours → the identifier of theirs; where a row leaves one out it is our name as a title.
-    words, flags, names, numbers : ours → the property.
-    spelled : the words that are others than ours in capitals → what they are.
-    fixed : property → what it must be.
-    before : of inputs that older versions lack, what these compute with.
-    unnamed : what an empty name stands for.
+    outputs : the identifier of Blender's output → our word for it, None where we have one output.
+    inputs : our name of an input → the identifier of Blender's; where a row leaves one out it is our name as a title.
+    words, flags, names, numbers : our name of an input → the property.
+    spelled : the words that are not ours in capitals → Blender's.
+    fixed : property → the value that it must have.
+    before : the values that older versions compute with, of inputs that they lack.
+    unnamed : the name that an empty one stands for.
     """
 
     kind: str
