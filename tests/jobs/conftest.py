@@ -55,6 +55,8 @@ class Renderer:
         if kind == "slow" and first:
             note("waits", shot.name)
             time.sleep(60)
+        if kind == "steady":
+            time.sleep(0.5)
         if kind == "bad":
             raise InputError(f"{{shot.name}} has no light: add some")
         if kind == "full":

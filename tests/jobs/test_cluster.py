@@ -173,7 +173,7 @@ def test_a_shot_that_ends_one_worker_after_another_fails_and_the_rest_go_on(stan
 
 def test_a_full_disk_ends_the_batch(stand_in, machines, blend, tmp_path):
     ear = Ear()
-    summary = run_on(machines, blend, tmp_path / "out", shots("full", *(f"shot_{i}" for i in range(40))), ear)
+    summary = run_on(machines, blend, tmp_path / "out", shots("full", *(f"steady_{i}" for i in range(40))), ear)
     assert summary.exit_status == 4 and summary.counts["left"] > 20
     (failure,) = ear.all("shot_failed")
     assert "No space left on device" in failure["error"]
