@@ -29,7 +29,7 @@ inline int dominant_axis(double x, double y, double z) {
 
 // The largest components of four directions, given their sizes.
 struct DominantAxis {
-    long4 x, y;  // whether it is that one
+    long4 x, y;  // true if it is that one
 
     explicit DominantAxis(const Vec3x4& size)
         : x(long4(size.x > size.y) & long4(size.x > size.z)), y(~long4(size.x > size.y) & long4(size.y > size.z)) {}

@@ -86,7 +86,7 @@ struct alignas(64) Packet : BoxRays<PACKET> {
         source[i] = other.source[ray];
     }
 
-    // What the rays have in common, and the last eight filled up with rays that meet nothing.
+    // Computes what the rays have in common, and fills up the last eight with rays that meet nothing.
     void close() {
         shear.z = key[0] >> 3;
         shear.x = (shear.z + 1) % 3;

@@ -1,4 +1,4 @@
-// What closures become at a point of a surface: the BSDF, a sum of lobes, what it gives off and what it lets straight through.
+// The BSDF that closures become at a point of a surface: a sum of lobes, what it gives off and what it lets straight through.
 //
 // A path takes one lobe only, chosen in proportion to the lobes' colors, and its weight is divided by that share: where there
 // is one lobe, it is taken and nothing is random. Glass is two lobes, shared out by Fresnel's equations.
@@ -92,8 +92,8 @@ template <class T> class BSDFOf {
         return sum;
     }
 
-    // What of light from a unit direction is sent on to where the path came from, cosine included, by lobes of some kinds.
-    // weight(kind, pdf): what of it counts, by the density with which `sample` chooses that lobe and this direction.
+    // The share of light from a unit direction that lobes of some kinds send on to where the path came from, cosine included.
+    // weight(kind, pdf): the part of it that counts, by the density with which `sample` chooses that lobe and this direction.
     template <class Weight> ScatteredLightOf<T> eval(Vec3Of<T> to_light, Flags<T> kinds, Weight&& weight) const {
         ScatteredLightOf<T> sum;
         for (int i = 0; i < count_; i++)

@@ -1,4 +1,4 @@
-// What sampling a BSDF, or one lobe of it, returns.
+// The sample of a BSDF, or of one lobe of it.
 #pragma once
 #include "../ray.h"
 

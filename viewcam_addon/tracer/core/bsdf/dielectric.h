@@ -1,7 +1,7 @@
 // Clear surfaces: Snell's refraction, and Fresnel's share of what is reflected.
 //
-// What Cycles makes of smooth, perfectly clear surfaces (measured with 4.2, 5.0 and 5.2) is this: Fresnel's equations as they
-// are, and no factor for the narrower cone of light in glass.
+// Cycles' smooth, perfectly clear surfaces (measured with 4.2, 5.0 and 5.2) are these: Fresnel's equations as they are, and no
+// factor for the narrower cone of light in glass.
 #pragma once
 #include "specular.h"
 

@@ -11,7 +11,7 @@ template <class T> struct LambertOf {
     static constexpr bool DELTA = false, IS_DIFFUSE = true;
     Vec3Of<T> color, normal;
 
-    // What of light from a unit direction is sent on, cosine included.
+    // The share of light from a unit direction that is sent on, cosine included.
     Vec3Of<T> eval(Vec3Of<T> to_light) const { return color * pdf(to_light); }
     T pdf(Vec3Of<T> to_light) const { return max(dot(normal, to_light), T{}) / PI; }
     LobeSampleOf<T> sample(Vec2Of<T> u) const {

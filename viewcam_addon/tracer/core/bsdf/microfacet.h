@@ -62,7 +62,7 @@ template <class T> struct MicrofacetReflectionOf : MicrofacetLobeOf<T> {
 };
 using MicrofacetReflection = MicrofacetReflectionOf<double>;
 
-// What the Fresnel term does not reflect, refracted. ratio: as of `fresnel`.
+// Refraction of what the Fresnel term does not reflect. ratio: see `fresnel`.
 //
 // As in Cycles, light from a lamp also comes in by half vectors that no facet can have which sends light down: so do the pictures
 // that this is compared with. What is found by scattered rays has none of it.

@@ -41,7 +41,7 @@ template <class T> struct OrenNayarOf {
     }
 
    private:
-    // What is reflected once of light that comes under a cosine.
+    // The share of light that comes under a cosine and is reflected once.
     T albedo_under(T cosine) const {
         T sine = sqrt(max(1.0 - cosine * cosine, T{}));
         T g = sine * (acos(cosine) - 2.0 / 3 - sine * cosine) + 2.0 / 3 * (sine / cosine) * (1.0 - sine * sine * sine);

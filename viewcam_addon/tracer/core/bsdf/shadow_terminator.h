@@ -13,7 +13,7 @@ template <class T> struct ShadowTerminatorOf {
     Vec3Of<T> smooth;  // the normal without bumps
     bool by_facets, of_all;  // since 4.3; since 5.0, of light that is not diffuse, too
 
-    // What is left of light from a direction that a lobe with a bumped normal scatters.
+    // The share that is left of light from a direction, scattered by a lobe with a bumped normal.
     T left(Vec3Of<T> bumped, bool is_diffuse, Vec3Of<T> to_light) const {
         T flat = dot(smooth, to_light), tilt = dot(smooth, bumped), light = dot(bumped, to_light), none{}, all = splat<T>(1);
         if (!is_diffuse) return select(Mask<T>((of_all ? flat * tilt * light : flat * light) < 0.0), none, all);

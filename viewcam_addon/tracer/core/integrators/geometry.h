@@ -36,8 +36,8 @@ struct GeometryHits {
     uint32_t *object, *primitive;
 };
 
-// What up to 64 rays met, written as Cycles writes it, also where that is nothing. ray_of(i), hit_of(i): each. pixels: where in
-// the planes.
+// Writes what up to 64 rays met as Cycles writes it, also where that is nothing. ray_of(i), hit_of(i): each. pixels: their
+// places in the planes.
 template <class RayOf, class HitOf>
 inline void write_geometry(const Scene& scene, const RayOf& ray_of, const HitOf& hit_of, int count, const GeometryPasses& passes, const size_t* pixels) {
     using enum GeometryPasses::Pass;

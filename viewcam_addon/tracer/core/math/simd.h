@@ -158,7 +158,7 @@ template <class T> inline T splat(double x) {
         return x;
 }
 template <class T> inline Vec3Of<T> splat(Vec3 v) { return {splat<T>(v.x), splat<T>(v.y), splat<T>(v.z)}; }
-// What a comparison of these gives.
+// The type of a comparison of these.
 inline Vec3 select(bool mask, Vec3 a, Vec3 b) { return mask ? a : b; }
 template <class T> using Mask = std::conditional_t<std::is_same_v<T, double4>, long4, bool>;
 // A set of flags for a number, or for each of four; those of `flags` where a mask holds.

@@ -51,8 +51,8 @@ struct ImageNode {
         if (!(size > 0)) return {};
         return {place.x != 0 || place.y != 0 ? 0.5 - round : 0, 1 - acos(place.z / size) / PI};
     }
-    // What is seen from the three axes, mixed by how the surface is turned: one in the corners of the triangle of all turns, two at its
-    // sides, three in its middle.
+    // The colors that are seen from the three axes, mixed by how the surface is turned: one in the corners of the triangle of
+    // all turns, two at its sides, three in its middle.
     template <class LookUp> Vec3 from_sides(const ShadingPoint& at, Vec3 place, LookUp&& color) const {
         Vec3 normal = at.object ? at.object->to_world.transposed(at.point.shading) : at.point.shading, n = abs(normal);
         n = n / (n.x + n.y + n.z);

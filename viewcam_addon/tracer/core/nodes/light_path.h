@@ -1,4 +1,4 @@
-// What kind of ray has come to a surface, and how.
+// The kind of ray that has come to a surface, and the way it came.
 #pragma once
 #include "math.h"
 

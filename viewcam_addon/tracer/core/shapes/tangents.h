@@ -104,7 +104,7 @@ class TangentsOfMesh {
             for (size_t k = i + 1; !taken[i] && k < edges.size() && edges[k].low == edges[i].low && edges[k].high == edges[i].high; k++)
                 if (!taken[k] && vertex_[edges[k].corner] != vertex_[edges[i].corner])  // they run against each other
                     taken[i] = taken[k] = true, shared.push_back({edges[i].corner, edges[k].corner});
-        // What has no side of its own is on that of a neighbor.
+        // A triangle that has no side of its own is on that of a neighbor.
         for (auto [a, b] : shared)
             for (auto [from, to] : {std::pair{a / 3, b / 3}, std::pair{b / 3, a / 3}})
                 if (!turns_[to]) turns_[to] = turns_[from];
