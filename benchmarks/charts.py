@@ -40,13 +40,13 @@ _MARKERS = "osv^Dd<>"
 _OURS = "#0b3d91"
 _OURS_STYLES = tuple((_OURS, marker, line) for marker, line in zip("osD^", ("-", "--", "-.", ":"), strict=True))
 _INK, _BACKGROUND, _FAINT, _GRID = "#1f2328", "#ffffff", "#656d76", "#e5e8eb"
-# What these are where pages are dark. A picture on a page knows what its reader prefers, and not the page's own colors: so it
-# brings its paper along.
+# The colors on dark pages. A picture on a page knows what its reader prefers, and not the page's own colors: so it brings its
+# paper along.
 _IN_THE_DARK = {_INK: "#e6edf3", _BACKGROUND: "#0d1117", _FAINT: "#9198a1", _GRID: "#30363d", _OURS: "#58a6ff"}
 _LIGHTER = ("#ff9a3c", "#4cc24c", "#ff7b72", "#bc8cff", "#c69083", "#f19cd2", "#cfd03a", "#39cfe0")
 _IN_THE_DARK |= dict(zip(_COLORS, _LIGHTER, strict=True))
 _FEW = 300  # times the least x, up to which the greatest leaves room for numbers between the powers of ten
-# What a measurement stands on, as far as it is installed.
+# Packages that a measurement depends on, as far as they are installed.
 _PACKAGES = ("numpy", "embreex", "bpy", "mitsuba")
 
 

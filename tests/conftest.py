@@ -19,7 +19,7 @@ import pytest
 # tests/real_blender drives a Blender that is installed beside: make test-blender says which.
 collect_ignore = [] if os.environ.get("BLENDER") else ["real_blender"]
 
-# The same examples in every run, so that a failure in CI is the same failure here; `pytest --hypothesis-profile=explore` looks
+# Every run has equal examples, so that a failure in CI is the same failure here; `pytest --hypothesis-profile=explore` looks
 # for new ones, `quick` has few. No clocks: Blender's first call is slow, and so is a machine with other work.
 NO_CLOCK = {"deadline": None, "suppress_health_check": [hypothesis.HealthCheck.too_slow]}
 REPEATABLE = {**NO_CLOCK, "derandomize": True, "database": None}

@@ -27,7 +27,7 @@ from typing import BinaryIO
 
 from .errors import FullDiskError, InputError
 
-# What a system says when no more fits: on the disk, into a user's share of it, into the largest file that it allows.
+# The errors of a system when no more fits: on the disk, into a user's share of it, into the largest file that it allows.
 _FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG}
 
 _UNLOCKED_AT_MOST = 60.0

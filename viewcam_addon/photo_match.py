@@ -279,7 +279,7 @@ def solve_edges(
         distance = np.full_like(distance, known_distance / half)
     seen = vanishing * np.stack([1 / distance, 1 / distance, -np.ones_like(distance)], axis=-1)[..., None, :]
     seen /= np.linalg.norm(seen, axis=-1, keepdims=True)
-    # What moves along an axis moves in the picture by V − p W, where (V, W) is its vanishing point.
+    # A step along an axis is one in the picture by V − p W, where (V, W) is its vanishing point.
     along = scaled[..., 1, :2] - scaled[..., 0, :2]
     for k, axis in enumerate(present):
         of = axes == axis

@@ -56,7 +56,7 @@ class Point:
         return math.sqrt(statistics.fmean(error * error for error in self.errors))
 
 
-# How many times the longest picture a method's first may take.
+# The times of the longest picture that a method's first one may take at most.
 _HOPELESS = 3
 
 Tracks = dict[Method, list[Point]]

@@ -23,7 +23,7 @@ SCENES = Path(__file__).resolve().parents[2] / "sample_scenes"
 
 _SUZANNES = {"suzannes": suzannes.six, "three suzannes": suzannes.three}
 
-# Of a pixel, where a noise threshold is asked for: Blender's own most.
+# The most samples of a pixel where a noise threshold is asked for: Blender's own limit.
 _MOST_SAMPLES = 4096
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from ..charts import Chart, Curve
 from .contest import Method, Point, Tracks
 
-# How much smaller an error a curve may be followed on to, and how much it must have fallen just before.
+# The factors by which a curve may be followed on to a smaller error, and by which it must have fallen just before.
 _FURTHEST, _STEEP = 4, 1.3
 
 

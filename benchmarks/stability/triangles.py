@@ -31,7 +31,7 @@ Array = NDArray[np.floating]
 
 # Some twenty roundings of float64 in a depth, of which the worst of a hundred are looked at.
 TIE = 16 * 2.0**-53
-# What half a unit in the last place of the ray's direction does.
+# The error by half a unit in the last place of the ray's direction.
 LAST_BIT = 2.0**-53
 # A share of a few hundred rays that none makes.
 SHARE_TIE = 1e-3

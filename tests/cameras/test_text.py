@@ -16,7 +16,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.scene import Scene, scene_file
 
 POSE = {"eye": (7.0, -6.0, 4.0), "look_at": (0.0, 0.0, 1.0), "up": (0.0, 0.0, 1.0)}
-# Of which nothing is like POSE: what stands where a text says nothing.
+# Stands where a text says nothing: nothing of it is like POSE.
 BASE = Pinhole((1, 2, 3), (4, 5, 7), (0, 1, 0), 1234.0, 1920, 1080, (900.0, 500.0), True)
 HD = Options(size=(1920, 1080))
 

@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
-# What a shot's name begins with says what happens to it. The diary says what happened, a line each.
+# The beginning of a shot's name says what happens to it. The diary says what happened, a line each.
 STAND_IN = """#!{python}
 import errno, hashlib, json, os, signal, sys, time
 sys.path[:0] = {path}

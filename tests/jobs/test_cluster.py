@@ -377,7 +377,7 @@ def test_nobody_else_on_this_machine_can_have_the_workers_run_anything(stand_in,
     mark = tmp_path / "mark"
 
     async def run(address, security):
-        # What Client.run does, and what workers and nannies do among themselves.
+        # A call as by Client.run, or as by workers and nannies among themselves.
         async with distributed.core.rpc(address, timeout=3, connection_args=security.get_connection_args("client")) as server:
             return await asyncio.wait_for(server.run(function=distributed.protocol.pickle.dumps(mark.mkdir)), 3)
 

@@ -703,7 +703,8 @@ def match_a_photo():
     assert _is_as_before(), "one undo does not take it back"
 
 
-# What would send an artist away again, and what is tried of it. Each part goes on where the one before it has ended.
+# Things that would send an artist away again if they failed, and the steps that try them. Each part goes on where the one
+# before it has ended.
 DAY = {
     "The lens can be set in the panel": (tick_the_box, choose_the_unit),
     "Fields go as far as Blender's own": (drag_the_fields,),

@@ -2,7 +2,8 @@
 
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python cameras_in_a_window.py -- FOLDER [PICTURES]
 
-FOLDER : a folder that has COLMAP's model `sparse` of the eyes in `cameras_of_colmap.json`, and takes the fSpy project that is made here.
+FOLDER : a folder that has COLMAP's model `sparse` of the eyes in `cameras_of_colmap.json`, and takes the fSpy project that is
+    made here.
 PICTURES : a folder for pictures of the window; without it none are taken.
 
 Leaves with status 0, or 5 and a traceback.

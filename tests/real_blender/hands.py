@@ -19,7 +19,8 @@ from bpy_extras.object_utils import world_to_camera_view
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Euler, Vector
 
-# Of the interface and of all places here: a window of half the width and height is drawn in software in a third of the time.
+# The scale of the interface and of all places here: a window of half the width and height is drawn in software in a third of
+# the time.
 SCALE = float(os.environ.get("VIEWCAM_UI_SCALE", "1"))
 NOWHERE = (int(600 * SCALE), int(500 * SCALE))  # a place in the 3D viewport
 # A step that yields these seconds leaves the processors to what it waits for: where events are simulated, Blender never sleeps.

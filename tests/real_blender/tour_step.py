@@ -11,7 +11,8 @@ import bpy
 import numpy as np
 
 SIZE = (640, 360)
-# Of the largest area: below there is nothing to see, since the window is as tall as the panel with all of its parts open.
+# A part of the largest area: below there is nothing to see, since the window is as tall as the panel with all of its parts
+# open.
 UPPER_PART = (0.0, 0.35, 1.0, 1.0)
 
 

@@ -80,8 +80,8 @@ class CameraSync:
     def __init__(self) -> None:
         self.camera_object: bpy.types.Object = None
         self.is_being_set = False  # the values were edited, and the camera does not stand there yet: neither has been moved
-        # What was placed last, with the state that it left. Blender tells of each edit once more when it evaluates it, and a
-        # camera that follows something would be placed where it stands already.
+        # The camera as it was placed last, with the state that it left. Blender tells of each edit once more when it evaluates
+        # it, and a camera that follows something would be placed where it stands already.
         self._placed: tuple = ()
         # The camera's state and its stored values as they were last seen to agree; None where nobody has looked.
         self._state: Any = None  # a tuple, and CameraValues; None until it is first seen

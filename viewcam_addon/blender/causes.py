@@ -21,7 +21,8 @@ def causes(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[
     yield from _sharers(camera_object)
 
 
-# What each value decides where it is animated: a moving eye turns the view, since the look-at point stands still.
+# The part of the camera that each value decides where it is animated: a moving eye turns the view, since the look-at point
+# stands still.
 _DECIDES = {
     "eye": POSE,
     "look_at": frozenset({VIEW}),

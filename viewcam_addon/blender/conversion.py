@@ -154,7 +154,7 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     mirrored = bool(volume < 0)
     _, v, w = rotation.nearest(axes).T
     eye = matrix[:3, 3]
-    # As far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.
+    # The look-at point is as far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.
     reach = 2.0 ** math.ceil(math.log2(max(1.0, np.abs(eye).max())))
     plane = datablocks.view_plane(datablocks.camera_data_of(camera), datablocks.frame_of(scene))
     return Pinhole(

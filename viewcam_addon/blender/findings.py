@@ -78,7 +78,7 @@ class Finding:
         return f"{self.cause.clause}{figures}: {self.cause.remedy}"
 
 
-# What has moved a camera where nothing that is known did.
+# The causes where nothing that is known has moved the camera.
 _MOVED = Cause("The camera or its parent was moved since", POSE, APPLY_OR_ADOPT, mended_by=Button.APPLY_AGAIN)
 _LENS = Cause(
     "The lens, sensor or pixel aspect was changed since", frozenset({DISTANCE}), APPLY_OR_ADOPT, mended_by=Button.APPLY_AGAIN

@@ -23,10 +23,11 @@ from ..errors import InputError
 from . import ensure_registered
 from .temporary_settings import Overrides, overridden
 
-# What a .blend starts with: itself, or a gzip or Zstandard stream.
+# The first bytes of a .blend: its own, or those of a gzip or Zstandard stream.
 _MAGIC = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 
-# What a render would write beside its picture: each pass for the compositor (in the temporary folder), images as tx (5.2).
+# Settings by which a render writes files beside its picture: each pass for the compositor (in the temporary folder), images as
+# tx (5.2).
 _WRITING = ("use_render_cache", "use_auto_generate_texture_cache")
 
 _WAITED = 5.0

@@ -27,11 +27,11 @@ Raw = tuple[tuple[float, ...], str, float | None]
 
 EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
 _VECTORS = ("eye", "look_at", "up")
-# What is no property of its own, or not as it is; a property with the name of each other value holds it.
+# Values that are no property of their own, or not as they are; each other one is held by the property of its name.
 _NOT_PLAIN = EXACT | {"counted_in", "set_for", "view_when_set", "precision", "follows", "asked"}
 _PLAIN = tuple(each.name for each in fields(CameraValues) if each.name not in _NOT_PLAIN)
 _ASKED = "asked"  # where Blender keeps what `ask` has noted
-# What is noted of a camera once it has been set.
+# Values that are noted of a camera once it has been set.
 _NOTED = ("distance", "counted_in", "set_for", "view_when_set", "held_roll")
 is_storing = False  # else the artist or a script sets a property, and the camera moves
 

@@ -153,7 +153,7 @@ _SAMPLES, _NEIGHBORS = 60, 4  # points of a picture, and how many of the next pi
 class Depths:
     """Depth maps, one a picture: (height, width), rows from the top, not finite or ≤ 0 where nothing is."""
 
-    # What one picture sees the next may not: of the errors the lowest fifth are those of what both see, if anything is.
+    # Pictures of depth may see little in common: the lowest fifth of the errors are those of what both see, if anything is.
     floor, unit, plausible, part = 1e-6, "of the depth", 0.02, 0.2
 
     def __init__(self, maps: Sequence[Array]) -> None:
@@ -724,7 +724,7 @@ def _fitted(
     """
     base = Lens((), projection).distort(points)
     off = taken - base
-    # What is farther from where the projection alone shows it than lenses bend is an outlier, or beyond the picture.
+    # A point that is farther from where the projection alone shows it than lenses bend is an outlier, or beyond the picture.
     usable = np.hypot(*off.T) < np.maximum(0.5 * np.hypot(*base.T), 0.1)
     if usable.sum() < _FEWEST:
         return None

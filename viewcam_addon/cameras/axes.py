@@ -38,7 +38,7 @@ _TURNS: dict[str, tuple[Callable[[Triple], Triple] | None, Callable[[Triple], Tr
     "y_down": (lambda p: (p[0], p[2], -p[1]), lambda p: (p[0], -p[2], p[1])),
 }
 _NO_MEAN = 1e-6  # of the length of a mean of unit vectors
-# How far a rotation in a file, whose numbers have few digits, may be off: without a note, and as a rotation at all.
+# The errors that a rotation in a file may have, whose numbers have few digits: without a note, and as a rotation at all.
 _NOTED, _NO_ROTATION, _NO_QUATERNION = 1e-5, 2e-3, 1e-2
 _SCALED = 1e-3
 _FARTHEST = 2.0**1022  # as far again as the eye from the origin there must be room for the look-at point

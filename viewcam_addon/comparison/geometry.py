@@ -36,7 +36,7 @@ from .statistics import PassErrors, measure
 from .tolerances import Array, Seen, in_float32
 from .verdict import GeometryComparison, allowed_unexplained, far_from_origin
 
-# Which of the passes both pictures must have.
+# The passes that both pictures must have.
 _NEEDED = ("Depth", "Position", "Object Index")
 # Pixels whose centers are traced again, to see whether the reference shows the scene.
 _ASKED_OF_THE_REFERENCE = 1000
@@ -95,7 +95,7 @@ def compare(
     mismatches = _mismatches(kinds, seen, reach, around, surfaces_at)
 
     compared = hit & np.isin(kinds, (-1, KINDS.index("material index"), KINDS.index("surface")))
-    # What is explained, or few enough to be let pass, is no error of the passes; what is not, shows in their figures.
+    # Pixels that are explained, or few enough to be let pass, are no error of the passes; all others show in their figures.
     settled = mismatches.explained | (mismatches.unexplained_count <= allowed_unexplained(pinhole))
     compared[mismatches.rows[settled] * pinhole.width + mismatches.columns[settled]] = False
     chosen = np.flatnonzero(compared)

@@ -101,8 +101,8 @@ class Rounding:
         self.belongs: NDArray = np.zeros(self._shift.shape)
         if "Object Index" in reference.passes:
             self.belongs = reference["Object Index"][..., 0]
-        # What the light on a surface would be if it came from straight above, as far as the picture tells: the largest
-        # Diffuse Direct anywhere, in the surface's color.
+        # The light on a surface if it came from straight above, as far as the picture tells: the largest Diffuse Direct
+        # anywhere, in the surface's color.
         self._brightest: Array | float = 0.0
         self._tables = tolerances.ALBEDO_TABLES if "albedo tables" in reference.attributes else 0.0
         self._triangles = tolerances.SHINING_TRIANGLES if "shining surfaces" in reference.attributes else 0.0

@@ -27,7 +27,7 @@ VECTORS = ("eye", "look_at", "up")
 LISTS = (*VECTORS, "principal_point")
 TEXTS = ("name", "camera", "engine", "level", "mirrored")
 
-# How each field may be written: as a whole, by another name, in three parts.
+# The forms in which a field may be written: as a whole, by another name, in three parts.
 _PARTS = {vector: tuple(f"{vector}_{axis}" for axis in "xyz") for vector in VECTORS}
 _SPELLINGS = {name: (name, *_PARTS.get(name, ())) for name in FIELDS} | {"d": ("d", "distance")}
 _FIELD_OF = {spelling: name for name, spellings in _SPELLINGS.items() for spelling in spellings}

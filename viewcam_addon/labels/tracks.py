@@ -74,7 +74,7 @@ def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
         placed = sampled._replace(positions=np.where(known[:, None], there, np.array(view.pinhole.eye)))
         column, row, depth_there = view.pinhole.project(placed.positions)
         places = np.concatenate([np.stack([column, view.pinhole.height - row], axis=-1), there], axis=-1)
-        # What float32 can't hold is nowhere, as what is behind the camera.
+        # A place that float32 can't hold is no place, like one behind the camera.
         valid = valids[number] = known & (depth_there > 0) & (np.abs(places) <= np.finfo(np.float32).max).all(axis=1)
         trajs_2d[number, valid], trajs_3d[number, valid] = places[valid, :2], places[valid, 2:]
         depth, state, _ = surface_points.planes(path, document, states, _state)

@@ -399,7 +399,7 @@ class CoreScene:
     def _described_camera(
         self, camera: Pinhole, clip: tuple[float, float], eye: NDArray, axes: NDArray, window: tuple[int, int, int, int]
     ) -> _Camera:
-        # What lies at the ends of the clip range is visible, and what lies at the ends of a ray is not.
+        # A point at an end of the clip range is visible, and one at an end of a ray is not.
         nearest, farthest = math.nextafter(clip[0], 0.0), math.nextafter(clip[1], math.inf)
         left, low, width, height = window
         described = _Camera(t_min=nearest, t_max=farthest, width=width, height=height, distance=camera.distance)

@@ -33,7 +33,7 @@ _MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 _TILE = re.compile(r"<(UDIM|UVTILE)>")
 _LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 _NO_FILE = "missing"
-# What is hashed at most: four caches of 25,000 frames in a folder, and of all files what takes some minutes.
+# The most that is hashed: four caches of 25,000 frames in a folder, and of all files what takes some minutes.
 _MOST_FILES = 100_000
 _MOST_BYTES = 256 * 2**30
 

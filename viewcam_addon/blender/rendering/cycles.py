@@ -60,7 +60,7 @@ _LIGHT = {
     "use_guiding": False,
     "film_transparent_glass": False,
 }
-# What the tracer has no choice about, and a picture with everything in it has as the scene does.
+# Settings that the tracer has no choice about; a picture with everything in it has the scene's.
 _LIGHT_OF_SURFACES = {"volume_bounces": 0, "caustics_reflective": True, "caustics_refractive": True}
 
 

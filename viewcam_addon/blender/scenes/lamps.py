@@ -285,7 +285,7 @@ def _times(rgb: RGB, factor: float) -> RGB:
 
 
 _BLACK = (0.0, 0.0, 0.0)
-# What says something else of a light than of a surface, or nothing.
+# Nodes that say something else of a light than of a surface, or nothing.
 _OF_SURFACES = {
     *("ATTRIBUTE", "VERTEX_COLOR", "CAMERA", "TANGENT", "BUMP", "NORMAL_MAP", "OBJECT_INFO", "VECT_TRANSFORM", "WIREFRAME"),
 }

@@ -89,5 +89,5 @@ class Ledger:
 
     def _status(self, name: str, statuses: set[str]) -> str:
         worst = max(statuses, key=_WORSE.index, default="exported")
-        # What is there in part is approximated.
+        # An object that is there in part is approximated.
         return "approximated" if worst == "skipped" and name in self._placed else worst

@@ -56,7 +56,7 @@ _PLACES = {("object_info", "location"), ("object_info", "random"), ("geometry", 
 
 _UNLINKED = "light linking is off on both sides"  # it does not come along
 
-# What of the render settings makes the picture's frame.
+# The render settings that make the picture's frame.
 _FRAME = (
     "resolution_x",
     "resolution_y",

@@ -40,8 +40,8 @@ struct Ray {
 
 constexpr int PACKET = 64;
 
-// As many rays, by coordinate. What is computed of four at once reads and writes the last four whole:
-// where fewer are left, `fill` has made the rest like the last.
+// A packet of rays, by coordinate. What is computed of four at once reads and writes the last four whole: where fewer are left,
+// `fill` has made the rest like the last.
 struct alignas(64) Rays {
     double origin[3][PACKET], direction[3][PACKET], t_min[PACKET], t_max[PACKET];
 

@@ -28,7 +28,7 @@ inline Vec2 mirror_ball(Vec3 direction) {
     return size > 0 ? Vec2{(half.x / size + 1) / 2, (half.z / size + 1) / 2} : Vec2{0.5, 0.5};
 }
 
-// How an image is looked up. straight: whether colors are divided by the alpha that they were multiplied by.
+// The way an image is looked up. straight: whether colors are divided by the alpha that they were multiplied by.
 struct Lookup {
     enum Interpolation { LINEAR, CLOSEST, CUBIC } interpolation = LINEAR;
     enum Extension { REPEAT, EXTEND, CLIP, MIRROR } extension = REPEAT;

@@ -57,7 +57,7 @@ class Picture:
         ends = _ends(pixels)
         if not np.isfinite(ends).all():
             raise InputError("an image holds a number that is not finite: check it")
-        # What is encoded as sRGB is raised to the power of 2.4.
+        # Numbers that are encoded as sRGB are raised to the power of 2.4.
         most = LARGEST_RADIANCE ** (1 / 2.4) if self.srgb else LARGEST_RADIANCE
         largest = max(map(abs, ends))
         if largest > most:

@@ -17,7 +17,7 @@ from .colors import LARGEST_RADIANCE, WHITE, Color
 RGB = tuple[float, float, float]
 
 GRAY = (0.8, 0.8, 0.8)
-# How facets are stretched along a tangent.
+# The inputs that stretch facets along a tangent.
 ANISOTROPY: dict[str, value_nodes.Default | None] = {"anisotropy": 0.0, "rotation": 0.0, "tangent": value_nodes.TANGENT}
 DISTRIBUTIONS = ("multiscatter_ggx", "ggx", "beckmann")
 

@@ -1,4 +1,4 @@
-// One ray through a hierarchy, near boxes first; in any order where it only asks whether it meets anything.
+// Takes a ray through a hierarchy, near boxes first; in any order where it only asks whether it meets anything.
 #pragma once
 #include "box_ray.h"
 

@@ -1,4 +1,4 @@
-// How much light rough surfaces scatter: looked up in tables, and what it means for light that is scattered more than once.
+// The share of light that rough surfaces scatter, looked up in tables, and from it the light that is scattered more than once.
 //
 // A single scattering loses the light that facets catch from each other. Kulla and Conty (Revisiting Physically Based Shading at
 // Imageworks, 2017) and Turquin (Practical Multiple Scattering Compensation for Microfacet Models, 2019) give it back: what a lobe

@@ -166,7 +166,7 @@ int main(int given, char** words) {
         for (size_t i = 0; i < along.x.size(); i++) sum += 2 * along.weight[i] * along.x[i] * of(along.x[i]);
         return sum;
     };
-    std::printf("// How much light rough surfaces scatter, as make_albedo_tables.cpp computes it: not written by hand.\n#pragma once\n\n"
+    std::printf("// The share of light that rough surfaces scatter, as make_albedo_tables.cpp computes it: not written by hand.\n#pragma once\n\n"
                 "namespace viewcam::VIEWCAM_ISA::albedo_tables {\n\n");
     write("GGX", "32 cosines × 32 roughnesses", 1024, [&](int i) { return mean(points, node(i % 32, 32), node(i / 32, 32), 0, mirror); });
     write("GGX_MEAN", "32 roughnesses", 32, [&](int i) {

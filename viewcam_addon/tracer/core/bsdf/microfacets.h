@@ -15,7 +15,7 @@ template <class T> struct MicrofacetsOf {
     T alpha_x, alpha_y;
     bool beckmann = false;  // of single points alone
 
-    // How many facets are turned so, by solid angle and by the surface's area.
+    // The density of facets that are turned so, by solid angle and by the surface's area.
     T d(Vec3Of<T> h) const {
         T x = h.x / alpha_x, y = h.y / alpha_y, slopes = x * x + y * y, up = h.z * h.z;
         if constexpr (std::is_same_v<T, double>)

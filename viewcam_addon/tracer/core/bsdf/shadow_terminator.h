@@ -1,4 +1,4 @@
-// How light ends on a bumped surface: what bumps turn towards the light may lie where the surface itself looks away.
+// The end of light on a bumped surface: what bumps turn towards the light may lie where the surface itself looks away.
 //
 // As in Cycles: since 4.3 bumps shadow diffuse light as microfacets would (Conty Estevez et al., A Microfacet-Based Shadowing Function
 // to Solve the Bump Terminator Problem, Ray Tracing Gems, 2019), before that it is faded by a cubic (Chiang et al., Taming the Shadow

@@ -16,7 +16,7 @@ template <class T> inline FacetsOf<T> facets_of(T roughness, bool beckmann = fal
     return {{alpha, alpha, beckmann}, {}};
 }
 
-// How facets are stretched: by how much, and along what, which is turned about the normal.
+// The stretch of facets: by how much, and along what, which is turned about the normal.
 struct Anisotropy {
     Color amount, rotation, tangent;
 

@@ -88,13 +88,13 @@ struct ShadingPoint {
     // the u of a UV map grows, 0 where the mesh has none of that name. Defined in scene.h.
     Vec3 tangent_round(int axis) const;
     Vec3 tangent_along(const std::string& uv) const;
-    // That which an input asks for: round z where it asks for none.
+    // The tangent that an input asks for: round z where it asks for none.
     Vec3 tangent(const Color& given) const { return given.node == NONE ? tangent_round(2) : value_of_node(given.node); }
     // A normal of the object's space, of any length.
     Vec3 to_world_normal(Vec3 normal) const;
     // Where this is in the box round the mesh's vertices, from 0 to 1; ½ along what has no extent.
     Vec3 generated() const;
-    // As Camera has it: to the right, up and ahead; and in the picture, from 0 to 1.
+    // The point in the node Camera's space: to the right, up and ahead; and in the picture, from 0 to 1.
     Vec3 in_camera() const;
     Vec3 in_window() const;
     // Where the camera is, in the world, and directions along its axes: those of the world where there is none.
@@ -103,11 +103,12 @@ struct ShadingPoint {
     Vec3 from_camera(Vec3 direction) const;
     // The index of the surface's material, which passes show. Defined in scene.h.
     double material_index() const;
-    // How long the ray is that has come along: from where it left a surface, or from the camera's clip start.
+    // The length of the ray that has come along: from where it left a surface, or from the camera's clip start.
     double ray_length() const;
-    // How wide the pixel is here that the path belongs to, world units.
+    // The width here of the pixel that the path belongs to, world units.
     double footprint() const;
-    // How far the nearest line along an edge of the triangle is, world units; infinite where there is none. Defined in scene.h.
+    // The distance of the nearest line along an edge of the triangle, world units; infinite where there is none. Defined in
+    // scene.h.
     double edge_distance() const;
     // A number's value a little beside, in the surface's own plane. away: the step there, in rendering space. Defined in
     // scene.h.

@@ -37,7 +37,7 @@ struct PathLight {
     void add(Category category, Vec3 rgb) { add(category, double4{rgb.x, rgb.y, rgb.z, 0}); }
 };
 
-// How samples become pixels.
+// The settings by which samples become pixels.
 struct FilmSettings {
     bool transparent = false;  // true if the world behind the scene leaves pixels see-through
     double exposure = 1;

@@ -19,12 +19,12 @@
 // no last ray, without either one ray a sample. What a path brings depends on its own numbers alone, and is added up in an order
 // of its own: whichever paths go along with it, and whether rays are traced in packets, changes no bit.
 //
-// Which of several surfaces in one place a ray of a float32 renderer meets, and which of them shadows the other, is its rounding's
-// choice. What light depends on that can be asked for: then that alone counts which comes by such a place, as much of it as all
-// surfaces there would scatter, none of which shadows another. No choice of a renderer's brings more, and any brings at least nothing.
-// So it is with light that shadow rays find and scattered rays do not, or the reverse (an object that only some kinds of rays see, a
-// material that asks which kind has come, a lamp without shadows): how much of it a picture has is its renderer's own weights of multiple
-// importance sampling, which elsewhere make no difference.
+// Several surfaces in one place are a matter of rounding: which of them a ray of a float32 renderer meets, and which shadows
+// the other. The light that depends on that choice can be asked for: then that alone counts which comes by such a place, as
+// much of it as all surfaces there would scatter, none of which shadows another. No choice of a renderer's brings more, and any
+// brings at least nothing. So it is with light that shadow rays find and scattered rays do not, or the reverse (an object that
+// only some kinds of rays see, a material that asks which kind has come, a lamp without shadows): how much of it a picture has
+// is its renderer's own weights of multiple importance sampling, which elsewhere make no difference.
 //
 // Where paths come to surfaces of meshes whose materials are wide (Material::is_wide), four of one material go on at a time, at every
 // depth: surface, light, lobes and the next ray are computed in vectors, whatever the other paths of the block have met (WidePaths).
@@ -43,8 +43,8 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-// How far a ray from a point goes to a light: it ends before it by what rounding can move the light's own surface along the ray, so
-// that what the light touches does not hide it.
+// The length of a ray from a point to a light: it ends before it by what rounding can move the light's own surface along the
+// ray, so that what the light touches does not hide it.
 template <class T> inline T shadow_ray_end(const SurfacePoint<T>& point, Vec3Of<T> origin, const LightSampleOf<T>& sample) {
     constexpr double ROUNDINGS = 32 * 0x1p-53, FLATTEST = 1e-6;
     T largest = max_component(abs(origin)) + sample.distance;
@@ -293,8 +293,9 @@ class PathIntegrator {
         point.offset = max(point.offset, 2 * reach * max(point.cosine, 0.0));
         path.weight = min(path.weight * double(hits.size()), MOST_WEIGHT);
     }
-    // How far before its light a shadow ray must end, so that nothing in the light's place counts; 0 where nothing is there. Notes
-    // the surface that a lamp lies in, as in that of a ceiling; the places of surfaces that shine are met by paths, too.
+    // The distance before its light at which a shadow ray must end, so that nothing in the light's place counts; 0 where
+    // nothing is there. Notes the surface that a lamp lies in, as in that of a ceiling; the places of surfaces that shine are
+    // met by paths, too.
     [[gnu::noinline]] double coincident_end(const Interaction& point, const LightSample& sample, const Light& light) const {
         static thread_local std::vector<Hit> hits;
         if (!(sample.distance < INFINITE && light.casts_shadow)) return 0;

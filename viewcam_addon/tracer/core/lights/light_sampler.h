@@ -123,7 +123,7 @@ class LightSampler {
 
     bool is_linked() const { return linked_; }
 
-    // How many lights surfaces can be lit by, and whether what they get depends on chance.
+    // The number of lights that surfaces can be lit by, and whether what they get depends on chance.
     int count() const { return count_; }
     bool has_sky() const { return sky_ != NONE; }  // among them
     bool has_meshes() const { return size_t(count_) > lamps_; }

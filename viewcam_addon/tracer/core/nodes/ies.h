@@ -1,4 +1,4 @@
-// How much light a lamp sends where, as its maker has measured it.
+// The light that a lamp sends in each direction, as its maker has measured it.
 #pragma once
 #include <cstdlib>
 

@@ -9,7 +9,8 @@ inline Lookup::Interpolation interpolation_of(const std::string& name) {
     return name == "closest" ? Lookup::CLOSEST : name == "cubic" ? Lookup::CUBIC : Lookup::LINEAR;
 }
 
-// How an image lies on what has it: flat, rolled round, or thrown on it along the object's three axes, from where it looks most.
+// The ways an image lies on its object: flat, rolled round, or thrown on it along the object's three axes, from where it looks
+// most.
 struct ImageNode {
     static constexpr const char* NAME = "image";
     static constexpr Gives GIVES = Gives::COLOR;

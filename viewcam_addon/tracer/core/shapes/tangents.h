@@ -37,7 +37,7 @@ class TangentsOfMesh {
     static size_t next(size_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
     static size_t previous(size_t corner) { return corner % 3 == 0 ? corner + 2 : corner - 1; }
     Vec3 place(size_t corner) const { return mesh_.corner(corner / 3, int(corner % 3)); }
-    // As float32 has them, so that equal faces have equal ones.
+    // Rounded to float32, so that equal faces have equal ones.
     std::array<float, 3> normal(size_t corner) const {
         if (mesh_.corner_normals) {
             const float* n = mesh_.corner_normals + 3 * corner;

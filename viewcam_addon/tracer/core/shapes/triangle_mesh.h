@@ -295,11 +295,11 @@ class TriangleSurfaces {
     // The longest side over the height on it; slimmer triangles than float32 can tell from a line are no surface.
     double4 slenderness() const { return min(longest_squared_ / size_, splat4(MOST_SLENDER)); }
 
-    // How far off the surface rays that leave it must start, with u = 2⁻⁵³, M the largest coordinate of corners and object in
-    // rendering space and L the longest side. The point is rounded along the normal by √3 u (M + 6 L) where it is interpolated.
-    // Seen from the start, corners are rounded by √3 u L; each of the three products u, v, w of the test is rounded by
-    // 2 u L² and their sum is the normal's projection, so that the plane seems to lie off by 6 u L σ, σ = L²/|N|. An instance's
-    // ray is rounded by as much again as its matrix's condition enlarges it.
+    // The distance from the surface at which rays that leave it must start, with u = 2⁻⁵³, M the largest coordinate of corners
+    // and object in rendering space and L the longest side. The point is rounded along the normal by √3 u (M + 6 L) where it is
+    // interpolated. Seen from the start, corners are rounded by √3 u L; each of the three products u, v, w of the test is
+    // rounded by 2 u L² and their sum is the normal's projection, so that the plane seems to lie off by 6 u L σ, σ = L²/|N|. An
+    // instance's ray is rounded by as much again as its matrix's condition enlarges it.
     [[gnu::always_inline]] double4 offset() const {
         double4 reach = max(max_component(abs(corner_[0])), max(max_component(abs(corner_[1])), max_component(abs(corner_[2]))));
         reach = max(reach, max_component(abs(translation_)));
