@@ -17,7 +17,7 @@ import shading
 from staging import distance_for, fresh_scene, state_camera
 
 WIDTH, HEIGHT = 640, 360
-# What glass stands above a table: where both lie in one plane, which a ray meets first is float32's chance.
+# The height of glass above a table: where both lie in one plane, which a ray meets first is float32's chance.
 CLEAR = 0.004
 
 

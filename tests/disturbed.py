@@ -57,7 +57,11 @@ def write_list(path: Path, count: int) -> None:
 
 
 class Command:
-    """A command line of `viewcam batch`. words : up to its options; variables : of the environment, beside this one's."""
+    """A command line of `viewcam batch`.
+
+    words : up to its options.
+    variables : variables of its environment, beside this one's.
+    """
 
     def __init__(self, words: Sequence[str | Path], variables: Mapping[str, str]) -> None:
         self._words, self._variables = [*map(str, words)], {**os.environ, **variables}

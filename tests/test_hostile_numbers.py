@@ -138,7 +138,7 @@ def assert_unit(vectors):
 
 @attacks("pinhole.Pinhole")
 def a_camera(source):
-    # Of every argument in turn: one hostile beside good ones, or all at once.
+    # Every argument in turn is hostile beside good ones, or all are at once.
     numbers = [source.number() for _ in range(15)]
     good = [(1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 500.0, 64, 48, None, False]
     hostile = [

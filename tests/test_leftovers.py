@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parent.parent
 
-# What an add-on may forget → the line that tells so.
+# Code that leaves something behind → the line that tells so.
 FORGOTTEN = {
     "bpy.app.handlers.load_post.append(lambda *_: None)": "<lambda> in handlers load_post",
     "bpy.types.TOPBAR_MT_file.append(lambda *_: None)": "<lambda> in entries of TOPBAR_MT_file",
@@ -39,7 +39,7 @@ FORGOTTEN = {
         "more: Forgotten in threads"
     ),
 }
-# The same of what can't be asked for: it keeps its module alive.
+# Code that leaves something behind which can't be asked for: it keeps its module alive.
 HELD = [
     "bpy.app.timers.register(addon.register, first_interval=1e6)",
     "bpy.types.SpaceView3D.draw_handler_add(addon.register, (), 'WINDOW', 'POST_VIEW')",

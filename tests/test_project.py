@@ -24,8 +24,8 @@ from viewcam_addon import cli
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewcam_addon"
 
-# Which room of viewcam_addon imports from which, and which of blender/. A new arrow is a decision: say it here, or leave it
-# out. The package's __init__ and __main__ only open doors.
+# The rooms of viewcam_addon, and of blender/, with those that each imports from. A new arrow is a decision: say it here, or
+# leave it out. The package's __init__ and __main__ only open doors.
 ROOMS = {
     "errors": "",
     "checks": "errors",
@@ -105,7 +105,7 @@ TRACER_ROOMS = {floor: " ".join(TRACER_FLOORS[:i]) for i, floor in enumerate(TRA
 HOUSES = {"": ROOMS, "blender": BLENDER_ROOMS, "tracer": TRACER_ROOMS}
 ROOF = {"__init__", "__main__"}
 
-# What exists inside Blender only.
+# Modules that exist inside Blender only.
 BLENDER_MODULES = {
     "bpy",
     "mathutils",
@@ -325,9 +325,10 @@ def test_an_import_of_what_is_not_there_is_seen():
 
 
 def vague_beginnings(source: str) -> list[str]:
-    """The docstrings that begin with a word after which their subject is still unknown, those of constants among them."""
-    words = "As|How|Of|That of|The same|Those|What|When|Where|Whether|Which|Who"
-    return re.findall(rf'(?m)^ *r?"""((?:{words})\b.*?)(?:"""|$)', source)
+    """The docstrings, and their parameters, that begin with a word after which their subject is still unknown."""
+    words = "As|How|Of|That of|The same|Those|What|When|Where|Whether|Which|Who|Whose"
+    parameters = re.findall(rf'(?m)^ *(?:""")?([\w`*, ]+ : (?:{words.lower()})\b.*)', source)
+    return parameters + re.findall(rf'(?m)^ *r?"""((?:{words})\b.*?)(?:"""|$)', source)
 
 
 NO_NAMES = "found|given|made|one|said|shown|some|told"
@@ -376,10 +377,10 @@ def test_docstrings_begin_with_what_a_thing_is_or_does():
 
 
 def test_comments_begin_with_what_a_thing_is_or_does():
-    """In Python and in the core; a sentence may begin with What, whose subject that is."""
-    vague = re.compile(r"(?m)^ *(?:#|//) (?:Of|That of|The same|Those|Whether)\b.*")
-    core = [path for path in PACKAGE.rglob("*") if path.suffix in (".h", ".cpp")]
-    texts = {str(path.relative_to(PACKAGE)): path.read_text(encoding="utf-8") for path in (*sources(), *core)}
+    """In Python, in the core, and where things are built."""
+    vague = re.compile(r"(?m)^ *(?:#|//) (?:How|Of|That of|The same|Those|What|Whether|Which|Who|Whose)\b.*")
+    files = [name for name in tracked_files() if name.endswith((".py", ".h", ".cpp", "Makefile", ".toml", ".ci/run"))]
+    texts = {name: (ROOT / name).read_text(encoding="utf-8") for name in files}
     assert {name: faults for name, text in texts.items() if (faults := vague.findall(text))} == {}
     assert len(vague.findall("x = 1\n    # Of a picture.\n// The same of four.\n")) == 2
 
@@ -394,6 +395,7 @@ def test_names_say_what_a_value_is_and_are_spelled_as_blender_spells():
 def test_a_docstring_that_begins_without_its_subject_is_seen():
     source = 'def a():\n    """Of a picture."""\n\ndef b():\n    """The area of a picture."""\n\nc = 1\n"""Those\nof it."""\n'
     assert vague_beginnings(source) == ["Of a picture.", "Those"]
+    assert vague_beginnings('    """A box.\n\n    size : what it is.\n    edge : its length.\n') == ["size : what it is."]
 
 
 @pytest.mark.parametrize(

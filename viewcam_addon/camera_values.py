@@ -36,15 +36,18 @@ CANONICAL, HOLD = "CANONICAL", "HOLD"
 class CameraValues:
     """The values that an artist or a script gives a camera, in float64 where that is known. Points and up in world space.
 
-    eye, look_at : a followed point is where its target stands. distance : pixels of the picture at 100 %, without zoom.
-    enabled : whether they place the camera.
+    eye, look_at : a followed point is where its target stands.
+    distance : pixels of the picture at 100 %, without zoom.
+    enabled : true if they place the camera.
     keeps : PIXELS or FIELD_OF_VIEW, what stays when the picture gets another resolution.
-    counted_in : the picture whose pixels the distance counts, None where nobody has said. set_for : the picture for which the
-        camera was set last. Both without border.
-    pole : CANONICAL or HOLD, what the picture does near up. hold_within : radians from up. held_roll : radians, see roll.py.
+    counted_in : the picture whose pixels the distance counts, None where nobody has said.
+    set_for : the picture for which the camera was set last. Both without border.
+    pole : CANONICAL or HOLD, what the picture does near up.
+    hold_within : radians from up.
+    held_roll : radians, see roll.py.
     view_when_set : (eye, look_at, up) from which the next edit sets out, None where that is not known.
     precision : the relative rounding of the values, 2⁻⁵³ where all are known in float64, else float32's 2⁻²⁴.
-    follows : those of "eye" and "look_at" that are set to follow an object.
+    follows : some of "eye" and "look_at", which are set to follow an object.
     asked : (name, number) of other looks at the values, such as a lens in millimeters or the roll, that count over them.
     """
 
@@ -78,7 +81,9 @@ class CameraValues:
     def pinhole(self, plane: ViewPlane, frame: Frame, sensor_fit: str, mirrored: bool) -> Pinhole:
         """The camera that the values ask for, whatever a held roll is.
 
-        plane : whose size and principal point it has. frame : the picture. sensor_fit : "AUTO", "HORIZONTAL" or "VERTICAL".
+        plane : the view plane, whose size and principal point it has.
+        frame : the picture that the scene renders.
+        sensor_fit : "AUTO", "HORIZONTAL" or "VERTICAL".
 
         Raises
         ------
@@ -168,9 +173,11 @@ class CameraValues:
     ) -> "CameraValues":
         """The view of a camera that was moved, with the look-at point as far away as it was.
 
-        pinhole : the camera as it stands. moved : which of "eye" and "view" have changed by more than a rounding; what has not
-        keeps its digits. bound : (name, index) of the numbers that something else decides; they stay. up_axis : the up to
-        choose where that of the values does not give the picture, up to `rounding`, but it does; else up becomes v.
+        pinhole : the camera as it stands.
+        moved : some of "eye" and "view", which have changed by more than a rounding; what has not keeps its digits.
+        bound : (name, index) of the numbers that something else decides; they stay.
+        up_axis : the up to choose where that of the values does not give the picture, up to `rounding`, but it does; else up
+            becomes v.
         """
         values = self.with_unbound(replace(self, eye=pinhole.eye), bound) if "eye" in moved else self
         if "view" in moved:
@@ -216,8 +223,11 @@ def moved_poses(
 ) -> Array:
     """The poses of n cameras that were moved, each as `CameraValues.moved_to` has it where nothing is bound and no roll held.
 
-    poses : (n, 3, 3), eye, look-at and up of each. is_moved, is_turned : (n,), whose eye and whose view has changed.
-    eyes : (n, 3). axes : (n, 3, 3), u, v and w as columns. up_axis, rounding : as there.
+    poses : (n, 3, 3), eye, look-at and up of each.
+    is_moved, is_turned : (n,) each, true for cameras whose eye, and whose view, has changed.
+    eyes : (n, 3).
+    axes : (n, 3, 3), u, v and w as columns.
+    up_axis, rounding : see `CameraValues.moved_to`.
     """
     after, reach = poses.copy(), [math.dist(eye, look_at) for eye, look_at, _ in poses.tolist()]
     after[is_moved, 0] = eyes[is_moved]

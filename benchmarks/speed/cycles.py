@@ -23,7 +23,7 @@ SCENES = Path(__file__).resolve().parents[2] / "sample_scenes"
 
 _SUZANNES = {"suzannes": suzannes.six, "three suzannes": suzannes.three}
 
-# Of a pixel, where a noise threshold is asked for: Blender's own most.
+# The most samples of a pixel where a noise threshold is asked for: Blender's own limit.
 _MOST_SAMPLES = 4096
 
 
@@ -32,8 +32,9 @@ def prepare(
 ) -> dict[str, race.Runner]:
     """In Blender's process: write the scene, and offer renders.
 
-    scene_name : of a sample scene or of one of sample_scenes/materials.py, "suzannes" for six of them or "three suzannes".
-    path : where the tracer's scene goes.
+    scene_name : the name of a sample scene or of one of sample_scenes/materials.py, "suzannes" for six of them or "three
+        suzannes".
+    path : the file for the tracer's scene.
     for_mitsuba : through a box filter and without materials, which is what mitsuba3.py translates.
     """
     viewcam_addon.register()

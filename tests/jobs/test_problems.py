@@ -32,7 +32,7 @@ GOOD = {
     "level": "",
 }
 
-# What is changed in a good row → (columns as they are named, what is said) of each problem.
+# Changes of a good row → (columns as they are named, what is said) of each problem.
 KINDS = [
     ({"name": ""}, [("name", "missing")]),
     ({"name": "SHOT2"}, [("name", "line 2 has this name already as 'shot2'")]),

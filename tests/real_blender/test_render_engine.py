@@ -11,7 +11,7 @@ from viewcam_addon import image
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SCRIPT = Path(__file__).with_name("engine_in_a_window.py")
-# What inside_blender.py tells the engine.
+# The options that inside_blender.py gives the engine.
 CHOICES = ("--level", "path", "--samples", "4", "--seed", "7")
 
 

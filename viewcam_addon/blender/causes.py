@@ -21,7 +21,8 @@ def causes(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[
     yield from _sharers(camera_object)
 
 
-# What each value decides where it is animated: a moving eye turns the view, since the look-at point stands still.
+# The part of the camera that each value decides where it is animated: a moving eye turns the view, since the look-at point
+# stands still.
 _DECIDES = {
     "eye": POSE,
     "look_at": frozenset({VIEW}),
@@ -157,7 +158,10 @@ def _drivers(camera_object: bpy.types.Object) -> Iterator[Cause]:
 def keyed(
     camera_object: bpy.types.Object, curves: Callable[[bpy.types.ID], list[bpy.types.FCurve]]
 ) -> list[tuple[bpy.types.ID, str]]:
-    """The camera's own channels that keyframes set: (object or data, data path). curves : of a datablock."""
+    """The camera's own channels that keyframes set: (object or data, data path).
+
+    curves : a function: datablock → its curves.
+    """
     blocks = camera_object, camera_object.data
     return [(block, path) for block in blocks for path in _paths(curves(block)) if _channel(path)[0] not in (None, CENTER)]
 

@@ -27,11 +27,11 @@ Raw = tuple[tuple[float, ...], str, float | None]
 
 EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
 _VECTORS = ("eye", "look_at", "up")
-# What is no property of its own, or not as it is; a property with the name of each other value holds it.
+# Values that are no property of their own, or not as they are; each other one is held by the property of its name.
 _NOT_PLAIN = EXACT | {"counted_in", "set_for", "view_when_set", "precision", "follows", "asked"}
 _PLAIN = tuple(each.name for each in fields(CameraValues) if each.name not in _NOT_PLAIN)
 _ASKED = "asked"  # where Blender keeps what `ask` has noted
-# What is noted of a camera once it has been set.
+# Values that are noted of a camera once it has been set.
 _NOTED = ("distance", "counted_in", "set_for", "view_when_set", "held_roll")
 is_storing = False  # else the artist or a script sets a property, and the camera moves
 
@@ -106,7 +106,8 @@ def raw(camera_object: bpy.types.Object) -> Raw | None:
 def animated(before: CameraValues, changed: Raw) -> CameraValues:
     """The values of a camera of which curves alone can have changed any: `before` itself if none has.
 
-    before : values that follow no target. changed : what is held of them now, by `raw`.
+    before : the values before, which follow no target.
+    changed : the numbers that Blender holds of them now, see `raw`.
     """
     rounded, exact, zoom = changed
     zoom = before.zoom if zoom is None else zoom
@@ -120,7 +121,8 @@ def animated(before: CameraValues, changed: Raw) -> CameraValues:
 def _numbers(text: str, rounded: tuple[float, ...]) -> tuple[tuple[float, ...], bool]:
     """Eye, look-at, up and distance, ten numbers, and whether all of them are known in float64.
 
-    text : `exact` of the camera. rounded : the ten numbers of its properties.
+    text : `exact` of the camera.
+    rounded : the ten numbers of its properties.
     """
     exact = _parsed(text, 10)
     if not exact:

@@ -29,7 +29,7 @@ VECTORS = ("eye", "look_at", "up")
 LISTS = (*VECTORS, "principal_point")
 TEXTS = ("name", "camera", "engine", "level", "mirrored")
 
-# How each field may be written: as a whole, by another name, in three parts.
+# The forms in which a field may be written: as a whole, by another name, in three parts.
 _PARTS = {vector: tuple(f"{vector}_{axis}" for axis in "xyz") for vector in VECTORS}
 _SPELLINGS = {name: (name, *_PARTS.get(name, ())) for name in FIELDS} | {"d": ("d", "distance")}
 _FIELD_OF = {spelling: name for name, spellings in _SPELLINGS.items() for spelling in spellings}
@@ -92,8 +92,11 @@ class Cell(NamedTuple):
 class Row:
     """One row.
 
-    place : "line 17" of a CSV, say. kind : "column" or "key". cells : by column, those that say something. columns : all that
-    the row could have had. excused : fields whose lack is told elsewhere.
+    place : its place in the list, "line 17" of a CSV, say.
+    kind : the word for a field in this list, "column" or "key".
+    cells : the cells that say something, by column.
+    columns : the columns that the row could have had.
+    excused : fields whose lack is told elsewhere.
     """
 
     place: str

@@ -17,9 +17,13 @@ Document = dict[str, Any]
 
 
 def instances(folder: Path, amodal: bool = False) -> Document:
-    """COCO's instances, as in instances_train2017.json. amodal : masks and boxes of whole objects, not of what is visible.
+    """COCO's instances, as in instances_train2017.json.
 
-    folder : of label files; `file_name` is the picture's that they belong to. Raises InputError as `read_pictures` does.
+    amodal : true for masks and boxes of whole objects, not of what is visible.
+
+    folder : a folder of label files; `file_name` is the name of the picture that they belong to.
+
+    Raises InputError as `read_pictures` does.
     """
     pictures, categories = read_pictures(folder)
     kind, names = "amodal" if amodal else "visible", keypoint_names(pictures)

@@ -333,7 +333,7 @@ def test_an_orbit_begins_with_the_picture_that_the_camera_takes_of_a_cropped_bor
             own["rendered"][name] for name in ("width", "height")
         ]
         taken, camera = (Pinhole(**record["camera"]) for record in (asked, own))
-        # What float32 stores of either: 2⁻²⁴ of a hundred pixels and of ten units, a few times over.
+        # Float32's rounding of either: 2⁻²⁴ of a hundred pixels and of ten units, a few times over.
         assert taken.principal_point == pytest.approx(camera.principal_point, abs=1e-4)
         assert taken.distance == pytest.approx(camera.distance, rel=1e-6) and taken.eye == pytest.approx(camera.eye, abs=1e-5)
 
@@ -350,7 +350,7 @@ def test_an_orbit_keeps_what_its_camera_has_beside_the_four_values(stage, shoot,
         own = Pinhole(**shoot(renderer, Job("own", camera="First", width=64, height=36))[0]["camera"])
     assert own.mirrored == (name == "scale") and (own.principal_point == (32, 18)) == (name == "scale")
     for pinhole in taken:
-        # What float32 stores of either: 2⁻²⁴ of a hundred pixels, a few times over.
+        # Float32's rounding of either: 2⁻²⁴ of a hundred pixels, a few times over.
         assert pinhole.principal_point == pytest.approx(own.principal_point, abs=1e-4)
         assert pinhole.distance == pytest.approx(own.distance, rel=1e-6) and pinhole.mirrored == own.mirrored
     assert taken[0].eye == pytest.approx(own.eye, abs=1e-5) and taken[1].eye != pytest.approx(own.eye, abs=1e-2)

@@ -27,7 +27,7 @@ from viewcam_addon.blender.temporary_settings import numbered_indices, overridde
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs.job import Job
 
-# What describes the settings, what follows from them, and brushes (reading some of them crashes 4.2).
+# Properties that describe the settings or follow from them, and brushes (reading some of them crashes 4.2).
 NO_SETTINGS = {"rna_type", "is_evaluated", "depsgraph", "tool_settings"}
 
 

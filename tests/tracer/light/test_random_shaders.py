@@ -59,7 +59,10 @@ def random_input(chance, default, depth, is_value):
 
 
 def random_node(chance, kind, depth) -> Node:
-    """A node of a type, each input of which is left out or drawn. depth : of nodes that may feed it."""
+    """A node of a type, each input of which is left out or drawn.
+
+    depth : the depth of the nodes that may feed it.
+    """
     inputs = {}
     for name, default in KINDS[kind].inputs.items():
         if isinstance(default, bool):

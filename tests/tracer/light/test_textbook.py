@@ -120,7 +120,7 @@ def off_by(actual, expected):
 def test_light_is_what_the_textbook_says(traced, bounces):
     each, whole = off_by(traced(bounces), textbook(bounces))
     assert abs(whole) < 4, f"the picture is off by {whole:+.1f} standard errors"
-    # Of 144 normal numbers one exceeds 5 once in 12,000 pictures.
+    # One of 144 normal numbers exceeds 5 once in 12,000 pictures.
     assert np.abs(each).max() < 5, f"a pixel is off by {np.abs(each).max():.1f} standard errors"
 
 

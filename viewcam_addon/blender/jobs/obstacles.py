@@ -26,7 +26,11 @@ def obstacles(
     own: Callable[[], bpy.types.Object],
     settings: JobSettings,
 ) -> Iterator[str]:
-    """One sentence for each obstacle. outputs : what is wanted of each shot. own : gives the camera for the four values."""
+    """One sentence for each obstacle.
+
+    outputs : the files that are wanted of each shot.
+    own : a function that gives the camera for the four values.
+    """
     if not any(layer.use for layer in scene.view_layers):
         yield f"scene {scene.name!r} renders nothing: all of its view layers are off, let one render"
     engines = sorted({settings.engine_of(shot) for shot in shots}) if outputs.picture else []

@@ -79,7 +79,8 @@ def render(
 ) -> None:
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
 
-    engine : "EEVEE" or "WORKBENCH". camera_object, remedies, threads : as cycles.render has them.
+    engine : "EEVEE" or "WORKBENCH".
+    camera_object, remedies, threads : see cycles.render.
 
     Raises
     ------

@@ -33,7 +33,7 @@ struct Bounds {
     }
 };
 
-// What a node's child is: another node, or a leaf by its number.
+// A node's child is another node, or a leaf by its number.
 constexpr uint32_t LEAF = 0x80000000u, NOTHING = 0xffffffffu;
 
 struct Bvh {

@@ -1,4 +1,4 @@
-// One ray through a hierarchy, near boxes first; in any order where it only asks whether it meets anything.
+// Takes a ray through a hierarchy, near boxes first; in any order where it only asks whether it meets anything.
 //
 // A ray as the boxes of a hierarchy see it: in float32, everything rounded so that no box is missed that the ray meets.
 //
@@ -31,7 +31,7 @@ inline int dominant_axis(double x, double y, double z) {
 
 // The largest components of four directions, given their sizes.
 struct DominantAxis {
-    long4 x, y;  // whether it is that one
+    long4 x, y;  // true if it is that one
 
     explicit DominantAxis(const Vec3x4& size)
         : x(long4(size.x > size.y) & long4(size.x > size.z)), y(~long4(size.x > size.y) & long4(size.y > size.z)) {}

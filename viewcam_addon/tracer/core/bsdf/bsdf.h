@@ -1,4 +1,4 @@
-// What closures become at a point of a surface: the BSDF, a sum of lobes, what it gives off and what it lets straight through.
+// The BSDF that closures become at a point of a surface: a sum of lobes, what it gives off and what it lets straight through.
 //
 // A path takes one lobe only, chosen in proportion to the lobes' colors, and its weight is divided by that share: where there
 // is one lobe, it is taken and nothing is random. Glass is two lobes, shared out by Fresnel's equations.
@@ -16,7 +16,7 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-// How light ends on a bumped surface: what bumps turn towards the light may lie where the surface itself looks away.
+// The end of light on a bumped surface: what bumps turn towards the light may lie where the surface itself looks away.
 //
 // As in Cycles: since 4.3 bumps shadow diffuse light as microfacets would (Conty Estevez et al., A Microfacet-Based Shadowing Function
 // to Solve the Bump Terminator Problem, Ray Tracing Gems, 2019), before that it is faded by a cubic (Chiang et al., Taming the Shadow
@@ -25,7 +25,7 @@ template <class T> struct ShadowTerminatorOf {
     Vec3Of<T> smooth;  // the normal without bumps
     bool by_facets, of_all;  // since 4.3; since 5.0, of light that is not diffuse, too
 
-    // What is left of light from a direction that a lobe with a bumped normal scatters.
+    // The share that is left of light from a direction, scattered by a lobe with a bumped normal.
     T left(Vec3Of<T> bumped, bool is_diffuse, Vec3Of<T> to_light) const {
         T flat = dot(smooth, to_light), tilt = dot(smooth, bumped), light = dot(bumped, to_light), none{}, all = splat<T>(1);
         if (!is_diffuse) return select(Mask<T>((of_all ? flat * tilt * light : flat * light) < 0.0), none, all);
@@ -114,8 +114,8 @@ template <class T> class BSDFOf {
         return sum;
     }
 
-    // What of light from a unit direction is sent on to where the path came from, cosine included, by lobes of some kinds.
-    // weight(kind, pdf): what of it counts, by the density with which `sample` chooses that lobe and this direction.
+    // The share of light from a unit direction that lobes of some kinds send on to where the path came from, cosine included.
+    // weight(kind, pdf): the part of it that counts, by the density with which `sample` chooses that lobe and this direction.
     template <class Weight> ScatteredLightOf<T> eval(Vec3Of<T> to_light, Flags<T> kinds, Weight&& weight) const {
         ScatteredLightOf<T> sum;
         for (int i = 0; i < count_; i++)

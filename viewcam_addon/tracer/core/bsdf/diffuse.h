@@ -14,7 +14,7 @@ template <class T> struct LambertOf {
     static constexpr bool DELTA = false, IS_DIFFUSE = true;
     Vec3Of<T> color, normal;
 
-    // What of light from a unit direction is sent on, cosine included.
+    // The share of light from a unit direction that is sent on, cosine included.
     Vec3Of<T> eval(Vec3Of<T> to_light) const { return color * pdf(to_light); }
     T pdf(Vec3Of<T> to_light) const { return max(dot(normal, to_light), T{}) / PI; }
     LobeSampleOf<T> sample(Vec2Of<T> u) const {
@@ -75,7 +75,7 @@ template <class T> struct OrenNayarOf {
     }
 
    private:
-    // What is reflected once of light that comes under a cosine.
+    // The share of light that comes under a cosine and is reflected once.
     T albedo_under(T cosine) const {
         T sine = sqrt(max(1.0 - cosine * cosine, T{}));
         T g = sine * (acos(cosine) - 2.0 / 3 - sine * cosine) + 2.0 / 3 * (sine / cosine) * (1.0 - sine * sine * sine);

@@ -17,7 +17,7 @@ template <class T> struct MicrofacetsOf {
     T alpha_x, alpha_y;
     bool beckmann = false;  // of single points alone
 
-    // How many facets are turned so, by solid angle and by the surface's area.
+    // The density of facets that are turned so, by solid angle and by the surface's area.
     T d(Vec3Of<T> h) const {
         T x = h.x / alpha_x, y = h.y / alpha_y, slopes = x * x + y * y, up = h.z * h.z;
         if constexpr (std::is_same_v<T, double>)
@@ -116,7 +116,7 @@ template <class T> struct MicrofacetReflectionOf : MicrofacetLobeOf<T> {
 };
 using MicrofacetReflection = MicrofacetReflectionOf<double>;
 
-// What the Fresnel term does not reflect, refracted. ratio: as of `fresnel`.
+// Refraction of what the Fresnel term does not reflect. ratio: see `fresnel`.
 //
 // As in Cycles, light from a lamp also comes in by half vectors that no facet can have which sends light down: so do the pictures
 // that this is compared with. What is found by scattered rays has none of it.

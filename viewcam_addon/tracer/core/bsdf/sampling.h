@@ -1,4 +1,4 @@
-// What sampling a BSDF, or one lobe of it, returns; and directions that are spread over spheres and cones as some density says.
+// The sample of a BSDF, or of one lobe of it; and directions that are spread over spheres and cones as some density says.
 #pragma once
 #include "../math/trig.h"
 #include "../math/vec.h"

@@ -1,7 +1,7 @@
 // The perfect mirror, how smooth normals are bent for mirrors and glass, and clear surfaces: Snell's refraction, and Fresnel's share of
 // what is reflected.
 //
-// What Cycles makes of smooth, perfectly clear surfaces (measured with 4.2, 5.0 and 5.2) is Fresnel's equations as they are, and no
+// Cycles' smooth, perfectly clear surfaces (measured with 4.2, 5.0 and 5.2) are these: Fresnel's equations as they are, and no
 // factor for the narrower cone of light in glass.
 #pragma once
 #include "../math/trig.h"

@@ -1,4 +1,4 @@
-// What is known of the point of a surface and of the ray that has come there, and coordinates that images are looked up by.
+// Geometry at a point of a surface, the ray that has come there, and coordinates that images are looked up by.
 #pragma once
 #include "../shapes/object.h"
 #include "math.h"
@@ -32,7 +32,7 @@ struct TextureCoordinateNode {
     }
 };
 
-// What a mesh has under a name: a color, a vector, their mean, or the fourth number, which is 1 where there is none.
+// A mesh's attribute of a name: a color, a vector, their mean, or the fourth number, which is 1 where there is none.
 struct AttributeNode {
     static constexpr const char* NAME = "attribute";
     static constexpr Gives GIVES = Gives::COLOR;

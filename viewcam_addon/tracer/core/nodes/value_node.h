@@ -1,5 +1,5 @@
-// What closures' inputs are computed from where they are neither constants nor a plain image: nodes, each of which makes a number,
-// a color or a vector of what other nodes make. A scene has one list of them; a node names only nodes before it.
+// Nodes, from which closures' inputs are computed where they are neither constants nor a plain image. Each makes a number, a
+// color or a vector of what other nodes make. A scene has one list of them; a node names only nodes before it.
 //
 // Evaluated at each hit, from the input back: what no input needs is never computed. A node whose inputs are all constant becomes
 // its value when it is made, so that constants cost nothing. Rejected: a stack machine (Cycles' SVM), whose order must be compiled.
