@@ -287,16 +287,17 @@ class ServerOnDemand:
 
     name : its name in sentences.
     module : a module of this package, which serves when it is run.
+    events : see ServerProcess.
     """
 
-    def __init__(self, name: str, module: str) -> None:
-        self._name, self._module = name, module
+    def __init__(self, name: str, module: str, events: Events | None = None) -> None:
+        self._name, self._module, self._events = name, module, events
         self._server: ServerProcess | None = None
 
     def ask(self, request: Mapping[str, Any]) -> Any:
         """The answer of the process; raises as ServerProcess does."""
         if self._server is None:
-            self._server = ServerProcess(self._name, module(self._module), environment())
+            self._server = ServerProcess(self._name, module(self._module), environment(), events=self._events)
         try:
             return self._server.ask(request)
         except ProcessEnded:
