@@ -331,7 +331,7 @@ def vague_beginnings(source: str) -> list[str]:
     return parameters + re.findall(rf'(?m)^ *r?"""((?:{words})\b.*?)(?:"""|$)', source)
 
 
-NO_NAMES = "found|given|made|one|said|shown|some|told"
+NO_NAMES = "found|given|it|made|one|said|shown|some|stuff|thing|things|told"
 POOR = rf"_?(?:{NO_NAMES})_?"
 SPELLED_AS_NAMES = [  # more or less: whole trees of syntax take ten seconds for all files
     re.compile(rf"\b{POOR}\)?( [:|+*/-]?= |, [^\"\n]* = )"),
