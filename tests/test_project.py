@@ -539,6 +539,26 @@ def test_every_path_that_a_document_names_exists():
     assert paths_named_in("in `tests/none.py`") == {"tests/none.py"}
 
 
+def dead_links(page: Path) -> list[str]:
+    """The links of a page to files, and to headings, that are not there."""
+    headings = functools.cache(lambda path: re.findall(r"(?m)^#+ (.*)", path.read_text(encoding="utf-8")))
+    dead = []
+    for link in re.findall(r"\]\(([^)\s:]+)\)", page.read_text(encoding="utf-8")):
+        name, _, anchor = link.partition("#")
+        path = page.parent / name if name else page
+        anchors = {re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-") for each in headings(path)} if anchor else {anchor}
+        dead += [link] if not path.exists() or anchor not in anchors else []
+    return dead
+
+
+def test_every_link_of_a_document_leads_somewhere(tmp_path):
+    pages = [ROOT / path for path in tracked_files() if path.endswith(".md")]
+    assert {page.name: links for page in pages if (links := dead_links(page))} == {}
+    page = tmp_path / "page.md"
+    page.write_text("# A `b` c\n[there](#a-b-c), [gone](#b) and [nowhere](none.md)\n", encoding="utf-8")
+    assert dead_links(page) == ["#b", "none.md"]
+
+
 def test_every_module_that_a_comment_names_exists():
     """But for the tracer's and those of other programs, which cameras/ names as its sources."""
     expected = re.compile(r"(?<![\w/.*-])((?:[a-z_]+/)*[a-z_]+\.py)\b")
