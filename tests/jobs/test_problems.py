@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import lists
-from viewcam_addon.jobs.lists import COLUMNS
-from viewcam_addon.jobs.problems import MOST_SHOWN, ShotsError
+from viewcam_addon.jobs.lists import COLUMNS, MOST_SHOWN, ShotsError
 
 pytestmark = pytest.mark.slow
 

@@ -6,7 +6,7 @@ FOLDER : docs/images.
 PHOTO : the photograph that photo_of_a_room.py draws.
 PART : the name of a function of STEPS; without any, all of them run.
 
-test_tour.py runs this. Leaves with status 0, or 5 and a traceback.
+test_window.py runs this. Leaves with status 0, or 5 and a traceback.
 """
 
 import subprocess

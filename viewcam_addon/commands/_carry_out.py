@@ -21,9 +21,9 @@ from ..jobs import run as running
 from ..jobs.folder import Folder, settings_hash
 from ..jobs.interruption import Interruption
 from ..jobs.job import Job
+from ..jobs.lists import ShotsError
 from ..jobs.names import one_file
 from ..jobs.plan import Plan, shard
-from ..jobs.problems import ShotsError
 from ..jobs.summary import Summary
 from ..terminal import say, silent_libraries
 from . import blender_room

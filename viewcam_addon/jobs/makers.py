@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..pinhole import Pinhole
 from . import names
 from .job import Job
-from .problems import Problems
+from .lists import Problems
 
 _MOST = 1_000_000
 _RANGE = re.compile(r"([-+]?\d{1,9})\.\.([-+]?\d{1,9})", re.ASCII)

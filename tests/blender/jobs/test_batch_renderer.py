@@ -17,7 +17,7 @@ from viewcam_addon import cameras, cli
 from viewcam_addon.blender import versions
 from viewcam_addon.blender.jobs import persistent_data, pictures
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
-from viewcam_addon.blender.rendering import exr, graphics
+from viewcam_addon.blender.rendering import exr, rasters
 from viewcam_addon.blender.scenes import depsgraph, export
 from viewcam_addon.cameras import Camera, Options
 from viewcam_addon.errors import InputError
@@ -369,7 +369,7 @@ def test_an_orbit_keeps_what_its_camera_has_beside_the_four_values(stage, shoot,
     ],
 )
 def test_what_can_not_be_rendered_is_said_before(stage, monkeypatch, shot, words):
-    monkeypatch.setattr(graphics, "are_there", lambda: False)
+    monkeypatch.setattr(rasters, "can_draw", lambda: False)
     flat = bpy.data.cameras.new("Flat")
     flat.type = "ORTHO"
     stage.collection.objects.link(bpy.data.objects.new("Flat", flat))
@@ -430,7 +430,7 @@ def test_eevee_draws_the_same_whatever_it_drew_before_or_is_refused(stage, shoot
     there, away = replace(LEFT, engine="EEVEE", samples=2), replace(RIGHT, engine="EEVEE", samples=2, frame=9)
     with BlenderRenderer() as renderer:
         problems = renderer.problems([there])
-        if not graphics.are_there():
+        if not rasters.can_draw():
             assert len(problems) == 1
             return
         assert not problems

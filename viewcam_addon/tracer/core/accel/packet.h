@@ -39,7 +39,7 @@ struct Shear {
     return inside & long4(determinant != zero);
 }
 
-// N rays, or sets of rays, as box_ray.h explains them, but for the origin, which is no product yet.
+// N rays, or sets of rays, as traverse.h explains them, but for the origin, which is no product yet.
 template <int N> struct alignas(64) BoxRays {
     float near_origin[3][N], far_origin[3][N], near_reciprocal[3][N], far_reciprocal[3][N], far[N];
 };

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "fresnel.h"
-#include "microfacets.h"
+#include "microfacet.h"
 
 using namespace viewcam::tables;
 

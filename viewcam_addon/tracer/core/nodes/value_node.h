@@ -12,10 +12,8 @@
 #include "geometry.h"
 #include "ies.h"
 #include "image.h"
-#include "light_path.h"
 #include "normals.h"
 #include "procedural.h"
-#include "spectrum.h"
 #include "voronoi.h"
 
 namespace viewcam::VIEWCAM_ISA {
@@ -35,8 +33,8 @@ struct Joined<std::variant<First...>, std::variant<Second...>, Others...> : Join
 // Each file of several nodes lists them at its end, those of one stand here. A node has a NAME, by which a scene asks for it, what it
 // GIVES, by which it becomes a number, and `eval`; VARIES or `varies` where it depends on more than its inputs; `gives` where the node
 // itself knows what it gives.
-using ValueNode = Joined<std::variant<ConstantNode, BumpNode, IESNode, LightPathNode, NormalMapNode, VoronoiNode>, ImageNodes, GeometryNodes,
-                         MathNodes, ColorNodes, CurveNodes, SpectrumNodes, ProceduralNodes>::Variant;
+using ValueNode = Joined<std::variant<ConstantNode, BumpNode, IESNode, NormalMapNode, VoronoiNode>, ImageNodes, GeometryNodes,
+                         MathNodes, ColorNodes, CurveNodes, ProceduralNodes>::Variant;
 template <class Kind>
 concept IsValueNode = requires(const Kind& node, const ShadingPoint& at) {
     { Kind::NAME } -> std::convertible_to<std::string_view>;
