@@ -189,7 +189,7 @@ def test_spheres_are_exact_spheres_and_one_is_an_ellipsoid(fresh_blender):
     exported = jobs.export(Job(blend=FOLDER / "spheres.blend", strict=True))
     spheres = {name: shape for name, shape in exported.geometries.items() if isinstance(shape, Spheres)}
     assert sum(len(shape.radii) for shape in spheres.values()) >= 6000
-    matrices = [matrix for thing in exported.objects if thing.geometry in spheres for matrix in thing.matrices]
+    matrices = [matrix for obj in exported.objects if obj.geometry in spheres for matrix in obj.matrices]
     scales = [np.linalg.norm(matrix[:3, :3], axis=0) for matrix in matrices]
     assert any(np.ptp(scale) > 0.1 for scale in scales), "no sphere is scaled to an ellipsoid"
 

@@ -298,7 +298,7 @@ def vague_beginnings(source: str) -> list[str]:
     return parameters + re.findall(rf'(?m)^ *r?"""((?:{words})\b.*?)(?:"""|$)', source)
 
 
-NO_NAMES = "found|given|made|one|said|shown|some|told"
+NO_NAMES = "found|given|it|made|one|said|shown|some|stuff|thing|things|told"
 POOR = rf"_?(?:{NO_NAMES})_?"
 SPELLED_AS_NAMES = [  # more or less: whole trees of syntax take ten seconds for all files
     re.compile(rf"\b{POOR}\)?( [:|+*/-]?= |, [^\"\n]* = )"),
@@ -470,6 +470,26 @@ def test_every_path_that_a_document_names_exists():
     missing = {path: gone for path, names in named.items() if (gone := {name for name in names if not (ROOT / name).exists()})}
     assert len(named["CONTRIBUTING.md"]) > 30 and not missing, missing
     assert paths_named_in("in `tests/none.py`") == {"tests/none.py"}
+
+
+def dead_links(page: Path) -> list[str]:
+    """The links of a page to files, and to headings, that are not there."""
+    headings = functools.cache(lambda path: re.findall(r"(?m)^#+ (.*)", path.read_text(encoding="utf-8")))
+    dead = []
+    for link in re.findall(r"\]\(([^)\s:]+)\)", page.read_text(encoding="utf-8")):
+        name, _, anchor = link.partition("#")
+        path = page.parent / name if name else page
+        anchors = {re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-") for each in headings(path)} if anchor else {anchor}
+        dead += [link] if not path.exists() or anchor not in anchors else []
+    return dead
+
+
+def test_every_link_of_a_document_leads_somewhere(tmp_path):
+    pages = [ROOT / path for path in tracked_files() if path.endswith(".md")]
+    assert {page.name: links for page in pages if (links := dead_links(page))} == {}
+    page = tmp_path / "page.md"
+    page.write_text("# A `b` c\n[there](#a-b-c), [gone](#b) and [nowhere](none.md)\n", encoding="utf-8")
+    assert dead_links(page) == ["#b", "none.md"]
 
 
 def test_every_module_that_a_comment_names_exists():

@@ -55,9 +55,9 @@ def made_scene(camera=CAMERA):
     balls = Spheres(
         np.array([[0, 0, 0.5], [1.2, 0.6, 0.3], [0.4, -1.5, 0.4]]), np.array([0.5, 0.3, 0.4]), np.zeros(3, np.int32)
     )
-    things = {"ground": ground, "tent": tent, "balls": balls}
-    objects = tuple(Object(name, name, np.eye(4), number) for number, name in enumerate(things, start=1))
-    return Scene(camera, things, objects, clip=CLIP)
+    geometries = {"ground": ground, "tent": tent, "balls": balls}
+    objects = tuple(Object(name, name, np.eye(4), number) for number, name in enumerate(geometries, start=1))
+    return Scene(camera, geometries, objects, clip=CLIP)
 
 
 @pytest.fixture(scope="module")

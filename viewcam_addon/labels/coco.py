@@ -64,8 +64,8 @@ def panoptic(folder: Path) -> Document:
         ]
         file_name = files.of_picture(Path(document["picture"]), "instances.png").name
         annotations.append({"image_id": number, "file_name": file_name, "segments_info": segments})
-    things = [{**each, "isthing": 1, "color": _color(each["id"])} for each in _categories(categories)]
-    return {"images": _images(pictures), "annotations": annotations, "categories": things}
+    listed = [{**each, "isthing": 1, "color": _color(each["id"])} for each in _categories(categories)]
+    return {"images": _images(pictures), "annotations": annotations, "categories": listed}
 
 
 def category(instance: Document) -> str:

@@ -27,8 +27,8 @@ def room():
 
 def light_of(make_lit, make_mesh, surface, world, picture, level="direct", samples=64, camera=DOWN, threads=2):
     floor = make_mesh([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2), (0, 2, 3)])
-    things = [] if surface is None else [(floor, Material(surface=surface))]
-    scene = make_lit(camera, *things, world=world, images={"room": picture}, film=Film("BOX"))
+    bodies = [] if surface is None else [(floor, Material(surface=surface))]
+    scene = make_lit(camera, *bodies, world=world, images={"room": picture}, film=Film("BOX"))
     return render(scene, level, samples, threads=threads)
 
 
