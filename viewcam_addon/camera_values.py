@@ -141,7 +141,7 @@ class CameraValues:
     ) -> "CameraValues":
         """These values with the numbers of another frame; dataclasses.replace takes eight times as long.
 
-        factors : those of FACTORS that are others.
+        factors : new numbers by name, some of FACTORS.
         """
         values = object.__new__(CameraValues)
         numbers = {"eye": eye, "look_at": look_at, "up": up, "distance": distance, "precision": precision}
