@@ -2,7 +2,9 @@
 
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python artist_in_a_window.py -- FOLDER [PICTURES]
 
-FOLDER : where rendered pictures and reports go. PICTURES : where pictures of the window go; without it none are taken.
+FOLDER : a folder for rendered pictures and reports.
+PICTURES : a folder for pictures of the window; without it none are taken.
+
 What each part of the add-on does beyond that day is in tour_in_a_window.py, handles_, proof_ and cameras_in_a_window.py.
 Leaves with status 0, or 5 and a traceback.
 """
@@ -699,7 +701,8 @@ def match_a_photo():
     assert _is_as_before(), "one undo does not take it back"
 
 
-# What would send an artist away again, and what is tried of it. Each part goes on where the one before it has ended.
+# Things that would send an artist away again if they failed, and the steps that try them. Each part goes on where the one
+# before it has ended.
 DAY = {
     "The lens can be set in the panel": (tick_the_box, choose_the_unit),
     "Fields go as far as Blender's own": (drag_the_fields,),

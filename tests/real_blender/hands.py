@@ -19,7 +19,8 @@ from bpy_extras.object_utils import world_to_camera_view
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Euler, Vector
 
-# Of the interface and of all places here: a window of half the width and height is drawn in software in a third of the time.
+# The scale of the interface and of all places here: a window of half the width and height is drawn in software in a third of
+# the time.
 SCALE = float(os.environ.get("VIEWCAM_UI_SCALE", "1"))
 NOWHERE = (int(600 * SCALE), int(500 * SCALE))  # a place in the 3D viewport
 # A step that yields these seconds leaves the processors to what it waits for: where events are simulated, Blender never sleeps.
@@ -425,9 +426,9 @@ def call(operator, where=VIEWPORT, **properties):
 
 
 def until(is_so, what, patience=_PATIENCE, seconds=0):
-    """Steps until something has happened: none is counted on to take a time. seconds : of each, where it does take some.
+    """Steps until something has happened: none is counted on to take a time.
 
-    patience : seconds, many times what it takes on a quiet machine.
+    patience : seconds, many times what it takes on a quiet machine. seconds : of each step, where it does take some.
     """
     ends = time.monotonic() + patience
     while not is_so():
@@ -456,7 +457,7 @@ def hide_the_sidebar(hidden=True):
 def photograph(where, path, share=100, pointer=None):
     """Save what the screen shows of (left, bottom, width, height), in percent of its size and few colors.
 
-    pointer : where the mouse is, window coordinates, and its arrow is drawn: simulated events move none.
+    pointer : the mouse's place, window coordinates, at which its arrow is drawn: simulated events move none.
     """
     left, bottom, width, height = map(int, where)
     screen = ("import", "-window", "root", "-crop", f"{width}x{height}+{left}+{SCREEN_HEIGHT - bottom - height}", "+repage")

@@ -2,9 +2,11 @@
 
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python pictures_in_a_window.py -- FOLDER PHOTO [PART…]
 
-FOLDER : docs/images. PHOTO : that of photo_of_a_room.py. PART : a function of STEPS; without any, all of them. test_tour.py
-runs this.
-Leaves with status 0, or 5 and a traceback.
+FOLDER : docs/images.
+PHOTO : the photograph that photo_of_a_room.py draws.
+PART : the name of a function of STEPS; without any, all of them run.
+
+test_window.py runs this. Leaves with status 0, or 5 and a traceback.
 """
 
 import subprocess

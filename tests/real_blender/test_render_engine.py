@@ -12,7 +12,7 @@ from viewcam_addon import image
 ROOT = Path(__file__).resolve().parent.parent.parent
 SCRIPT = Path(__file__).with_name("engine_in_a_window.py")
 BLOCKED = 0.1  # seconds, from which on a window that waits is felt
-# What inside_blender.py tells the engine.
+# The options that inside_blender.py gives the engine.
 CHOICES = ("--level", "path", "--samples", "4", "--seed", "7")
 
 
@@ -86,7 +86,7 @@ def test_escape_cancels_a_heavy_render_within_seconds(host, lit_file, tmp_path):
 def test_in_rendered_shading_the_viewport_turns_and_light_comes_when_it_rests(host, lit_file, tmp_path):
     """And the window is never blocked for 0.1 s: no call of the engine's computes as long, nor do they wait for a picture.
 
-    A busy machine may take the processor away for a while, not in most of the calls. The window's viewport is of about 960 × 540.
+    A busy machine may take the processor away for a while, not in most of the calls. The viewport is of about 960 × 540.
     """
     in_a_window(host, "view", lit_file, tmp_path / "figures", simulated=True, size=(1280, 800))
     figures = json.loads((tmp_path / "figures").read_text())

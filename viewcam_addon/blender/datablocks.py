@@ -98,7 +98,7 @@ def has_driven_values(camera_object: bpy.types.Object) -> bool:
     return any(curve.data_path.startswith(f"{_VALUES}.") for curve in versions.drivers(camera_object))
 
 
-# What is checked once is not checked again as a camera moves.
+# Numbers that were checked once are not checked again as a camera moves.
 _known_frame = functools.lru_cache(maxsize=64)(intrinsics.Frame)
 _known_camera = functools.lru_cache(maxsize=64)(intrinsics.CameraData)
 view_plane = functools.lru_cache(maxsize=64)(intrinsics.view_plane)

@@ -19,20 +19,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import checks
-from ..camera_values import FIELD_OF_VIEW, HOLD, CameraValues, without_border
+from ..camera_values import FACTORS, FIELD_OF_VIEW, HOLD, CameraValues, without_border
 from ..errors import InputError
 from ..intrinsics import Frame
 from . import datablocks, versions
 
-Raw = tuple[tuple[float, ...], str, float | None]
+Raw = tuple[tuple[float, ...], str, tuple[float | None, ...]]
 
 EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
 _VECTORS = ("eye", "look_at", "up")
-# What is no property of its own, or not as it is; a property with the name of each other value holds it.
+# Values that are no property of their own, or not as they are; each other one is held by the property of its name.
 _NOT_PLAIN = EXACT | {"counted_in", "set_for", "view_when_set", "precision", "follows", "asked"}
 _PLAIN = tuple(each.name for each in fields(CameraValues) if each.name not in _NOT_PLAIN)
 _ASKED = "asked"  # where Blender keeps what `ask` has noted
-# What is noted of a camera once it has been set.
+# Values that are noted of a camera once it has been set.
 _NOTED = ("distance", "counted_in", "set_for", "view_when_set", "held_roll")
 _NUMBERS = struct.Struct("<10d")
 is_storing = False  # else the artist or a script sets a property, and the camera moves
@@ -92,7 +92,7 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
 
 
 def raw(camera_object: bpy.types.Object) -> Raw | None:
-    """The four values and the zoom as Blender holds them: ten numbers, `exact`, and the factor, None where that is the default.
+    """The four values and FACTORS as Blender holds them: ten numbers, `exact`, and the factors, None where one is the default.
 
     It takes a third of the time that the properties take. The evaluated object may be given as well. Returns None where a curve
     asks for another look at a value, or where a value has never been set.
@@ -102,27 +102,33 @@ def raw(camera_object: bpy.types.Object) -> Raw | None:
         rounded = (*stored["eye"], *stored["look_at"], *stored["up"], stored["distance"])
     except KeyError:
         return None
-    return None if _ASKED in stored else (rounded, stored.get("exact", ""), stored.get("zoom"))
+    return None if _ASKED in stored else (rounded, stored.get("exact", ""), tuple(map(stored.get, FACTORS)))
 
 
 def animated(before: CameraValues, changed: Raw) -> CameraValues:
     """The values of a camera of which curves alone can have changed any: `before` itself if none has.
 
-    before : values that follow no target. changed : what is held of them now, by `raw`.
+    before : the values before, which follow no target.
+    changed : the numbers that Blender holds of them now, see `raw`.
     """
-    rounded, exact, zoom = changed
-    zoom = before.zoom if zoom is None else zoom
+    rounded, exact, stored = changed
+    factors = {
+        name: number
+        for name, number in zip(FACTORS, stored, strict=True)
+        if number is not None and number != getattr(before, name)
+    }
     numbers, is_exact = _numbers(exact, rounded)
-    if zoom == before.zoom and numbers == (*before.eye, *before.look_at, *before.up, before.distance):
+    if not factors and numbers == (*before.eye, *before.look_at, *before.up, before.distance):
         return before
     precision = 2.0**-53 if is_exact else 2.0**-24
-    return before.animated(numbers[0:3], numbers[3:6], numbers[6:9], numbers[9], zoom, precision)
+    return before.animated(numbers[0:3], numbers[3:6], numbers[6:9], numbers[9], precision, **factors)
 
 
 def _numbers(text: str, rounded: tuple[float, ...]) -> tuple[tuple[float, ...], bool]:
     """Eye, look-at, up and distance, ten numbers, and whether all of them are known in float64.
 
-    text : `exact` of the camera. rounded : the ten numbers of its properties.
+    text : `exact` of the camera.
+    rounded : the ten numbers of its properties.
     """
     exact = _parsed(text, 10)
     if not exact:

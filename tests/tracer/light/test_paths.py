@@ -194,11 +194,11 @@ def test_a_lambert_sphere_under_a_sun_is_bright_by_its_cosine_and_dark_behind(ma
     assert (passes["Combined"][~met] == (0, 0, 0, 1)).all()
 
 
-def lit_from_above(make_mesh, make_lit, lamp=None, thing=None, samples=64, seed=0, albedo=0.8, **light):
+def lit_from_above(make_mesh, make_lit, lamp=None, body=None, samples=64, seed=0, albedo=0.8, **light):
     """The middle of a plane, 0.0016 wide, from below a lamp or a thing that shines: what it gets differs there by 1e-6."""
     camera = Pinhole((0, 0, 0.5), (0, 0, 0), (0, 1, 0), 5000, 16, 12)
-    things = [(square(make_mesh, 0.05), lambert(albedo))] + ([thing] if thing else [])
-    return render(make_lit(camera, *things, lamps=(lamp,) if lamp else (), **light), "direct", samples, seed, threads=1)
+    bodies = [(square(make_mesh, 0.05), lambert(albedo))] + ([body] if body else [])
+    return render(make_lit(camera, *bodies, lamps=(lamp,) if lamp else (), **light), "direct", samples, seed, threads=1)
 
 
 def facing_rectangle(half_x, half_y, height):
@@ -226,7 +226,7 @@ def test_an_area_lamp_lights_a_point_by_its_form_factor(make_mesh, make_lit, ell
 
 
 def test_a_shining_square_lights_a_point_by_its_form_factor(make_mesh, make_lit):
-    passes = lit_from_above(make_mesh, make_lit, thing=(square(make_mesh, 0.5, 1.0), glow(5)))
+    passes = lit_from_above(make_mesh, make_lit, body=(square(make_mesh, 0.5, 1.0), glow(5)))
     assert_close(passes, 0.8 * 5 * facing_rectangle(0.5, 0.5, 1.0), 0.005)
 
 
@@ -234,14 +234,14 @@ def test_a_shining_principled_square_lights_by_the_mean_of_its_image(make_mesh, 
     images = {"screen": Picture(np.tile(np.array([[[7.0], [3.0]]], np.float32), (1, 1, 3)))}
     screen = Material(node("principled", emission_color=Color(WHITE, image="screen"), emission_strength=1.0))
     mesh = replace(square(make_mesh, 0.5, 1.0), corner_uvs=np.array([[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]], "f4"))
-    passes = lit_from_above(make_mesh, make_lit, thing=(mesh, screen), images=images)
+    passes = lit_from_above(make_mesh, make_lit, body=(mesh, screen), images=images)
     assert_close(passes, 0.8 * 5 * facing_rectangle(0.5, 0.5, 1.0), 0.005)
 
 
 def test_a_coat_dims_what_shines_below_it_alike_in_all_colors(make_mesh, make_lit):
     def light_of(color):
         coated = Material(node("principled", emission_color=color, emission_strength=5.0, coat_weight=1.0))
-        return lit_from_above(make_mesh, make_lit, thing=(square(make_mesh, 0.5, 1.0), coated))["Combined"][..., 1]
+        return lit_from_above(make_mesh, make_lit, body=(square(make_mesh, 0.5, 1.0), coated))["Combined"][..., 1]
 
     np.testing.assert_allclose(light_of((0.0, 1.0, 1.0)), light_of(WHITE), rtol=ROUNDED)
 
@@ -260,7 +260,7 @@ def test_means_of_many_pictures_are_right_at_any_number_of_samples(make_mesh, ma
     expected = 0.8 * 5 * facing_rectangle(0.5, 0.5, 1.0)
     for samples in (1, 4, 16, 64):
         means = [
-            lit_from_above(make_mesh, make_lit, thing=(square(make_mesh, 0.5, 1.0), glow(5)), samples=samples, seed=seed)[
+            lit_from_above(make_mesh, make_lit, body=(square(make_mesh, 0.5, 1.0), glow(5)), samples=samples, seed=seed)[
                 "Combined"
             ][..., :3].mean()
             for seed in range(12)
@@ -349,7 +349,7 @@ def radiosity(patches, most):
 
 def back_wall(make_mesh, make_lit, reflections, by_lamp=False, samples=256, seed=0, walls=WALLS, brightness=1.0):
     """The tracer's mean radiance of the back wall, and its standard error."""
-    things = [
+    bodies = [
         (make_mesh(corners(axis, sign, (-1, -1), (1, 1)), [[0, 1, 2], [0, 2, 3]]), sum_of(diffuse=Color(color)))
         for axis, sign, color in walls.values()
     ]
@@ -362,8 +362,8 @@ def back_wall(make_mesh, make_lit, reflections, by_lamp=False, samples=256, seed
     else:  # part of the ceiling, which shines as well
         square = corners(2, 1, (-HALF, -HALF), (HALF, HALF)) - (0, 0, 1e-6)
         material = sum_of(diffuse=Color(walls["ceiling"][2]), emission=Color((radiance,) * 3))
-        things.append((make_mesh(square, [[0, 1, 2], [0, 2, 3]]), material))
-    scene = make_lit(CAMERA, *things, lamps=lamps, bounces=Bounces(reflections, 1024, 1024, 1024), film=Film(filter="BOX"))
+        bodies.append((make_mesh(square, [[0, 1, 2], [0, 2, 3]]), material))
+    scene = make_lit(CAMERA, *bodies, lamps=lamps, bounces=Bounces(reflections, 1024, 1024, 1024), film=Film(filter="BOX"))
     passes = render(scene, "path", samples, seed, threads=1)
     picture, variance = (passes[name][..., :3].astype(float) for name in ("Combined", "Variance"))
     return picture.mean(axis=(0, 1)), np.sqrt(variance.sum(axis=(0, 1))) / picture[..., 0].size

@@ -50,11 +50,11 @@ def test_refraction_shows_things_where_snell_says(make_mesh, make_lit):
     """From 2 above water of 1.5 that is 1 deep, the floor beyond x = 0.8 is lit: the ray at x = 2 tan a there arrives at
     2 tan a + tan b with sin a = 1.5 sin b."""
     camera = Pinhole((0, 0, 2), (0.7, 0, 0), (0, 1, 0), 1000, 400, 4)
-    things = (
+    bodies = (
         (rectangle(make_mesh, (-9, 9), (-9, 9), 0.0), sum_of(refraction=Color((1.0, 0.5, 0.25)), ior=1.5)),
         (rectangle(make_mesh, (0.8, 9), (-9, 9), -1.0), glow(1)),
     )
-    picture = render(make_lit(camera, *things), "direct", 1, threads=1)["Combined"][..., :3]
+    picture = render(make_lit(camera, *bodies), "direct", 1, threads=1)["Combined"][..., :3]
     rows, columns = np.mgrid[:4, :400]
     x, y, z = np.moveaxis(camera.ray_directions(columns, rows), -1, 0)
     sine = np.hypot(x, y)
@@ -68,12 +68,12 @@ def test_refraction_shows_things_where_snell_says(make_mesh, make_lit):
 def test_glass_shares_light_out_by_fresnel(make_mesh, make_lit):
     """Water, seen flat: F of the bright ceiling and 1 − F of the floor."""
     camera = Pinhole((0, 0, 1), (5, 0, 0), (0, 0, 1), 2000, 16, 12)
-    things = (
+    bodies = (
         (rectangle(make_mesh, (-90, 90), (-90, 90), 0.0), sum_of(glass=Color(WHITE), ior=1.33)),
         (rectangle(make_mesh, (-900, 900), (-900, 900), 9.0), glow(5)),
         (rectangle(make_mesh, (-90, 90), (-90, 90), -1.0), glow(1)),
     )
-    passes = render(make_lit(camera, *things), "direct", 256, threads=1)
+    passes = render(make_lit(camera, *bodies), "direct", 256, threads=1)
     angle = np.arccos(-camera.ray_directions(*np.meshgrid(np.arange(16), np.arange(12)))[..., 2])
     reflectance = fresnel_of_angles(angle, 1.33)
     off = passes["Combined"][..., 0] - (1 + 4 * reflectance)
@@ -90,8 +90,8 @@ def test_a_pane_of_clear_glass_shifts_what_is_behind_it(make_mesh, make_lit):
     pane = [rectangle(make_mesh, (-9, 9), (-9, 9), 1.0), rectangle(make_mesh, (-9, 9), (-9, 9), 0.5)]
     below = make_mesh(pane[1].vertices, pane[1].triangles[:, ::-1])  # its front looks down, out of the glass
     glass = sum_of(glass=Color(WHITE), ior=1.5)
-    things = ((pane[0], glass), (below, glass), (rectangle(make_mesh, (1.2, 9), (-9, 9), -1.0), glow(1)))
-    passes = render(make_lit(camera, *things, bounces=WITHOUT_END), "path", 128, threads=1)
+    bodies = ((pane[0], glass), (below, glass), (rectangle(make_mesh, (1.2, 9), (-9, 9), -1.0), glow(1)))
+    passes = render(make_lit(camera, *bodies, bounces=WITHOUT_END), "path", 128, threads=1)
     rows, columns = np.mgrid[:4, :400]
     x, _, z = np.moveaxis(camera.ray_directions(columns, rows), -1, 0)
     angle = np.arccos(-z)
@@ -114,9 +114,9 @@ def test_between_two_mirrors_light_is_reflected_as_often_as_there_are_bounces(ma
     camera = Pinhole((0, 0, 1), (0, 0.1, 0), (0, 1, 0), 500, 8, 6)
     shining = {component: Color((0.5,) * 3), "emission": Color(WHITE), "ior": 1e3 if component == "glass" else 1.45}
     floor, ceiling = rectangle(make_mesh, (-99, 99), (-99, 99), 0.0), rectangle(make_mesh, (-99, 99), (-99, 99), 2.0)
-    things = [(floor, sum_of(**shining)), (ceiling, sum_of(**shining))]
+    bodies = [(floor, sum_of(**shining)), (ceiling, sum_of(**shining))]
     for bounces, reflections in ((Bounces(0, 9, 9, 9), 1), (Bounces(3, 9, 9, 9), 4), (Bounces(9, 9, 2, 9), 3)):
-        scene = make_lit(camera, *things, bounces=bounces)
+        scene = make_lit(camera, *bodies, bounces=bounces)
         picture = render(scene, "path", 1, threads=1)["Combined"][..., :3]
         expected = sum(0.5**k for k in range(reflections + 1))
         if component == "mirror":
