@@ -58,7 +58,7 @@ test: .venv/test
 test-fresh:
 	.ci/fresh-machine "make demo" "make test"
 
-# What is slow and needs Blender, the oldest and the newest run: test-matrix and test-blender.
+# Slow tests that need Blender are run with the oldest and the newest: test-matrix and test-blender.
 test-exhaustive: .venv/test
 	$(call PARALLEL,.venv) --numprocesses=3 -m "exhaustive or (slow and not blender)"
 
@@ -67,7 +67,7 @@ sanitizers-address = address,undefined
 preload-address = $(shell g++ -print-file-name=libasan.so) $(shell g++ -print-file-name=libubsan.so)
 sanitizers-thread = thread
 preload-thread = $(shell g++ -print-file-name=libtsan.so)
-# What goes wrong between threads shows where there are some; the rest is tried on one.
+# Faults between threads show where there are some; the others are looked for on one.
 tests-address = tests/tracer/test_c_interface.py tests/tracer/test_leaks.py tests/tracer/test_render.py tests/tracer/test_triangles.py \
 	tests/tracer/light/test_textbook.py tests/tracer/light/test_textures.py
 calls-address = VIEWCAM_FUZZ_CALLS=150
@@ -98,7 +98,7 @@ lint: .venv/test
 	.venv/bin/python -c 'import bpy'
 	touch $@ .venv/demo
 
-# What makes zips, beside the tests of them.
+# The environment that makes zips, beside the tests of them.
 .venv/zips: .venv/test
 	$(PYTHON_FOUND) .ci/environment.py .venv --editable '.[extension]'
 	touch $@
@@ -120,11 +120,12 @@ MATRIX := $(filter-out $(TESTED),$(WHEELS))
 test-matrix: $(MATRIX:%=test-wheel-%)
 	@$(if $(filter 5.2,$(WHEELS)),,echo "NOT TESTED: the wheel of Blender 5.2, since there is no Python 3.13 on the PATH or in pyenv")
 
-# What a version can change: what touches Blender; with the oldest and the newest, which have NumPys of their own, the quick ones;
-# with the newest, which has a Python of its own, processes. Of the newest, tests/blender runs inside the real one, but for lights
-# and batches (test-blender). What is slow of lights the newest has alone, what is slow of batches the oldest. Between the two, 4.5
-# has what versions.py tells apart: scenes, pictures, animation; 5.0 has the rest, and test-light what Cycles shades. The faults
-# that are made on purpose, and the sample scenes, are the oldest's, whose files the latter are.
+# The tests whose outcome a version can change: those that touch Blender; with the oldest and the newest, which have NumPys of
+# their own, the quick ones; with the newest, which has a Python of its own, processes. Of the newest, tests/blender runs inside
+# the real one, but for lights and batches (test-blender). What is slow of lights the newest has alone, what is slow of batches
+# the oldest. Between the two, 4.5 has what versions.py tells apart: scenes, pictures, animation; 5.0 has the rest, and
+# test-light what Cycles shades. The faults that are made on purpose, and the sample scenes, are the oldest's, whose files the
+# latter are.
 TOUCHING_BLENDER = tests/blender tests/test_crashes.py \
 	$(shell grep -lE 'importorskip\("bpy"\)' tests/test_*.py tests/commands/test_*.py tests/comparison/test_*.py | grep -v test_project)
 tests-4.5 = tests/blender $(foreach each,interface jobs light,--ignore=tests/blender/$(each))
@@ -206,7 +207,7 @@ extension: .venv/extension
 
 artist-pictures: .venv/test
 	BLENDER=$$(.ci/find-blender) || exit 1; export BLENDER; \
-	VIEWCAM_PICTURES=docs/images/artists .venv/bin/python -m pytest tests/real_blender/test_tour.py
+	VIEWCAM_PICTURES=docs/images/artists .venv/bin/python -m pytest tests/real_blender/test_window.py -k tour
 
 # Blender 4.2 writes them, so that every later one opens them.
 scenes: .venvs/4.2/ready

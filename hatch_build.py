@@ -81,7 +81,8 @@ def system_compiler() -> str | None:
 def build_core(platform: str, flags: tuple[str, ...] = (), travels: bool = False) -> Path:
     """The library for a platform, compiled where it is not there yet.
 
-    flags : more of them, as sanitizers need. travels : by ziglang, for machines whose C library is older than this one's.
+    flags : more of them, as sanitizers need.
+    travels : true to compile by ziglang, for machines whose C library is older than this one's.
     """
     compiler = system_compiler() if platform == this_platform() and not travels else None
     library, options = _place(platform, compiler, flags)
@@ -154,7 +155,7 @@ def _compiled(platform: str, command: list[str], zig: bool, folder: Path) -> Pat
         if zig:
             first.result()
     library = folder / PLATFORMS[platform][2]
-    # Of what several objects define alike, linkers take the first: that of the least instruction set.
+    # Linkers take the first of several definitions of a name: that of the least instruction set.
     _run([*linked, *objects, "-o", str(library)])
     return library
 
@@ -212,7 +213,7 @@ class CoreBuildHook(BuildHookInterface):
         included = {str(library): f"{PACKAGE}/{library.name}", str(empty): f"{PACKAGE}/__init__.py"}
         build_data["force_include_editable" if version == "editable" else "force_include"].update(included)
         build_data["pure_python"] = False
-        # What is compiled by ziglang, or on this machine for this machine.
+        # The platform of a core that ziglang compiled, or this machine for itself.
         tag = sysconfig.get_platform() if system_compiler() else PLATFORMS[platform][1]
         build_data["tag"] = f"py3-none-{tag.replace('-', '_').replace('.', '_')}"
 

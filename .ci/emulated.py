@@ -44,7 +44,7 @@ PIP_PLATFORMS = {
     "linux-arm64": ["manylinux_2_28_aarch64", "manylinux2014_aarch64", "manylinux_2_17_aarch64"],
 }
 BLENDERS = {"4.2": ["bpy==4.2.23", "numpy==1.24.*"], "5.0": ["bpy==5.0.1", "numpy==1.26.*"]}
-# What pip adds on Windows alone: its markers are asked of this machine.
+# Packages that pip adds on Windows alone: its markers are asked of this machine.
 WINDOWS_ALONE = ["colorama"]
 BUNDLED = ["OpenEXR==3.5.3", "Jinja2==3.1.6", "MarkupSafe==3.0.4", "tqdm==4.70.1"]
 TESTS = ["numpy==1.26.*", "pytest>=8.3", "pytest-timeout>=2.3", "hypothesis>=6.100", "mpmath>=1.3", "pyyaml>=6"]
@@ -54,7 +54,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 # With Blender 5.0 alone, whose suite has the tests of cameras and labels.
 EXTRAS = PROJECT["optional-dependencies"]
 JUDGES = [*EXTRAS["judges"], *EXTRAS["flip"], "embreex>=4.4", "numpy==1.26.*"]
-# What every Python under wine does first.
+# The program that every Python under wine runs first.
 # - wine's clocks tick every 100 ns. Dask waits until it has the same time twice, and so for ever.
 # - wine 8 has VirtualAlloc2, but none of the placeholders into which Blender maps files from 5.0 on: it would read no image and
 #   link no file. Where Windows is too old for that function Blender does without; so its name is hidden in kernelbase's table.
@@ -192,7 +192,8 @@ def of_windows(path: Path) -> str:
 def windows(blender: str, bare: bool = False) -> tuple[list[str], dict[str, str]]:
     """The command of Python for Windows and its environment variables.
 
-    blender : a version of BLENDERS. bare : with what that Blender's own Python has alone: neither this checkout nor tests.
+    blender : a version of BLENDERS.
+    bare : with what that Blender's own Python has alone: neither this checkout nor tests.
     """
     folders = [packages("windows-x64", f"blender-{blender}", *BLENDERS[blender], *WINDOWS_ALONE)]
     if not bare:

@@ -25,7 +25,7 @@ SUBJECTS = {
 def main(words: Sequence[str] | None = None) -> int:
     """Run the sweeps of one subject and return the exit status.
 
-    words : those of the shell by default.
+    words : the command's words, the shell's by default.
     """
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__.partition("\n")[0])
     parser.add_argument("subject", choices=SUBJECTS, help="; ".join(f"{name}: {text}" for name, text in SUBJECTS.items()))

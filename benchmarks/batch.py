@@ -36,7 +36,7 @@ ROOT = Path(__file__).resolve().parent.parent
 STUDIO = ROOT / "sample_scenes" / "studio.blend"
 STILL = Pinhole((-0.5, -7.6, 1.62), (0.0, 0.9, 1.38), (0.0, 0.0, 1.0), 395.0, 320, 180)
 
-# One shot of the loop: as in a pipeline, but with this add-on's own camera, since only the same camera has the same pixels.
+# A shot of the loop, as in a pipeline, but with this add-on's own camera, since only the same camera has the same pixels.
 ONE_SHOT = """
 import bpy, json
 from bl_ext.user_default.virtual_pinhole.viewcam_addon.blender import camera, versions

@@ -40,13 +40,13 @@ _MARKERS = "osv^Dd<>"
 _OURS = "#0b3d91"
 _OURS_STYLES = tuple((_OURS, marker, line) for marker, line in zip("osD^", ("-", "--", "-.", ":"), strict=True))
 _INK, _BACKGROUND, _FAINT, _GRID = "#1f2328", "#ffffff", "#656d76", "#e5e8eb"
-# What these are where pages are dark. A picture on a page knows what its reader prefers, and not the page's own colors: so it
-# brings its paper along.
+# The colors on dark pages. A picture on a page knows what its reader prefers, and not the page's own colors: so it brings its
+# paper along.
 _IN_THE_DARK = {_INK: "#e6edf3", _BACKGROUND: "#0d1117", _FAINT: "#9198a1", _GRID: "#30363d", _OURS: "#58a6ff"}
 _LIGHTER = ("#ff9a3c", "#4cc24c", "#ff7b72", "#bc8cff", "#c69083", "#f19cd2", "#cfd03a", "#39cfe0")
 _IN_THE_DARK |= dict(zip(_COLORS, _LIGHTER, strict=True))
 _FEW = 300  # times the least x, up to which the greatest leaves room for numbers between the powers of ten
-# What a measurement stands on, as far as it is installed.
+# Packages that a measurement depends on, as far as they are installed.
 _PACKAGES = ("numpy", "embreex", "bpy", "mitsuba")
 
 
@@ -54,11 +54,15 @@ _PACKAGES = ("numpy", "embreex", "bpy", "mitsuba")
 class Curve:
     """One method on a chart.
 
-    x, y : as many numbers each. y = 0 lies on the lower edge; nan and inf mean that the method has no answer there.
-    ours : whether it is the method in use. league : curves compete with those of the same league only (a method that computes
-        in float64 does not compete with what Blender stores in float32). tie : errors up to this count as equal, the chart's
-        own tie if it is None. limit : no method, but what the others of its league must not exceed. spread : the least and
-        the most of each x, where it was measured several times. minor : whether it stays in the background.
+    x, y : the points' numbers, as many of each. y = 0 lies on the lower edge; nan and inf mean that the method has no answer
+        there.
+    ours : true for the method in use.
+    league : curves compete with those of the same league only (a method that computes in float64 does not compete with what
+        Blender stores in float32).
+    tie : errors up to this count as equal, the chart's own tie if it is None.
+    limit : no method, but what the others of its league must not exceed.
+    spread : the least and the most of each x, where it was measured several times.
+    minor : true to draw it in the background.
     """
 
     name: str
@@ -80,10 +84,12 @@ class Curve:
 class Chart:
     """A sweep: one curve for each method.
 
-    name : of its file, without subject and extension. reading : a sentence that says what to read off.
+    name : the name of its file, without subject and extension.
+    reading : a sentence that says what to read off.
     tie : errors up to this count as equal, inf where nothing is judged.
     reverse : the failure lies at small x, and x falls to the right.
-    log_x, log_y : whether the axes are logarithmic. levels : heights that methods are compared at.
+    log_x, log_y : true for a logarithmic axis.
+    levels : heights that methods are compared at.
     rows : a row for each method, named at its left, with y written at its right: where methods have a point or two each. They
         are what the points of a row are, the first filled and the second hollow.
     """
@@ -185,7 +191,8 @@ def _processor() -> str:
 def draw(charts: Sequence[Chart], path: Path, command: str, measured_on: str = "") -> None:
     """Write charts, one above the other, as one SVG, whole or not at all.
 
-    command : what measures them again, for the captions. measured_on : the machine and versions, those here if it is empty.
+    command : the command that measures them again, for the captions.
+    measured_on : the machine and versions, those here if it is empty.
 
     Raises
     ------
@@ -358,7 +365,9 @@ def run(
 ) -> tuple[int, dict[str, Any]]:
     """Measure the sweeps of a package of benchmarks and draw their charts into `folder`.
 
-    sweeps : the package's modules, each with a `charts(quick)`. only : some of them, all if it is empty. quick : few trials.
+    sweeps : the package's modules, each with a `charts(quick)`.
+    only : some of them, all if it is empty.
+    quick : few trials.
 
     Returns 0, or 1 if the method in use is behind another somewhere, and their figures.
 

@@ -144,8 +144,8 @@ def prepare_passes(blend: Path, shots: Sequence[Job], folder: Path) -> dict[str,
 
     viewcam_addon.register()
     opening.open_blend(STUDIO)
-    for things in (bpy.data.objects, bpy.data.materials):
-        for number, each in enumerate(things, 1):
+    for datablocks in (bpy.data.objects, bpy.data.materials):
+        for number, each in enumerate(datablocks, 1):
             each.pass_index = number
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
 

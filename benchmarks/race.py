@@ -25,8 +25,9 @@ Runner = Callable[..., float]
 class Contestant:
     """A contestant in a process of its own, for the time of a `with` block.
 
-    prepare : a function at the top of a module; it is called there with the arguments and returns what can be asked for:
-    name → a function that does it once and returns its seconds. environment : variables that the process finds set.
+    prepare : a function at the top of a module; it is called there with the arguments and returns what can be asked for: name →
+        a function that does it once and returns its seconds.
+    environment : variables that the process finds set.
     """
 
     def __init__(

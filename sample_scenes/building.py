@@ -93,22 +93,22 @@ def kit(name: str):
 
 def instance(name: str, of, location=(0, 0, 0), rotation=(0, 0, 0)):
     """All objects of a kit once more, by an empty that stands for them."""
-    thing = place(name, None, location=location, rotation=rotation)
-    thing.instance_type, thing.instance_collection = "COLLECTION", of
-    return thing
+    obj = place(name, None, location=location, rotation=rotation)
+    obj.instance_type, obj.instance_collection = "COLLECTION", of
+    return obj
 
 
 def place(name: str, data, material=None, location=(0, 0, 0), rotation=(0, 0, 0), scale=(1, 1, 1), into=None):
     """Put data into the scene as an object; rotation in degrees."""
-    thing = bpy.data.objects.new(name, data)
-    thing.location, thing.scale = location, scale
-    thing.rotation_euler = [math.radians(angle) for angle in rotation]
-    (into or bpy.context.scene.collection).objects.link(thing)
+    obj = bpy.data.objects.new(name, data)
+    obj.location, obj.scale = location, scale
+    obj.rotation_euler = [math.radians(angle) for angle in rotation]
+    (into or bpy.context.scene.collection).objects.link(obj)
     materials = material if isinstance(material, (list, tuple)) else [material]
     if data is not None and data.users == 1:
         for each in filter(None, materials):
             data.materials.append(each)
-    return thing
+    return obj
 
 
 def mesh(name: str, vertices, faces=(), edges=(), face_materials=None, smooth: bool = False):
@@ -140,10 +140,10 @@ def box(name: str, size, material, location=(0, 0, 0), bevel: float = 0.02, piec
     """
     cube = primitive(name, _cut_cube, smooth=bevel > 0, pieces=pieces)
     cube.vertices.foreach_set("co", [value for v in cube.vertices for value in _standing(v.co, size)])
-    thing = place(name, cube, material, location, **options)
+    obj = place(name, cube, material, location, **options)
     if bevel:
-        round_edges(thing, bevel)
-    return thing
+        round_edges(obj, bevel)
+    return obj
 
 
 def _cut_cube(shape, pieces: int) -> None:
@@ -157,9 +157,9 @@ def _standing(corner, size):
     return corner.x * size[0], corner.y * size[1], (corner.z + 0.5) * size[2]
 
 
-def round_edges(thing, width: float, segments: int = 3) -> None:
+def round_edges(obj, width: float, segments: int = 3) -> None:
     """Round the sharp edges while flat faces keep looking flat."""
-    bevel = thing.modifiers.new("Rounded edges", "BEVEL")
+    bevel = obj.modifiers.new("Rounded edges", "BEVEL")
     bevel.width, bevel.segments, bevel.limit_method, bevel.harden_normals = width, segments, "ANGLE", True
 
 
@@ -167,13 +167,13 @@ def turned(name: str, profile, material, location=(0, 0, 0), steps: int = 64, **
     """A solid of revolution about z: the outline [(radius, height), …], turned on the lathe of a Screw modifier."""
     outline = [(radius, 0.0, height) for radius, height in profile]
     edges = [(i, i + 1) for i in range(len(outline) - 1)]
-    thing = place(name, mesh(name, outline, edges=edges), material, location, **options)
-    screw = thing.modifiers.new("Lathe", "SCREW")
+    obj = place(name, mesh(name, outline, edges=edges), material, location, **options)
+    screw = obj.modifiers.new("Lathe", "SCREW")
     screw.steps = screw.render_steps = steps
     screw.use_merge_vertices, screw.use_normal_calculate, screw.use_smooth_shade = True, True, True
-    split = thing.modifiers.new("Crisp corners", "EDGE_SPLIT")
+    split = obj.modifiers.new("Crisp corners", "EDGE_SPLIT")
     split.split_angle = math.radians(35)
-    return thing
+    return obj
 
 
 def ball(name: str, radius: float, material, location=(0, 0, 0), scale=(1, 1, 1), **options):
@@ -182,27 +182,27 @@ def ball(name: str, radius: float, material, location=(0, 0, 0), scale=(1, 1, 1)
     if data is None:
         data = primitive("Ball", bmesh.ops.create_icosphere, smooth=True, subdivisions=4, radius=1.0)
         data.materials.append(None)
-    thing = place(name, data, None, location, scale=[radius * factor for factor in scale], **options)
-    thing.material_slots[0].link = "OBJECT"
-    thing.material_slots[0].material = material
-    return thing
+    obj = place(name, data, None, location, scale=[radius * factor for factor in scale], **options)
+    obj.material_slots[0].link = "OBJECT"
+    obj.material_slots[0].material = material
+    return obj
 
 
 def suzanne(name: str, material, location, rotation, size: float):
     """Blender's monkey, subdivided and smooth."""
-    thing = place(name, primitive(name, bmesh.ops.create_monkey, smooth=True), material, location, rotation, (size,) * 3)
-    subdivision = thing.modifiers.new("Subdivision", "SUBSURF")
+    obj = place(name, primitive(name, bmesh.ops.create_monkey, smooth=True), material, location, rotation, (size,) * 3)
+    subdivision = obj.modifiers.new("Subdivision", "SUBSURF")
     subdivision.levels, subdivision.render_levels = 2, 3
-    return thing
+    return obj
 
 
 def ground(name: str, width: float, depth: float, material, location=(0, 0, 0), **options):
     """A flat grid of 64 × 64. Small faces keep Cycles' float32 positions precise; two huge triangles would not."""
     corners = [(x * width / 2, y * depth / 2, 0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    thing = place(name, mesh(name, corners, [range(4)]), material, location, **options)
-    subdivision = thing.modifiers.new("Grid", "SUBSURF")
+    obj = place(name, mesh(name, corners, [range(4)]), material, location, **options)
+    subdivision = obj.modifiers.new("Grid", "SUBSURF")
     subdivision.subdivision_type, subdivision.levels, subdivision.render_levels = "SIMPLE", 6, 6
-    return thing
+    return obj
 
 
 def text(name: str, body: str, material, size: float, location=(0, 0, 0), rotation=(90, 0, 0), depth=0.06, **options):

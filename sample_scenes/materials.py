@@ -17,7 +17,7 @@ import shading
 from staging import distance_for, fresh_scene, state_camera
 
 WIDTH, HEIGHT = 640, 360
-# What glass stands above a table: where both lie in one plane, which a ray meets first is float32's chance.
+# The height of glass above a table: where both lie in one plane, which a ray meets first is float32's chance.
 CLEAR = 0.004
 
 
@@ -197,10 +197,10 @@ def roadster():
         "Rubber", lambda s: s.principled(Base_Color="1b1b1d", Roughness=0.7, Specular_IOR_Level=0.3, Diffuse_Roughness=0.8)
     )
     chrome = b.glossy("Chrome", "e8e8ec", 0.06, metallic=1.0)
-    tyre = [(0.12, -0.1), (0.3, -0.1), (0.33, -0.06), (0.33, 0.06), (0.3, 0.1), (0.12, 0.1), (0.12, -0.1)]
+    tire = [(0.12, -0.1), (0.3, -0.1), (0.33, -0.06), (0.33, 0.06), (0.3, 0.1), (0.12, 0.1), (0.12, -0.1)]
     hub = [(0, -0.11), (0.12, -0.12), (0.13, 0.12), (0, 0.11)]
     for number, (x, y) in enumerate([(x, y) for x in (-0.65, 0.65) for y in (-0.5, 0.5)], 1):
-        b.turned(f"Tyre {number}", tyre, rubber, (x, y, 0.33), steps=48, rotation=(90, 0, 0))
+        b.turned(f"Tyre {number}", tire, rubber, (x, y, 0.33), steps=48, rotation=(90, 0, 0))
         b.turned(f"Hub {number}", hub, chrome, (x, y, 0.33), steps=48, rotation=(90, 0, 0))
     shading.environment(shading.studio_lights(), turn=70.0)
     return scene

@@ -102,9 +102,9 @@ def _available(sockets, key: str | int):
     return next(socket for socket in usable if socket.name == key)
 
 
-def use_nodes(thing, group, **parameters):
+def use_nodes(obj, group, **parameters):
     """Give an object a geometry-nodes modifier with this group and these parameters."""
-    modifier = thing.modifiers.new(group.name, "NODES")
+    modifier = obj.modifiers.new(group.name, "NODES")
     modifier.node_group = group
     identifiers = {item.name: item.identifier for item in group.interface.items_tree if item.in_out == "INPUT"}
     for name, value in parameters.items():

@@ -16,7 +16,8 @@ class Shading:
     def add(self, kind: str, inputs=None, output=None, **properties):
         """Add a shader node; returns the first output that is in use, or that of a name.
 
-        kind : its class, without "ShaderNode". inputs : by identifier or name; sockets, numbers, or colors as hex codes.
+        kind : its class, without "ShaderNode".
+        inputs : sockets, numbers, or colors as hex codes, by the input's identifier or name.
         """
         node = self.tree.nodes.new(f"ShaderNode{kind}")
         for name, value in properties.items():
@@ -113,7 +114,11 @@ def _shading(owner, output: str):
 
 
 def picture(name: str, pixels: np.ndarray, is_data: bool = False, linear: bool = False):
-    """A packed image. pixels : (height, width, 3 or 4), rows from the bottom. linear : floats, else bytes."""
+    """A packed image.
+
+    pixels : (height, width, 3 or 4), rows from the bottom.
+    linear : floats, else bytes.
+    """
     height, width, channels = pixels.shape
     image = bpy.data.images.new(name, width, height, alpha=channels == 4, float_buffer=linear, is_data=is_data or linear)
     if channels == 3:
@@ -131,7 +136,9 @@ def _grid(width: int, height: int):
 def outdoors(sun: float = 400.0, elevation: float = 35.0, bearing: float = 0.3, width: float = 2.5):
     """An HDRI: a sky with a sun that fades at its edge, clouds and brown earth.
 
-    sun : its radiance. bearing : of the picture's width. width : the sun's, in degrees.
+    sun : its radiance.
+    bearing : the sun's place, as a share of the picture's width.
+    width : the sun's, in degrees.
     """
     u, v = _grid(256, 128)
     height, around = (v - 0.5) * np.pi, (u - bearing) * 2 * np.pi

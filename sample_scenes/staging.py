@@ -35,18 +35,18 @@ def distance_for(field_of_view: float, pixels: int) -> float:
 def state_camera(scene, eye, look_at, distance: float, up=(0, 0, 1), principal_point=None):
     """Add the scene's camera and state it by its four values. Pixels that are not square have a distance per axis."""
     data = bpy.data.cameras.new("Virtual Pinhole")
-    thing = bpy.data.objects.new("Virtual Pinhole", data)
-    scene.collection.objects.link(thing)
-    scene.camera = thing
+    obj = bpy.data.objects.new("Virtual Pinhole", data)
+    scene.collection.objects.link(obj)
+    scene.camera = obj
     data.clip_start, data.clip_end = 0.01, 1000.0
     render = scene.render
     distances = (distance, distance * render.pixel_aspect_x / render.pixel_aspect_y)
     size = {"width": render.resolution_x, "height": render.resolution_y}
     pinhole = Pinhole(eye, look_at, up, distances, principal_point=principal_point, **size)
-    did_not_stick = virtual_pinhole.apply(thing, pinhole, scene)
+    did_not_stick = virtual_pinhole.apply(obj, pinhole, scene)
     if did_not_stick:
         raise RuntimeError(f"{scene.name}: {' '.join(did_not_stick)}")
-    return thing
+    return obj
 
 
 def save(scene, about: str, path: Path) -> None:

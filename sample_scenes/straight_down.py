@@ -121,8 +121,8 @@ def settings(china, glaze):
 def _flatware(name: str, outline, steel, location, into):
     """An outline cut from sheet steel."""
     data = b.mesh(name, [(x, y, 0) for x, y in outline], [range(len(outline))])
-    thing = b.place(name, data, steel, location, into=into)
-    solid = thing.modifiers.new("Thickness", "SOLIDIFY")
+    obj = b.place(name, data, steel, location, into=into)
+    solid = obj.modifiers.new("Thickness", "SOLIDIFY")
     solid.thickness, solid.offset = 0.003, 1.0
 
 

@@ -135,8 +135,8 @@ def meadow(furniture):
     b.place("Pebble", pebble, b.matte("Pebble", "d8b48c"), into=kit)
     b.place("Flower", *_flower(), into=kit)
     kept_clear = b.collection("Kept clear")
-    for thing in furniture:
-        kept_clear.objects.link(thing)
+    for obj in furniture:
+        kept_clear.objects.link(obj)
     field = b.ground("Meadow", 9.0, 7.0, grasses[0], (0, 1.4, 0))
     use_nodes(field, _scatter(kit, kept_clear))
 

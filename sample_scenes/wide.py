@@ -59,9 +59,9 @@ def _first_y() -> float:
     return 2.1
 
 
-def _repeat(thing, count: int, step: float) -> None:
+def _repeat(obj, count: int, step: float) -> None:
     for name, number, offset in [("Along", count, (step, 0, 0)), ("Rows", ROWS, (0, ROW, 0))]:
-        array = thing.modifiers.new(name, "ARRAY")
+        array = obj.modifiers.new(name, "ARRAY")
         array.count, array.use_relative_offset, array.use_constant_offset = number, False, True
         array.constant_offset_displace = offset
 

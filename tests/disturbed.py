@@ -1,7 +1,7 @@
 """`viewcam batch` of the studio still as processes that are killed, interrupted, run out of disk and run beside each other.
 
 What is asserted is always the same: in the end the folder holds, byte for byte but for timings, what an undisturbed run leaves.
-tests/test_batch_disturbed.py runs `Disturbances` with a wheel, tests/real_blender/test_batch_disturbed.py in a real Blender.
+tests/test_batch_disturbed.py runs `Disturbances` with a wheel, tests/real_blender/test_batch_command.py in a real Blender.
 """
 
 import json
@@ -57,7 +57,11 @@ def write_list(path: Path, count: int) -> None:
 
 
 class Command:
-    """A command line of `viewcam batch`. words : up to its options; variables : of the environment, beside this one's."""
+    """A command line of `viewcam batch`.
+
+    words : up to its options.
+    variables : variables of its environment, beside this one's.
+    """
 
     def __init__(self, words: Sequence[str | Path], variables: Mapping[str, str]) -> None:
         self._words, self._variables = [*map(str, words)], {**os.environ, **variables}

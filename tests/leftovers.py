@@ -28,8 +28,8 @@ import bpy
 
 PACKAGE = "viewcam_addon"
 EXTENSION = "bl_ext.user_default.virtual_pinhole"
-# What Blender itself leaves of any extension that was installed and removed: its own cache, the folder of wheels on Python's
-# path, and Ctrl-C as it is without Python.
+# Things that Blender itself leaves of any extension that was installed and removed: its own cache, the folder of wheels on
+# Python's path, and Ctrl-C as it is without Python.
 _LEFT_BY_BLENDER = ("extensions/.cache/compat.dat in files", "site-packages in sys.path", f"{signal.SIGINT:d} 0 in signals")
 _PLAIN = str | int | float | list | set | dict | tuple | frozenset
 

@@ -138,7 +138,7 @@ def assert_unit(vectors):
 
 @attacks("pinhole.Pinhole")
 def a_camera(source):
-    # Of every argument in turn: one hostile beside good ones, or all at once.
+    # Every argument in turn is hostile beside good ones, or all are at once.
     numbers = [source.number() for _ in range(15)]
     good = [(1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 500.0, 64, 48, None, False]
     hostile = [
@@ -344,12 +344,12 @@ def public_functions():
     """Every public function, class, method and property of the two modules, by name."""
     for module in (pinhole, intrinsics):
         name = module.__name__.rpartition(".")[2]
-        for key, thing in vars(module).items():
-            if key.startswith("_") or getattr(thing, "__module__", None) != module.__name__ or not callable(thing):
+        for key, public in vars(module).items():
+            if key.startswith("_") or getattr(public, "__module__", None) != module.__name__ or not callable(public):
                 continue
             yield f"{name}.{key}"
-            if inspect.isclass(thing):
-                members = [member for member, value in vars(thing).items() if callable(value) or hasattr(value, "__get__")]
+            if inspect.isclass(public):
+                members = [member for member, value in vars(public).items() if callable(value) or hasattr(value, "__get__")]
                 yield from (f"{name}.{key}.{member}" for member in members if not member.startswith("_"))
 
 

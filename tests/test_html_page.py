@@ -94,7 +94,8 @@ def test_any_text_makes_a_file_that_parsers_read(tmp_path_factory, text):
     path = tmp_path_factory.getbasetemp() / "any.xml"
     junit.write(path, text, 1, {"sentence": text, text or "k": text}, 0.0)
     (case,) = ElementTree.parse(path).getroot().iter("testcase")
-    # What XML can't hold is told as #x1B, and what remains is the text; of the ends of lines a parser makes blanks.
+    # Characters that XML can't hold are told as #x1B, and the rest of the text remains; a parser makes blanks of the ends of
+    # lines.
     plain = "".join(f"#x{ord(c):02X}" if not _is_xml(c) else c for c in text)
     assert case.get("name") == plain
 

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parent.parent
 
-# What an add-on may forget → the line that tells so.
+# Code that leaves something behind → the line that tells so.
 FORGOTTEN = {
     "bpy.app.handlers.load_post.append(lambda *_: None)": "<lambda> in handlers load_post",
     "bpy.types.TOPBAR_MT_file.append(lambda *_: None)": "<lambda> in entries of TOPBAR_MT_file",
@@ -39,7 +39,7 @@ FORGOTTEN = {
         "more: Forgotten in threads"
     ),
 }
-# The same of what can't be asked for: it keeps its module alive.
+# Code that leaves something behind which can't be asked for: it keeps its module alive.
 HELD = [
     "bpy.app.timers.register(addon.register, first_interval=1e6)",
     "bpy.types.SpaceView3D.draw_handler_add(addon.register, (), 'WINDOW', 'POST_VIEW')",
@@ -189,7 +189,7 @@ def test_spheres_are_exact_spheres_and_one_is_an_ellipsoid(fresh_blender):
     exported = jobs.export(Job(blend=FOLDER / "spheres.blend", strict=True))
     spheres = {name: shape for name, shape in exported.geometries.items() if isinstance(shape, Spheres)}
     assert sum(len(shape.radii) for shape in spheres.values()) >= 6000
-    matrices = [matrix for thing in exported.objects if thing.geometry in spheres for matrix in thing.matrices]
+    matrices = [matrix for obj in exported.objects if obj.geometry in spheres for matrix in obj.matrices]
     scales = [np.linalg.norm(matrix[:3, :3], axis=0) for matrix in matrices]
     assert any(np.ptp(scale) > 0.1 for scale in scales), "no sphere is scaled to an ellipsoid"
 

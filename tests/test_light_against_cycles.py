@@ -26,7 +26,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "sample_scenes"
 SAMPLES = 1024
 
-# What artists work on every day: materials, worlds and instances that the tracer does not model, under one matte material.
+# The scenes that artists work on every day: materials, worlds and instances that the tracer does not model, under one matte
+# material.
 EVERYDAY = {"portrait": "32x72", "straight_down": "48x48", "wide": "84x28", "flight": "64x36", "spheres": "64x48"}
 
 

@@ -18,7 +18,8 @@ from viewcam_addon import exact, pinhole
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole, basis, canonical_axes
 
-# Of a unit vector's component: ¾ unit roundoff from e − l or the product, one each from the root and the division, 2.8 · 2⁻⁵³.
+# The rounding of a unit vector's component: ¾ unit roundoff from e − l or the product, one each from the root and the division,
+# 2.8 · 2⁻⁵³.
 BASIS_TOLERANCE = 4e-16
 
 coordinates = st.floats(-1e6, 1e6)

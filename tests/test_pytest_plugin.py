@@ -116,7 +116,7 @@ def test_figures_are_properties_of_the_test_in_the_form_that_junit_has(run, aske
         and properties["viewcam-2.passed"] == "false"
         and properties["viewcam-2.passes.Depth.max"] == "0.5"
     )
-    # What --junit writes has the same elements, and no attribute that pytest's has not.
+    # The file of --junit has the same elements, and no attribute that pytest's has not.
     junit.write(tmp_path / "b.xml", "check", 1, {"sentence": VERDICT}, 1.0)
     expected = {each.tag: set(each.attrib) for each in root.iter()}
     for each in ElementTree.parse(tmp_path / "b.xml").getroot().iter():
@@ -229,7 +229,7 @@ def test_from_a_wheel_in_an_environment_of_its_own_three_broken_files_fail_with_
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "fresh"], check=True)
     (site,) = (tmp_path / "fresh" / "lib").glob("*/site-packages")
     subprocess.run([*pip, "install", "-q", "--no-deps", "--target", site, wheel], check=True)
-    # Of this folder only what stands in it is found: a .pth there, which is how the project itself is installed, is not read.
+    # Only what stands in this folder is found of it: a .pth there, which is how the project itself is installed, is not read.
     (site / "dependencies.pth").write_text(str(Path(pytest.__file__).parents[1]), encoding="utf-8")
     folder = tmp_path / "shots"
     broken = folder / "broken"

@@ -141,7 +141,8 @@ def test_sine_and_roll_uncertainty_are_right_for_every_pose(camera, precision):
         if sine < 1e-300:
             return
         roll = min(mpmath.pi, precision * ((lengths[3] + lengths[4]) / lengths[2] + 1) / sine)
-        # What precision has turned is rounded to whole multiples of 5e-324 where it is that small, and then divided by sine.
+        # The roll that precision has turned is rounded to whole multiples of 5e-324 where it is that small, and then divided by
+        # sine.
         assert is_near(camera.roll_uncertainty(precision), roll, 30 * ROUNDING * roll + 5e-324 / sine)
     assert camera.roll_uncertainty(0.0) == 0
 

@@ -55,11 +55,14 @@ def render(
 ) -> Image:
     """Trace a scene with the reference tracer.
 
-    scene : or the path of a scene file; its camera is `scene.camera`, which `dataclasses.replace` changes.
+    scene : a scene, or the path of its file; its camera is `scene.camera`, which `dataclasses.replace` changes.
     level : "geometry", "direct", "path", or "auto" for the least one that leaves nothing out.
-    samples : of each pixel, at the levels of light. seed : another for other noise. threads : all cores where None.
+    samples : the number of samples of each pixel, at the levels of light.
+    seed : any whole number; another one gives other noise.
+    threads : the number of threads to trace with; all cores where None.
     error : the standard error of each pixel, scene-linear, instead of a number of samples.
-    watcher : is told of rows that are done, and may stop it. keeper : of what scenes share that are traced one after another.
+    watcher : called with the rows that are done, and may stop it.
+    keeper : keeps what scenes share that are traced one after another.
 
     Returns the passes by name, (height, width, channels) float32, rows from the bottom, with the camera.
 
@@ -94,9 +97,11 @@ def label(
 ) -> "Labels":
     """The ground truth of a scene's picture, exact at the center of each pixel.
 
-    scene : or the path of a scene file, as the others. labels : some of "depth", "normals", "position", "masks", "amodal",
-    "flow" and "coverage"; docs/labels.md says what each brings. previous, next : the frames before and after, for "flow".
-    threads : all cores where None.
+    scene : a scene or the path of its file, as the other two are.
+    labels : some of "depth", "normals", "position", "masks", "amodal", "flow" and "coverage"; docs/labels.md says what each
+        brings.
+    previous, next : the frames before and after, for "flow".
+    threads : the number of threads to trace with; all cores where None.
 
     Returns the passes as an Image, and what is told of each instance as plain JSON values.
 
@@ -127,14 +132,19 @@ def compare(
 ) -> "GeometryComparison | RadianceComparison":
     """The comparison of a picture with the tracer's: what differs, by how much, and whether it is explained.
 
-    reference : the tracer's, of `render` or an EXR. tests : Cycles', say; several of different seeds where there is noise.
-    scene : what the reference shows, with which pixels on edges are traced again. Without it none of them is explained.
-    test_samples : of each test picture, where that is not what its file tells. renderer : who made it, one of
-    comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
-    enough. everything : Cycles' picture with all that the scene's ledger says is not modeled, of the first test's seed; it
-    tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object, or
-    whose light is all a renderer's choice, are different, and no error. false_alarms : of light, how often the same is called
-    different at most; one in a hundred by default.
+    reference : the tracer's picture, of `render` or an EXR.
+    tests : Cycles' picture, say; several of different seeds where there is noise.
+    scene : the scene that the reference shows. Pixels on edges are traced again with it; without it none of them is explained.
+    test_samples : the number of samples of each test picture, where its file tells none or another one.
+    renderer : the program that made the test pictures, one of comparison.renderers; Cycles by default.
+    partial : true to let a test picture of geometry lack passes: Depth, Distance or Position is enough.
+    everything : Cycles' picture with all that the scene's ledger says is not modeled, of the first test's seed; it tells on how
+        much of the picture that is.
+    keeper : see `render`.
+    may_be_empty : true to call pictures that show no object, or whose light is all a renderer's choice, different, rather than
+        raise an error.
+    false_alarms : the highest probability with which two pictures of the same light are called different; one in a hundred by
+        default.
 
     Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 

@@ -31,20 +31,37 @@ Flags = NDArray[np.bool_]
 PIXELS, FIELD_OF_VIEW = "PIXELS", "FIELD_OF_VIEW"
 CANONICAL, HOLD = "CANONICAL", "HOLD"
 
+PARTS = EYE, VIEW, DISTANCE = "eye", "view", "distance"
+# The parts of the camera that each value decides where it is animated: a moving eye turns the view, since the look-at point
+# stands still.
+DECIDES = {
+    "eye": frozenset({EYE, VIEW}),
+    "look_at": frozenset({VIEW}),
+    "up": frozenset({VIEW}),
+    "held_roll": frozenset({VIEW}),
+    "distance": frozenset({DISTANCE}),
+    "zoom": frozenset({DISTANCE}),
+}
+FACTORS = ("zoom",)
+"""Numbers on the distance, each of which may be keyed by itself."""
+
 
 @dataclass(frozen=True)
 class CameraValues:
     """The values that an artist or a script gives a camera, in float64 where that is known. Points and up in world space.
 
-    eye, look_at : a followed point is where its target stands. distance : pixels of the picture at 100 %, without zoom.
-    enabled : whether they place the camera.
+    eye, look_at : a followed point is where its target stands.
+    distance : pixels of the picture at 100 %, without zoom.
+    enabled : true if they place the camera.
     keeps : PIXELS or FIELD_OF_VIEW, what stays when the picture gets another resolution.
-    counted_in : the picture whose pixels the distance counts, None where nobody has said. set_for : the picture for which the
-        camera was set last. Both without border.
-    pole : CANONICAL or HOLD, what the picture does near up. hold_within : radians from up. held_roll : radians, see roll.py.
+    counted_in : the picture whose pixels the distance counts, None where nobody has said.
+    set_for : the picture for which the camera was set last. Both without border.
+    pole : CANONICAL or HOLD, what the picture does near up.
+    hold_within : radians from up.
+    held_roll : radians, see roll.py.
     view_when_set : (eye, look_at, up) from which the next edit sets out, None where that is not known.
     precision : the relative rounding of the values, 2⁻⁵³ where all are known in float64, else float32's 2⁻²⁴.
-    follows : those of "eye" and "look_at" that are set to follow an object.
+    follows : some of "eye" and "look_at", which are set to follow an object.
     asked : (name, number) of other looks at the values, such as a lens in millimeters or the roll, that count over them.
     """
 
@@ -78,7 +95,9 @@ class CameraValues:
     def pinhole(self, plane: ViewPlane, frame: Frame, sensor_fit: str, mirrored: bool) -> Pinhole:
         """The camera that the values ask for, whatever a held roll is.
 
-        plane : whose size and principal point it has. frame : the picture. sensor_fit : "AUTO", "HORIZONTAL" or "VERTICAL".
+        plane : the view plane, whose size and principal point it has.
+        frame : the picture that the scene renders.
+        sensor_fit : "AUTO", "HORIZONTAL" or "VERTICAL".
 
         Raises
         ------
@@ -104,7 +123,12 @@ class CameraValues:
         """
         if checks.number("zoom", self.zoom) <= 0:
             raise InputError(f"zoom is {self.zoom:g}: give a factor above 0")
-        return self.distance * self.zoom * self.growth(frame, sensor_fit)
+        return self.zoomed_distance * self.growth(frame, sensor_fit)
+
+    @property
+    def zoomed_distance(self) -> float:
+        """The distance with its factors, in the pixels that it counts."""
+        return self.distance * self.zoom
 
     def growth(self, frame: Frame, sensor_fit: str) -> float:
         """The factor on the distance in the picture of `frame`: 1 unless the field of view of another picture is kept."""
@@ -113,12 +137,15 @@ class CameraValues:
         return intrinsics.growth(sensor_fit, self.counted_in, frame)
 
     def animated(
-        self, eye: Triple, look_at: Triple, up: Triple, distance: float, zoom: float, precision: float
+        self, eye: Triple, look_at: Triple, up: Triple, distance: float, precision: float, **factors: float
     ) -> "CameraValues":
-        """These values with the numbers of another frame; dataclasses.replace takes eight times as long."""
+        """These values with the numbers of another frame; dataclasses.replace takes eight times as long.
+
+        factors : new numbers by name, some of FACTORS.
+        """
         values = object.__new__(CameraValues)
-        numbers = {"eye": eye, "look_at": look_at, "up": up, "distance": distance, "zoom": zoom, "precision": precision}
-        values.__dict__.update(self.__dict__ | numbers)
+        numbers = {"eye": eye, "look_at": look_at, "up": up, "distance": distance, "precision": precision}
+        values.__dict__.update(self.__dict__ | numbers | factors)
         return values
 
     def stating(
@@ -168,9 +195,11 @@ class CameraValues:
     ) -> "CameraValues":
         """The view of a camera that was moved, with the look-at point as far away as it was.
 
-        pinhole : the camera as it stands. moved : which of "eye" and "view" have changed by more than a rounding; what has not
-        keeps its digits. bound : (name, index) of the numbers that something else decides; they stay. up_axis : the up to
-        choose where that of the values does not give the picture, up to `rounding`, but it does; else up becomes v.
+        pinhole : the camera as it stands.
+        moved : some of "eye" and "view", which have changed by more than a rounding; what has not keeps its digits.
+        bound : (name, index) of the numbers that something else decides; they stay.
+        up_axis : the up to choose where that of the values does not give the picture, up to `rounding`, but it does; else up
+            becomes v.
         """
         values = self.with_unbound(replace(self, eye=pinhole.eye), bound) if "eye" in moved else self
         if "view" in moved:
@@ -216,8 +245,11 @@ def moved_poses(
 ) -> Array:
     """The poses of n cameras that were moved, each as `CameraValues.moved_to` has it where nothing is bound and no roll held.
 
-    poses : (n, 3, 3), eye, look-at and up of each. is_moved, is_turned : (n,), whose eye and whose view has changed.
-    eyes : (n, 3). axes : (n, 3, 3), u, v and w as columns. up_axis, rounding : as there.
+    poses : (n, 3, 3), eye, look-at and up of each.
+    is_moved, is_turned : (n,) each, true for cameras whose eye, and whose view, has changed.
+    eyes : (n, 3).
+    axes : (n, 3, 3), u, v and w as columns.
+    up_axis, rounding : see `CameraValues.moved_to`.
     """
     after, reach = poses.copy(), [math.dist(eye, look_at) for eye, look_at, _ in poses.tolist()]
     after[is_moved, 0] = eyes[is_moved]

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import InputError
 
-# What scene files, image files and Blender count with.
+# The largest number that scene files, image files and Blender count with.
 LARGEST_WHOLE = 2**31 - 1
 
 _WITHOUT_ORDER = (bytes, bytearray, memoryview, Set, Mapping)  # or whose items are no numbers of anybody's

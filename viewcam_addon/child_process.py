@@ -73,7 +73,8 @@ def module(name: str, *arguments: str | Path) -> list[str]:
 def environment(apart_from: str = "", **more: str) -> dict[str, str]:
     """The environment in which that process has the same modules in reach as this one.
 
-    apart_from : a folder whose modules it shall not have. more : further variables.
+    apart_from : a folder whose modules it shall not have.
+    more : further variables.
     """
     others = [path for path in sys.path if path and not (apart_from and Path(path).is_relative_to(apart_from))]
     return os.environ | {"PYTHONPATH": os.pathsep.join([str(_PACKAGE.parent), *others])} | more
@@ -101,7 +102,7 @@ def events_in(lines: Iterable[str | bytes]) -> Iterator[dict[str, Any]]:
 class ProcessGroup:
     """A process and all that it starts, which say what they have to say into a file.
 
-    handle : of this process, which the child inherits under the same number.
+    handle : an open handle of this process, which the child inherits under the same number.
 
     Raises
     ------
@@ -183,8 +184,10 @@ class AnswerTimeout(InputError):
 class ServerProcess:
     """The process, as the one who asks has it: it ends with `close`, or with whoever started it.
 
-    name : what sentences call it. command : its handle is added as the last word, for `answer`. log : a file for what it
-    prints, nowhere by default. events : whoever is told what it tells on the way, nobody by default.
+    name : its name in sentences.
+    command : the command that starts it; its handle is added as the last word, for `answer`.
+    log : a file for what it prints, nowhere by default.
+    events : receives the events that it tells on the way; nothing does by default.
 
     Raises
     ------
@@ -218,7 +221,9 @@ class ServerProcess:
             return False
 
     def ask(self, request: Mapping[str, Any], ends: float = math.inf) -> Any:
-        """The answer of the process. ends : when the answer must be there, by time.monotonic().
+        """The answer of the process.
+
+        ends : the time by which the answer must be there, of time.monotonic().
 
         Raises
         ------
@@ -280,7 +285,9 @@ class ServerProcess:
 class ServerOnDemand:
     """A server process that is started with the first question, and again if it was lost.
 
-    name : what sentences call it. module : of this package, which serves when it is run. events : as of ServerProcess.
+    name : its name in sentences.
+    module : a module of this package, which serves when it is run.
+    events : see ServerProcess.
     """
 
     def __init__(self, name: str, module: str, events: Events | None = None) -> None:
@@ -317,8 +324,9 @@ Tell = Callable[..., None]
 def serve(handle: str, answers: Callable[[dict[str, Any], Tell], Any], idle: float | None = None) -> None:
     """Answer what is asked, until nobody is left to ask.
 
-    handle : the last word of this process's command. answers : gives the answer to a request, which JSON can hold, and may tell
-    events meanwhile. idle : return as well when nothing was asked for so many seconds.
+    handle : the last word of this process's command.
+    answers : gives the answer to a request, which JSON can hold, and may tell events meanwhile.
+    idle : return as well when nothing was asked for so many seconds.
 
     A thread of its own listens, so that this process ends within a second of its asker also in the midst of an answer.
     """

@@ -31,7 +31,8 @@ _FOLDERS = ("yolo", "bop", "colmap", "kitti", "middlebury")
 def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False, ended_by: int | None = None) -> int:
     """Run one sub-command and return its exit status.
 
-    arguments : those of the shell by default. blend_is_open : inside Blender, where FILE.blend is the file that is open.
+    arguments : the words after `viewcam`, those of the shell by default.
+    blend_is_open : true inside Blender, where FILE.blend is the file that is open.
     ended_by : the signal that has ended the process that ran it (crashes.py): then it is only told.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
@@ -153,7 +154,10 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _check_output(path: Path, is_text: bool) -> None:
-    """is_text : it may stand between the lines that are printed."""
+    """Refuse an output file that can't be written, or that is where viewcam prints.
+
+    is_text : it may stand between the lines that are printed.
+    """
     check_writable(path)
     if not is_text and is_printed_to(path):
         raise InputError(f"{path} is where viewcam prints: give the name of a file")

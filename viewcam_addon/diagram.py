@@ -31,7 +31,8 @@ class Diagram:
     grid : (n, 2, 3), n ≤ 30, lines between pixels, those across columns first.
     pyramid : (4, 2, 3), from the eye to the corners.
     view : (2, 3), from the eye to the look-at point.
-    axes : (3, 3), the tips of u, v and w. up : (3,), the tip of up.
+    axes : (3, 3), the tips of u, v and w.
+    up : (3,), the tip of up.
     """
 
     plane: Array
@@ -50,8 +51,8 @@ class Diagram:
 def diagram(pinhole: Pinhole, up: Triple, share: float) -> Diagram:
     """The figure of a pinhole.
 
-    up : what the artist calls up; the pinhole's own may have been turned by a roll.
-    share : where the view plane is drawn on the way from the eye (0) to the look-at point (1).
+    up : the artist's up; the pinhole's own may have been turned by a roll.
+    share : the view plane's place in the drawing, between the eye (0) and the look-at point (1).
     """
     towards = np.subtract(pinhole.look_at, pinhole.eye)
     depth = share * math.hypot(*towards.tolist())

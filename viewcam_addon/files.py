@@ -27,7 +27,7 @@ from typing import BinaryIO
 
 from .errors import FullDiskError, InputError
 
-# What a system says when no more fits: on the disk, into a user's share of it, into the largest file that it allows.
+# The errors of a system when no more fits: on the disk, into a user's share of it, into the largest file that it allows.
 _FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG}
 
 _UNLOCKED_AT_MOST = 60.0
@@ -129,7 +129,7 @@ def _remove_abandoned() -> None:
 def written_together(folder: Path, name: str) -> Iterator[Path]:
     """A temporary folder whose files stand in `folder` when the block has ended well, in place of those there; else none does.
 
-    name : what the temporary one is called by, hidden beside them: .NAME-1a2b3c4d.labels.
+    name : the beginning of the temporary folder's name, which is hidden beside them: .NAME-1a2b3c4d.labels.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def written_together(folder: Path, name: str) -> Iterator[Path]:
 def folder_written_whole(folder: Path, may_replace: Callable[[Path], bool] = lambda _: False) -> Iterator[Path]:
     """Give a temporary folder beside `folder`, and call it that when the block has ended well; else nothing of it stays.
 
-    may_replace : whether a folder that is there, and not empty, may go.
+    may_replace : a function: true if a folder that is there, and not empty, may go.
 
     Raises
     ------

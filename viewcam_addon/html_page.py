@@ -29,7 +29,8 @@ def lacking() -> str | None:
 def filled(template: str, **values: Any) -> "Markup":
     """A template with values put in: a page, or a part of one, which other templates take as HTML.
 
-    template : its path below the package, with slashes. values : what it names, all of it; filters and tests are Jinja2's.
+    template : its path below the package, with slashes.
+    values : a value for each name in it; filters and tests are Jinja2's.
 
     Raises
     ------

@@ -40,8 +40,11 @@ from .terminal import silent_libraries
 
 @dataclass(frozen=True)
 class _Pass:
-    """channels : in the order of the pass's last axis, as Cycles names them. setting : the property of Blender's view layers
-    that asks for it, of what is not the tracer's own; Combined is always there. older : what Blender 4 calls it in a file.
+    """A pass as files and Blender have it.
+
+    channels : the channels' names in the order of the pass's last axis, as Cycles names them.
+    setting : the property of Blender's view layers that asks for it, of what is not the tracer's own; Combined is always there.
+    older : its name in the files of Blender 4.
     """
 
     channels: str
@@ -232,7 +235,11 @@ def _pixels(path: Path) -> tuple[dict[str, NDArray[Any]], Pinhole | None, dict[s
 
 @dataclass(frozen=True)
 class FrameSize:
-    """The size of a file's pixels, by its header alone. size : width and height. aspect : of a pixel, width over height."""
+    """The size of a file's pixels, by its header alone.
+
+    size : width and height in pixels.
+    aspect : a pixel's width over its height.
+    """
 
     size: tuple[int, int]
     aspect: float
@@ -314,8 +321,8 @@ def _frame(headers: Sequence[dict[str, Any]], path: Path) -> FrameSize:
 def write(path: str | os.PathLike[str], image: Image, is_bent: bool = False) -> None:
     """Write a 32-bit multilayer EXR, whole or not at all.
 
-    is_bent : whether a lens bends the picture: then it has no worldToNDC and no camera of its own, which would be the
-    pinhole's, but worldToCamera alone.
+    is_bent : true if a lens bends the picture: then it has no worldToNDC and no camera of its own, which would be the
+        pinhole's, but worldToCamera alone.
 
     Raises
     ------
@@ -347,8 +354,11 @@ _DATA = ("Vector", "Denoising Depth", "Denoising Normal", "Crypto")
 def rewrite(path: str | os.PathLike[str], change: Callable[[NDArray[Any], bool], NDArray[Any]], plane: ViewPlane) -> None:
     """Write an EXR anew, with other pixels in the same channels; its texts stay, and what it says of its camera does not.
 
-    change : (height, width, channels), rows from the **top**, and whether these are data, of which nothing may be between →
-    the new ones. plane : of these, whose pixel aspect the file says. Raises InputError as `read` and `write` do.
+    change : a function: pixels (height, width, channels), rows from the **top**, and whether these are data, between which
+        nothing may be interpolated → the new ones.
+    plane : the new pixels' view plane, whose pixel aspect the file says.
+
+    Raises InputError as `read` and `write` do.
     """
     channels, _, attributes = _pixels(Path(path))
     result: dict[str, NDArray[Any]] = {}

@@ -61,10 +61,11 @@ class CameraData:
 class Frame:
     """The picture that a Blender scene renders.
 
-    resolution_x, resolution_y : pixels at 100 %. percentage : whole per cent.
+    resolution_x, resolution_y : pixels at 100 %.
+    percentage : whole per cent.
     pixel_aspect_x, pixel_aspect_y : width and height of a pixel, of which only the ratio counts.
-    border : (left, bottom, right, top) as fractions of the picture, or None for the whole. crop : whether only the border is
-    kept.
+    border : (left, bottom, right, top) as fractions of the picture, or None for the whole.
+    crop : true to keep only the border.
 
     Raises
     ------
@@ -204,7 +205,8 @@ def growth(sensor_fit: str, before: Frame, after: Frame) -> float:
 def lens_in(unit: str, distance: float, frame: Frame, sensor: tuple[float, float], sensor_fit: str) -> float:
     """The lens that a distance is, in one of LENS_UNITS: millimeters, or an angle in radians of the whole picture, unshifted.
 
-    distance : pixels of the picture of `frame` at 100 %. sensor : width and height in mm.
+    distance : pixels of the picture of `frame` at 100 %.
+    sensor : width and height in mm.
     """
     return (
         distance * _scale(unit, frame, sensor, sensor_fit)

@@ -21,7 +21,7 @@ _NO_CHARACTERS = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ff
 def properties(figures: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Names and values of what `--json` writes, in its order. Lists of what has no name are left out, and so is null.
 
-    figures : as json.dumps takes them, but for numbers that are not finite: these are null, as in the file.
+    figures : values as json.dumps takes them; numbers that are not finite are null, as in the file.
     """
     return [(name, text if isinstance(text, str) else json.dumps(text)) for name, text in _leaves("", for_json(figures))]
 
@@ -43,9 +43,11 @@ def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 def write(path: Path, words: str, status: int, result: Mapping[str, Any], seconds: float) -> None:
     """Write one suite: one test, or one for each of the result's `shots`.
 
-    path : the file. words : those of the command, the test's name, or the suite's of several. status : its exit status: 0
-    passed, 1 failed, 3 failed where there is an `answer`, another one an error. result : what --json writes, with `sentence` or
-    `error`. seconds : it took.
+    path : the file to write.
+    words : the command's words: the name of the test, or of the suite of several.
+    status : the command's exit status: 0 passed, 1 failed, 3 failed where there is an `answer`, another one an error.
+    result : the object that --json writes, with `sentence` or `error`.
+    seconds : the seconds that it took.
 
     Raises
     ------
@@ -73,7 +75,11 @@ def write(path: Path, words: str, status: int, result: Mapping[str, Any], second
 
 
 def _case(name: str, kind: str | None, sentence: str, figures: Mapping[str, Any], seconds: float) -> ElementTree.Element:
-    """One test. kind : "failure", "error" or "skipped", None where it passed. sentence : why."""
+    """One test.
+
+    kind : "failure", "error" or "skipped", None where it passed.
+    sentence : a sentence that says why.
+    """
     case = ElementTree.Element("testcase", classname="viewcam", name=_text(name), time=f"{seconds:.3f}")
     if named := properties({key: value for key, value in figures.items() if key != "timing"}):
         of_case = ElementTree.SubElement(case, "properties")
@@ -89,7 +95,10 @@ def _seconds(shot: Mapping[str, Any]) -> float:
 
 
 def _outcome_of(shot: Mapping[str, Any], strict: bool) -> tuple[str | None, str]:
-    """The outcome of a shot of a summary, and why. strict : whether what is not modeled fails it."""
+    """The outcome of a shot of a summary, and why.
+
+    strict : true if what is not modeled fails it.
+    """
     if shot["state"] == "failed":
         return "error", shot["error"]
     if shot["state"] == "left":

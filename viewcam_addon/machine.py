@@ -26,7 +26,8 @@ def most() -> int:
 def check(what: str, size: int, remedy: str) -> None:
     """Refuse what needs more bytes than a process may have.
 
-    what : begins a sentence and has a plural's verb ("the arrays of scene.npz"). remedy : ends it.
+    what : begins a sentence and has a plural's verb ("the arrays of scene.npz").
+    remedy : ends it.
 
     Raises
     ------

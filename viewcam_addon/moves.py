@@ -64,7 +64,8 @@ def trucked_to(pinhole: Pinhole, look_at: Triple) -> Pinhole:
 def orbited(pinhole: Pinhole, around: float, upwards: float) -> Pinhole:
     """The eye carried about the look-at point, which stays in the middle of the view at the same distance.
 
-    around : radians about up; positive moves the eye towards u. upwards : radians about u; positive moves it towards v.
+    around : radians about up; positive moves the eye towards u.
+    upwards : radians about u; positive moves it towards v.
 
     Both at 0 give the very same pinhole. The way back is (−around, −upwards), and (around, −upwards) once up has turned into
     its opposite, since `around` is counted about up as it stands.
@@ -87,7 +88,8 @@ def orbited(pinhole: Pinhole, around: float, upwards: float) -> Pinhole:
 def framed_by_eye(pinhole: Pinhole, points: ArrayLike, margin: float = 0.0) -> Pinhole:
     """The eye moved along its view to where it is as near as all points in the picture allow; d stays.
 
-    points : (n, 3), n ≥ 1, world space. margin : the share of the picture's width and height kept free at each edge, 0 to 0.49.
+    points : (n, 3), n ≥ 1, world space.
+    margin : the share of the picture's width and height kept free at each edge, 0 to 0.49.
 
     The look-at point stays as long as it lies before the eye, else it moves along the view to the middle of the points' depths.
 

@@ -49,14 +49,15 @@ _FLAT = 1e-6
 class Match:
     """A camera that was found.
 
-    pinhole : the camera. precision : how well the pixels were known, one standard deviation.
+    pinhole : the camera.
+    precision : the standard deviation with which the pixels were known.
     error : root mean square in pixels of what is left, 0 where there was nothing to spare.
     distance_between : d with a probability of 68 %, lowest and highest.
     eye_error : one standard deviation along each axis, world units; None where the eye is not asked.
     principal_point_error : one standard deviation of column and row, pixels; None where it was fixed.
-    pixels : by how many pixels the picture moves as each value goes off by one standard deviation: "look_at" (where its middle
-    is), "up" (the roll, at the corners), "distance" (the lens, at the corners), and "eye" and "principal_point" where they are
-    asked.
+    pixels : the pixels by which the picture moves as each value goes off by one standard deviation: "look_at" (where its middle
+        is), "up" (the roll, at the corners), "distance" (the lens, at the corners), and "eye" and "principal_point" where they
+        are asked.
     """
 
     pinhole: Pinhole
@@ -72,10 +73,13 @@ class Match:
 class Solution:
     """Cameras that were found, over leading axes.
 
-    rotation : (..., 3, 3), its rows are u, v, w. eye : (..., 3); of edges, which don't tell it, 0. principal_point : (..., 2)
-    pixels from the one that was given, 0 where it is fixed. distance : (...). residuals : (..., m) in pixels.
+    rotation : (..., 3, 3), its rows are u, v, w.
+    eye : (..., 3); of edges, which don't tell it, 0.
+    principal_point : (..., 2) pixels from the one that was given, 0 where it is fixed.
+    distance : (...).
+    residuals : (..., m) in pixels.
     covariance : (..., p, p) for a precision of one pixel, of the turn about u, v and w in radians, of log d, and then of the
-    eye (points), of the principal point (edges, where it is free) or of nothing more.
+        eye (points), of the principal point (edges, where it is free) or of nothing more.
     """
 
     rotation: Array
@@ -90,7 +94,9 @@ class Solution:
 class KnownEdge:
     """An edge whose place and size in the world are known.
 
-    edge : its number among the edges. length : world units, > 0. start : where it begins, world space.
+    edge : its number among the edges.
+    length : world units, > 0.
+    start : the place where it begins, world space.
     """
 
     edge: int
@@ -108,11 +114,15 @@ def from_edges(
 ) -> Match:
     """The camera whose picture has these edges.
 
-    edges : (axis, start, end), at least two along each of two axes. axis : "X", "Y" or "Z". start, end : (2,) pixels, drawn
-    towards where the axis points. like : its eye, distance to the look-at point, size and principal point are kept.
-    precision : of start and end, pixels, one standard deviation. distance : d in pixels where the lens is known.
-    known : the edge whose length and place say how far away the camera stands, and where; without it its eye is kept.
-    is_principal_point_free : it is asked as well, which takes edges along all three axes; else that of `like` is kept.
+    edges : (axis, start, end), at least two along each of two axes.
+    axis : "X", "Y" or "Z".
+    start, end : (2,) pixels, drawn towards where the axis points.
+    like : its eye, distance to the look-at point, size and principal point are kept.
+    precision : the standard deviation of start and end, pixels.
+    distance : d in pixels where the lens is known.
+    known : an edge whose length and place say how far away the camera stands, and where; without it its eye is kept.
+    is_principal_point_free : true to find the principal point as well, which takes edges along all three axes; else that of
+        `like` is kept.
 
     Raises
     ------
@@ -173,8 +183,10 @@ def from_points(
 ) -> Match:
     """The camera that sees points of known place.
 
-    points : (n, 3) world space; at least four in one plane, or six. pixels : (n, 2), where they are in the picture.
-    like : its size, principal point and distance to the look-at point are kept. precision : of pixels, as for from_edges.
+    points : (n, 3) world space; at least four in one plane, or six.
+    pixels : (n, 2), where they are in the picture.
+    like : its size, principal point and distance to the look-at point are kept.
+    precision : the standard deviation of pixels.
     distance : d in pixels where the lens is known.
 
     Raises
@@ -209,8 +221,10 @@ def from_rectangle(
 ) -> Match:
     """The camera that sees a rectangle of known sides.
 
-    corners : (4, 2) pixels: that at the origin, then around, first along the first axis. sides : lengths along both axes, world
-    units. origin : world space. axes : the two that the sides run along, as "XY" on the floor or "XZ" on a wall.
+    corners : (4, 2) pixels: that at the origin, then around, first along the first axis.
+    sides : lengths along both axes, world units.
+    origin : world space.
+    axes : the two that the sides run along, as "XY" on the floor or "XZ" on a wall.
     distance : d in pixels where the lens is known.
 
     Raises
@@ -237,9 +251,12 @@ def solve_edges(
 ) -> tuple[Solution, NDArray[np.bool_]]:
     """The cameras of edges, and whether those that were drawn are of a mirrored picture.
 
-    ends : (..., n, 2, 2): edge, end, pixels from the principal point. axes : (n,) which of the world's axes each runs along.
-    half : of the picture's larger side, pixels. known_distance : d in pixels where the lens is known.
-    is_principal_point_free : it is asked as well, of edges along all three axes; `ends` count from where it may be.
+    ends : (..., n, 2, 2): edge, end, pixels from the principal point.
+    axes : (n,), the number of the world's axis along which each runs.
+    half : half of the picture's larger side, pixels.
+    known_distance : d in pixels where the lens is known.
+    is_principal_point_free : true to find the principal point as well, from edges along all three axes; `ends` count from where
+        it may be.
     """
     present = np.unique(axes)
     scaled = np.concatenate([ends / half, np.ones((*ends.shape[:-1], 1))], axis=-1)
@@ -262,7 +279,7 @@ def solve_edges(
         distance = np.full_like(distance, known_distance / half)
     seen = vanishing * np.stack([1 / distance, 1 / distance, -np.ones_like(distance)], axis=-1)[..., None, :]
     seen /= np.linalg.norm(seen, axis=-1, keepdims=True)
-    # What moves along an axis moves in the picture by V − p W, where (V, W) is its vanishing point.
+    # A step along an axis is one in the picture by V − p W, where (V, W) is its vanishing point.
     along = scaled[..., 1, :2] - scaled[..., 0, :2]
     for k, axis in enumerate(present):
         of = axes == axis
@@ -287,9 +304,14 @@ def solve_edges(
 
 
 def solve_points(points: Array, pixels: Array, half: float, is_flat: bool, known_distance: float | None = None) -> Solution:
-    """The cameras that see points. points : (..., n, 3). pixels : (..., n, 2) from the principal point. half : see above.
+    """The cameras that see points.
 
-    is_flat : whether the points lie in a plane, where four are enough. known_distance : see above.
+    points : (..., n, 3).
+    pixels : (..., n, 2) from the principal point.
+    half : see `solve_edges`.
+
+    is_flat : true if the points lie in a plane, where four are enough.
+    known_distance : see `solve_edges`.
     """
     center = points.mean(axis=-2, keepdims=True)
     scale = np.sqrt(((points - center) ** 2).sum(axis=-1).mean(axis=-1))[..., None, None]
@@ -420,8 +442,9 @@ def _refined(
 ) -> tuple[Array, Array, Array, Array, Array]:
     """The least squares near a start: rotation, others, distance, residuals and covariance, as of a `Solution`.
 
-    others : (..., k) what is asked beside turn and lens: the eye, the principal point, or nothing. scale : the unit in which
-    `measured` counts these. is_lens_known : the start's is right.
+    others : (..., k) what is asked beside turn and lens: the eye, the principal point, or nothing.
+    scale : the unit in which `measured` counts these.
+    is_lens_known : the start's is right.
     """
     unknowns = 4 + others.shape[-1]
     scale = np.broadcast_to(scale, distance.shape)
@@ -480,7 +503,10 @@ def _solved(matrix: Array, vector: Array) -> Array:
 
 
 def _pose_of_a_plane(points: Array, pixels: Array) -> tuple[Array, Array, Array]:
-    """Rotation, R (center − eye) and d of points in a plane, from their homography. pixels : of half the picture."""
+    """Rotation, R (center − eye) and d of points in a plane, from their homography.
+
+    pixels : (..., n, 2), in units of half the picture.
+    """
     _, _, within = np.linalg.svd(points)
     frame = within[..., :2, :]  # two directions in the plane
     flat = np.einsum("...ij,...nj->...ni", frame, points)
@@ -531,7 +557,11 @@ def _null(matrix: Array) -> Array:
 
 
 def _match(solution: Solution, like: Pinhole, precision: float, reach: float, spare: int, depth: float | None) -> Match:
-    """One camera's answer. reach : from the eye to the look-at point. spare : residuals beyond the unknowns."""
+    """One camera's answer.
+
+    reach : from the eye to the look-at point.
+    spare : residuals beyond the unknowns.
+    """
     covariance = solution.covariance * precision**2
     errors = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
     distance, is_center_free = float(solution.distance), depth is None and len(errors) > 4

@@ -91,9 +91,9 @@ class Pinhole:
     up : three floats, world space, of any length but zero; need not be perpendicular to the view.
     distance : view-plane distance d in pixels, > 0; one float, or a pair (d_x, d_y) in pixel widths and pixel heights.
     width, height : pixels of the picture, whole numbers ≥ 1.
-    principal_point : (c_x, c_y), where the view axis meets the picture, in pixels from its left and its bottom edge.
-        The picture's center if it is None.
-    mirrored : whether u points left in the picture.
+    principal_point : (c_x, c_y), where the view axis meets the picture, in pixels from its left and its bottom edge. The
+        picture's center if it is None.
+    mirrored : true if u points left in the picture.
 
     Raises
     ------
@@ -148,7 +148,8 @@ class Pinhole:
     def of_poses(cls, eye: ArrayLike, look_at: ArrayLike, up: ArrayLike, planes: Sequence[ViewPlane]) -> list["Pinhole"]:
         """Many pinholes of arrays: each as its constructor makes it, in a tenth of the time.
 
-        eye, look_at, up : (n, 3) float64, world space. planes : of each.
+        eye, look_at, up : (n, 3) float64, world space.
+        planes : the view plane of each.
 
         Raises
         ------
@@ -243,8 +244,8 @@ class Pinhole:
     def ray_directions(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Array:
         """Directions from the eye through sample points of pixels.
 
-        columns, rows : pixels from the left and from the bottom; px, py : the sample point in [0, 1)² of each pixel. All
-        finite, and broadcast.
+        columns, rows : pixels from the left and from the bottom.
+        px, py : the sample point in [0, 1)² of each pixel. All finite, and broadcast.
 
         Returns (..., 3) float64 unit vectors, world space, to 1e-15 of the sample point that columns + px and rows + py round
         to.

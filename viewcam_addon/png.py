@@ -70,7 +70,9 @@ def decoded(content: bytes) -> NDArray[np.uint8] | NDArray[np.uint16]:
 
 
 def _unfiltered(filters: NDArray[np.uint8], differences: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The bytes of all pixels, (height, width, bytes of a pixel). filters : of each row.
+    """The bytes of all pixels, (height, width, bytes of a pixel).
+
+    filters : the filter of each row.
 
     A byte needs those of the pixels to the left, above and between them. So what lies on one diagonal, column + row = k, needs
     only the two diagonals before it: each is a row of these arrays, and computed at once.

@@ -63,8 +63,9 @@ def viewcam_check(request: pytest.FixtureRequest) -> "Callable[..., Check]":
 def same_picture(request: pytest.FixtureRequest) -> "Callable[..., Check]":
     """Fails the test unless pictures are the same: `same_picture("reference.exr", "test.exr", scene="scene.json")`.
 
-    reference : what `viewcam render` traced, or any EXR with those channels where `scene` tells its camera. tests : further
-    EXRs; several are one picture with several seeds. Paths are from the test's folder; options are those of `viewcam compare`.
+    reference : an EXR that `viewcam render` traced, or any other with those channels where `scene` tells its camera.
+    tests : further EXRs; several are one picture with several seeds. Paths are from the test's folder; options are those of
+        `viewcam compare`.
 
     Returns the viewcam_addon.Check: `.sentence`, `.figures`.
     """

@@ -76,7 +76,8 @@ def rolled(pinhole: Pinhole, up: Triple, angle: float) -> Pinhole:
 def steps(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike, within: float) -> tuple[Array, NDArray[np.bool_]]:
     """The change of the roll by carrying the axes along, from each of n poses to the next.
 
-    eye, look_at, up : (n, 3) float64, world space. within : radians, how near to up or its opposite a step counts as near.
+    eye, look_at, up : (n, 3) float64, world space.
+    within : radians, how near to up or its opposite a step counts as near.
 
     Returns (n − 1,) float64 in [−π, π], by which α changes if the step is carried, and (n − 1,) bool, whether it passes near:
     not only its ends, but the whole arc of view directions between them, as up sees it. A step to the opposite direction has no

@@ -21,6 +21,7 @@ from .pinhole import Pinhole
 Array = NDArray[np.float64]
 
 IDENTITY = np.eye(4)
+_THREE_HALVES = 1.5 * IDENTITY[:3, :3]
 # Radians: in so small a turn the axis, and so close to gimbal lock one of the angles, may be any, within float32's rounding.
 _FREE = 2.0**-26
 
@@ -38,7 +39,7 @@ def euler(rotation: Array, order: str) -> Array:
 def _triples(m: Array, order: str, before: Sequence[float] | None = None) -> tuple[Array, Array]:
     """Both triples of angles in [−π, π] that give rotations, (..., 3) each.
 
-    before : of a single matrix, in gimbal lock those that begin with its angle.
+    before : the angles before, for a single matrix; in gimbal lock the triples begin with the first of them.
     """
     i, j, k, sign = _axes(order)
     from_lock = np.hypot(m[..., i, i], m[..., j, i])
@@ -118,7 +119,7 @@ def axis_angle(rotation: Array) -> Array:
 def numbers(rotation: Array, mode: str, before: Sequence[float] | None = None) -> Array:
     """(..., n): the numbers of rotations in one of Blender's modes, an order of Euler angles, "QUATERNION" or "AXIS_ANGLE".
 
-    before : of a single matrix, the numbers of another rotation. Those nearest to them are given then, so that what is
+    before : the numbers of another rotation, for a single matrix. Those nearest to them are given then, so that what is
         interpolated between the two neither flips nor takes the long way round: the other triple of Euler angles, the
         quaternion of the other sign, the opposite axis, and whole turns more or less.
     """
@@ -158,6 +159,16 @@ def nearest(matrix: Array) -> Array:
     """The orthonormal matrices nearest to (..., 3, 3) ones (the polar decomposition's), mirroring where those mirror."""
     left, _, right = np.linalg.svd(matrix)
     return left @ right
+
+
+def straightened(axes: Array) -> Array:
+    """`nearest` of axes of length one whose skew is small, in a fifth of the time: (..., 3, 3).
+
+    Two steps of Newton's method for the polar decomposition. Each leaves 3/2 of the square of what is off: of 2⁻¹⁷, 2⁻⁶⁶.
+    """
+    for _ in range(2):
+        axes = axes @ (_THREE_HALVES - 0.5 * (axes.swapaxes(-2, -1) @ axes))
+    return axes
 
 
 def skew(matrix: Array) -> Array:
@@ -207,8 +218,9 @@ def has_inverse(matrix: Array) -> bool:
 class Channels(NamedTuple):
     """All that says where a Blender object stands relative to what carries it, as it is stored.
 
-    mode : an order of Euler angles, "QUATERNION" or "AXIS_ANGLE". rotation : its numbers in this mode, and delta_rotation those
-    that Blender applies after it; () for AXIS_ANGLE, for which it shows none.
+    mode : an order of Euler angles, "QUATERNION" or "AXIS_ANGLE".
+    rotation : its numbers in this mode, and delta_rotation those that Blender applies after it; () for AXIS_ANGLE, for which it
+        shows none.
     """
 
     mode: str

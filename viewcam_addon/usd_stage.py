@@ -51,8 +51,9 @@ _TOO_MUCH = "OpenUSD needed more time or memory for it than its size accounts fo
 def read(name: str, path: Path | None, text: str, size: str, values: str) -> dict[str, Any]:
     """The cameras of the stage of a file, or of a text if `path` is None.
 
-    name : what sentences call it. size : the attribute of a camera that has the pixels of its picture. values : the key of its
-    customData that is wanted.
+    name : its name in sentences.
+    size : the attribute of a camera that has the pixels of its picture.
+    values : the key of its customData that is wanted.
 
     Returns
     -------
@@ -164,7 +165,7 @@ def _read(request: dict[str, Any]) -> dict[str, Any]:
 class _Layers:
     """Layers in memory, each with all that it is composed of; what may not be read is taken out of them.
 
-    left_out : what was, as it stands in the file.
+    left_out : the things that were taken out, as they stand in the file.
     """
 
     def __init__(self, sdf: Any) -> None:
@@ -194,7 +195,10 @@ class _Layers:
         return self._by_path[path]
 
     def _close(self, layer: Any, folder: str | None) -> None:
-        """Lead all that the layer is composed of to layers in memory. folder : where it lies; None if it is a text."""
+        """Lead all that the layer is composed of to layers in memory.
+
+        folder : the layer's folder; None if it is a text.
+        """
         for named in filter(None, layer.GetCompositionAssetDependencies()):  # what has no name is the layer itself
             place = self._allowed(named, folder)
             inner = None

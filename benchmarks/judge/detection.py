@@ -202,7 +202,10 @@ class Block:
         return np.random.default_rng((self._number, *place))
 
     def _seed(self, number: int, i: int) -> int:
-        """The first of a reference's and a picture's seeds. number : of the fault, 0 for none."""
+        """The first of a reference's and a picture's seeds.
+
+        number : the fault's number, 0 for none.
+        """
         return ((self._number * (1 + len(FAULTS)) + number) * SIDE + i) * (1 + _PICTURES)
 
 

@@ -20,7 +20,13 @@ Passes = dict[str, NDArray[np.float32]]
 
 @dataclass(frozen=True)
 class Fault:
-    """family : of the chart. name : in words. of_scene : changes the scene; of_picture : the passes, with a generator."""
+    """A fault that is put into a scene or a picture, so that the judge has to find it.
+
+    family : the chart that it stands in.
+    name : in words.
+    of_scene : a function that changes the scene.
+    of_picture : a function that changes the passes, with a generator.
+    """
 
     family: str
     name: str

@@ -68,7 +68,11 @@ def flip(reference: Array, test: Array, _: Array, __: int) -> float:
 
 
 def z_test(reference: Array, test: Array, variance: Array, samples: int) -> float:
-    """variance : of one sample. samples : of the test."""
+    """The largest deviation of pixels, in standard errors, over what chance allows.
+
+    variance : the variance of one sample.
+    samples : the samples of the test picture.
+    """
     z = np.abs(test - reference) * np.sqrt(samples / np.maximum(variance, 1e-4))
     alpha = 1 - (1 - 0.01) ** (1 / z.size)
     return float(np.percentile(np.nan_to_num(z, nan=np.inf), 99.75)) / NormalDist().inv_cdf(1 - alpha / 2)

@@ -21,9 +21,12 @@ Error = Callable[[Path], float]
 class Method:
     """One curve.
 
-    side : whose it is, a key of the contestants. sampling : what the parameters are, as the contestant knows it.
-    parameters : of rising effort. ours : whether it is this project's, as it is meant to be used. rival : whether ours has
-        to be ahead of it. job : whether its job is measured too, beside the picture.
+    side : the side that it is on, a key of the contestants.
+    sampling : the kind of the parameters, as the contestant knows it.
+    parameters : parameters of rising effort.
+    ours : true for this project's method, as it is meant to be used.
+    rival : true if ours has to be ahead of it.
+    job : true to measure its job too, beside the picture.
     """
 
     name: str
@@ -53,7 +56,7 @@ class Point:
         return math.sqrt(statistics.fmean(error * error for error in self.errors))
 
 
-# How many times the longest picture a method's first may take.
+# The times of the longest picture that a method's first one may take at most.
 _HOPELESS = 3
 
 Tracks = dict[Method, list[Point]]
@@ -61,8 +64,11 @@ Tracks = dict[Method, list[Point]]
 
 @dataclass(frozen=True)
 class Effort:
-    """The extent of a race. enough : the error at which a method stops. longest : seconds of a picture that is not followed by
-    a longer one."""
+    """The extent of a race.
+
+    enough : the error at which a method stops.
+    longest : seconds of a picture that is not followed by a longer one.
+    """
 
     rounds: int
     enough: float
@@ -75,7 +81,8 @@ def measure(
     """Points of all methods.
 
     sides : side → figure → a function of sampling, parameter, seed and path, that returns its seconds and leaves a picture at
-    the path. path : where pictures may be written.
+        the path.
+    path : a folder in which pictures may be written.
     """
     tracks: Tracks = {}
     for method in methods:

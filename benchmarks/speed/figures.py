@@ -17,7 +17,9 @@ Sides = dict[str, dict[str, Runner]]
 
 @dataclass(frozen=True)
 class Still:
-    """A picture. wanted : error → how many times as fast as the rivals, as (picture, job), None where nothing is asked for.
+    """A picture.
+
+    wanted : error → how many times as fast as the rivals, as (picture, job), None where nothing is asked for.
 
     samples : a pixel, of each half of the reference, of the two sides that make it.
     """
@@ -39,7 +41,11 @@ class Still:
 
 @dataclass(frozen=True)
 class Figure:
-    """A duration that is compared. key : as contestants know it. name, seconds : as charts say it."""
+    """A duration that is compared.
+
+    key : its name among contestants.
+    name, seconds : its name and its unit on charts.
+    """
 
     key: str
     name: str
@@ -56,7 +62,7 @@ def charts(
 ) -> tuple[Chart, Chart]:
     """The picture, and the job around the errors that are asked for.
 
-    path : where pictures may be written.
+    path : a folder in which pictures may be written.
     """
     enough = max(0.9 * min(still.wanted), reference.error)
     effort = Effort(rounds=1, enough=enough, longest=1) if quick else Effort(rounds=3, enough=enough, longest=8)

@@ -45,7 +45,10 @@ def _runs(variant: str) -> bool:
 
 
 def prepare(scene_path: Path, folder: Path, variant: str, threads: int) -> dict[str, race.Runner]:
-    """In the contestant's process. folder : where Mitsuba's files go."""
+    """In the contestant's process.
+
+    folder : the folder for Mitsuba's files.
+    """
     import drjit
     import mitsuba
 

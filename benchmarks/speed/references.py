@@ -29,7 +29,11 @@ _SEEDS = (7001, 7002)
 
 @dataclass(frozen=True)
 class Half:
-    """samples : a pixel, of each of a side's two halves. error : of one half."""
+    """The effort and the error of one of a side's two halves.
+
+    samples : the samples of each pixel in each of a side's two halves.
+    error : the error of one half.
+    """
 
     side: str
     samples: int
@@ -38,8 +42,13 @@ class Half:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """picture : (height, width, 3) float64. error : its own RMSE. differ : RMS of the difference between the sides.
-    explained : what of it their noise explains."""
+    """The picture that races are measured against.
+
+    picture : (height, width, 3) float64.
+    error : its own RMSE.
+    differ : RMS of the difference between the sides.
+    explained : the part of it that their noise explains.
+    """
 
     picture: NDArray[np.float64]
     error: float
@@ -89,7 +98,10 @@ def reference(
 
 
 def combine(halves: Mapping[str, NDArray[np.float64]], samples: Mapping[str, int]) -> Reference:
-    """halves : of each of two sides, (2, height, width, 3)."""
+    """The reference of both sides' pictures.
+
+    halves : the two halves of each of two sides, (2, height, width, 3).
+    """
     noise = {side: rms(pair[0] - pair[1]) / math.sqrt(2) for side, pair in halves.items()}
     (first, other), variances = halves.values(), [error * error / 2 for error in noise.values()]
     weight = variances[1] / sum(variances) if any(variances) else 0.5

@@ -9,13 +9,17 @@ from typing import Any
 from ..charts import Chart, Curve
 from .contest import Method, Point, Tracks
 
-# How much smaller an error a curve may be followed on to, and how much it must have fallen just before.
+# The factors by which a curve may be followed on to a smaller error, and by which it must have fallen just before.
 _FURTHEST, _STEEP = 4, 1.3
 
 
 @dataclass(frozen=True)
 class Reached:
-    """seconds : that a method takes to an error. beyond : whether its points end before, and the last two were followed on."""
+    """The time in which a method reaches an error.
+
+    seconds : the seconds that a method takes to an error.
+    beyond : true if its points end before, and the last two were followed on.
+    """
 
     method: Method
     seconds: float
@@ -54,8 +58,10 @@ class Standing:
 class Contested(Chart):
     """A chart of error against time, judged by its standings.
 
-    standings : each with ratio, wanted, summary() and figures(). times : error → when each method reaches it. measured : all
-    points, for JSON. judged : whether what is wanted and missed counts.
+    standings : each with ratio, wanted, summary() and figures().
+    times : error → when each method reaches it.
+    measured : all points, for JSON.
+    judged : true if what is wanted and missed counts.
     """
 
     standings: tuple[Any, ...] = ()
@@ -151,7 +157,11 @@ def with_point_by_line(points: Sequence[Point], samples: int, error: float) -> l
 
 
 def curves(tracks: Tracks, least: float, judged: Sequence[Standing] = ()) -> tuple[Curve, ...]:
-    """least : points of smaller errors are left out. judged : who is the best of his side in none stays in the background."""
+    """The curves of a chart, one for each method.
+
+    least : points of smaller errors are left out.
+    judged : the methods that are judged; one that is the best of its side in none stays in the background.
+    """
     result, best = [], {side.method for standing in judged for side in (standing.ours, standing.rival)}
     for method, points in tracks.items():
         visible_points = [point for point in points if point.error >= least]

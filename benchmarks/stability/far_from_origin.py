@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 WIDTH, HEIGHT, DISTANCE = 120, 90, 150
 # Picture coordinates up to 120 in float64: x and z by three products and their sums each, one quotient, d and the center.
 ARITHMETIC = 16 * 2.0**-53 * WIDTH
-# What one rounding costs near the origin: 2⁻²⁴ · d · (M + t)/z with M and t of at most 30 and z of at least 5 units.
+# The error by one rounding near the origin: 2⁻²⁴ · d · (M + t)/z with M and t of at most 30 and z of at least 5 units.
 NEAR_ORIGIN = 2.0**-24 * DISTANCE * 60 / 5
 
 

@@ -41,7 +41,11 @@ _CAMERA = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 1, 1, 1)
 
 @dataclass(frozen=True)
 class Leaving:
-    """n rays that leave surfaces. points, normals, directions, starts : (n, 3). starts : ours."""
+    """n rays that leave surfaces.
+
+    points, normals, directions, starts : (n, 3).
+    starts : ours.
+    """
 
     points: Array
     normals: Array
@@ -222,7 +226,8 @@ def _hits(
 ) -> tuple[CoreScene, Leaving]:
     """The hits of rays from the eye that aim at a thing, and a ray from each hit to the eye's side (1) or the other (−1).
 
-    corners : (m, 3, 3), of the triangles. chosen : (m,), whose hits count. The eye is at the origin.
+    corners : (m, 3, 3), of the triangles.
+    chosen : (m,), whose hits count. The eye is at the origin.
     """
     random = np.random.default_rng(4)
     core = _core_of(_mesh(corners))

@@ -42,7 +42,10 @@ _DIGITS = 60
 class Shots:
     """n rays at n spheres of one object.
 
-    matrix : (4, 4), object to world. centers : (3, n), object space. radii : (n,). eye : (3,), world space.
+    matrix : (4, 4), object to world.
+    centers : (3, n), object space.
+    radii : (n,).
+    eye : (3,), world space.
     x, y : (n,): the rays are (x, y, −1) in world space.
     """
 

@@ -31,7 +31,7 @@ Array = NDArray[np.floating]
 
 # Some twenty roundings of float64 in a depth, of which the worst of a hundred are looked at.
 TIE = 16 * 2.0**-53
-# What half a unit in the last place of the ray's direction does.
+# The error by half a unit in the last place of the ray's direction.
 LAST_BIT = 2.0**-53
 # A share of a few hundred rays that none makes.
 SHARE_TIE = 1e-3
@@ -121,7 +121,10 @@ def _leaks(ratios: Array, fans: int) -> tuple[tuple[Curve, ...], tuple[Curve, ..
 
 
 def _hits_of_fans(size: float, fans: int, random: np.random.Generator) -> Iterator[tuple[str, Array]]:
-    """The number of triangles of its fan that each ray meets. size : of the triangles, in distances."""
+    """The number of triangles of its fan that each ray meets.
+
+    size : the triangles' size, in distances.
+    """
     side = int(np.clip(0.4 / size, 1, 16))  # fans stand in a square, apart from one another
     groups = [_Fans(size, side, random) for _ in range(min(60, -(-fans // side**2)))]
     for name, test in _FORMULAS.items():
@@ -137,7 +140,8 @@ def _hits_of_fans(size: float, fans: int, random: np.random.Generator) -> Iterat
 class _Fans:
     """Fans of six triangles, and rays at their common vertices and at the edges that meet there.
 
-    corners : (3, m, 3): [corner, triangle, axis], camera space; six triangles after another make a fan. x, y : (n,) rays.
+    corners : (3, m, 3): [corner, triangle, axis], camera space; six triangles after another make a fan.
+    x, y : (n,) rays.
     fan : (n,) which one each ray is aimed at.
     """
 
@@ -240,7 +244,7 @@ def _seen_on_the_ground(extents: Array, count: int) -> tuple[Curve, ...]:
 def _first_on_the_ground(extent: float, random: np.random.Generator) -> Iterator[tuple[str, Array]]:
     """Each method's first triangle, −1 if none: those of the ground, then those of a mat at which all rays are aimed.
 
-    extent : of the ground, in heights of the eye.
+    extent : the ground's extent, in heights of the eye.
     """
     angles = np.pi / 2 * (np.arange(4) + random.uniform(-0.4, 0.4, 4))
     ground = np.stack([np.cos(angles), np.sin(angles), np.zeros(4)], axis=-1) * extent * random.uniform(0.6, 1, (4, 1))

@@ -123,7 +123,7 @@ def test_the_page_shows_every_chart_and_the_figures_that_it_was_drawn_from(subje
     present = set(re.findall(rf"\(charts/({subject}-[a-z-]+)\.svg\)", page))
     drawings = {each["drawing"] for each in figures["charts"].values()}
     assert present == drawings == {path.stem for path in (DOCS / "charts").glob(f"{subject}-*.svg")}
-    # What is missed is told in so many words; of races, by the page's table (tests/test_project.py).
+    # A missed target is told in so many words; of races, by the page's table (tests/test_project.py).
     assert subject == "speed" or all(sentence in page.replace("\n", " ") for sentence in figures["behind"])
 
 

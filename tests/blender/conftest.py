@@ -102,7 +102,9 @@ def render_positions(fresh_blender, scene, tmp_path):
     """A function that has Cycles render where in the world each pixel's center falls, in a sphere about the origin.
 
     Its radius is 40. The surface shines with its own position, so that Blender's plain EXR is enough.
-    animation : render all frames of the scene. also : objects that shall shine likewise.
+    animation : render all frames of the scene.
+    also : objects that shall shine likewise.
+
     Returns (height, width, 3) float32, rows from the bottom, or a dict of them by frame.
     """
     bpy = fresh_blender

@@ -11,7 +11,7 @@ bpy = pytest.importorskip("bpy")
 import viewcam_addon
 
 PACKAGE = Path(viewcam_addon.__file__).parent
-# As they stand on one another, from below. All that is outside blender/ lies below them, and is plain mathematics here.
+# The layers, from below. All that is outside blender/ lies below them, and is plain mathematics here.
 ROOMS = [
     *("versions", "datablocks", "preferences", "pose", "storage", "targets", "hold", "findings", "causes"),
     *("conversion", "camera", "resolution", "animation", "properties"),

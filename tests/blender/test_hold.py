@@ -54,7 +54,7 @@ def test_without_holding_the_same_drag_flips(held_camera, over_the_top, turn_bet
 def test_straight_over_the_top_the_picture_ends_upside_down(held_camera, over_the_top):
     for degrees in range(-20, 21):
         held_camera.virtual_pinhole.eye = over_the_top(degrees)
-    # Of the forty steps those near the pole write the roll, each rounded to float32, π by 2⁻²³.
+    # Steps near the pole, forty at most, write the roll, each rounded to float32, π by 2⁻²³.
     assert abs(abs(held_camera.virtual_pinhole.held_roll) - math.pi) <= 40 * 2.0**-23
     assert axes(held_camera)[2, 1] < -0.3  # v points down
 

@@ -194,7 +194,7 @@ def test_lamps_that_are_not_the_same_all_over_and_how_they_are_seen(stage, add_l
 
 
 def test_a_picture_on_a_lamp_that_is_a_little_aside_is_told(stage, add_lamp, monkeypatch):
-    """Whose UV begins at 0.02 in place of 0."""
+    """Its UV begins at 0.02 in place of 0."""
     from viewcam_addon.tracer import native
 
     right = native._described_node

@@ -496,7 +496,7 @@ def test_a_pipe_in_place_of_a_library_is_refused_and_not_waited_for(fresh_blende
     assert signal.getsignal(signal.SIGALRM) is handler
 
 
-# What of a .blend names a file, and what becomes of it in a render.
+# The types of a .blend that name a file, by what becomes of it in a render.
 READ = {"CacheFile", "CacheFileLayer", "Image", "ImagePackedFile", "Library", "LibraryWeakReference", "MeshCacheModifier"}
 READ |= {"MovieClip", "MultiresModifier", "OceanModifier", "ShaderNodeTexIES", "Sound", "VectorFont", "Volume", "VolumeGrids"}
 READ |= {"NodeSocketStringFilePath", "NodeTreeInterfaceSocketStringFilePath", "BlendImportContextLibrary", "BlendData", "Brush"}

@@ -22,7 +22,8 @@ from viewcam_addon.pinhole import Pinhole
 
 MODES = ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "QUATERNION", "AXIS_ANGLE"]
 FLOAT32 = 2.0**-24
-# What was asked for. Euler angles rounded alone stay below 3.2e-7 (pose.py); the choice among neighbors does for the others.
+# The largest error of the roll that was asked for. Euler angles rounded alone stay below 3.2e-7 (pose.py); the choice among
+# neighbors does for the others.
 LARGEST_ROLL = 4e-7
 # A product of rotations in float32 rounds each entry by 4 · 2⁻²⁴ at most (four products of which the magnitudes sum to 1, and
 # their sum), and so an axis by √3 times that. A parent is two products, with its inverse and with the camera's own matrix. Its

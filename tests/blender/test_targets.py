@@ -150,7 +150,7 @@ def test_the_eye_is_where_its_target_is_to_the_last_bit(location):
     assert tuple(camera_object.matrix_world.translation) == tuple(target.matrix_world.translation) == group.numbers()[0]
 
 
-# How Blender may leave an object out of the viewport, of the render, or of both.
+# The ways in which Blender leaves an object out of the viewport, of the render, or of both.
 
 
 def hidden_in_viewports(target):

@@ -82,7 +82,8 @@ def picture_error(pinhole: Pinhole, column: np.ndarray, row: np.ndarray, points:
 def allowed(pinhole: Pinhole, points: np.ndarray, unit: float = 2.0**-53, operations: int = 16) -> float:
     """Pixels that so many roundings of `unit` can move a projection by: of coordinates as large as these, seen from there.
 
-    operations : of a chain of matrix, translation, division and principal point; calibrated, no bound was exceeded by 4.
+    operations : the number of operations in a chain of matrix, translation, division and principal point; calibrated, no bound
+        was exceeded by 4.
     """
     size = max(np.abs(points).max(), max(map(abs, pinhole.eye)))
     depth = pinhole.project(points)[2].min()

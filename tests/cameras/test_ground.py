@@ -22,11 +22,11 @@ def room(random, noise=0.0):
     """
     floor = np.column_stack([random.uniform(-3, 3, (1500, 2)), random.normal(0, noise, 1500) if noise else np.zeros(1500)])
     wall = np.column_stack([random.uniform(-3, 3, 3000), np.full(3000, 3.0), random.uniform(0.2, 3, 3000)])
-    things = random.uniform([-3, -3, 0.2], [3, 3, 2], (1000, 3))
+    scattered = random.uniform([-3, -3, 0.2], [3, 3, 2], (1000, 3))
     angles = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     eyes = np.column_stack([np.cos(angles), np.sin(angles), np.full(12, HEIGHT)])
     views = np.column_stack([2 * np.cos(angles + 0.4), 2 * np.sin(angles + 0.4), random.uniform(1.0, 1.8, 12)])
-    return np.vstack([floor, wall, things]), eyes, views, np.array([0.05, 0.0, 1.0])
+    return np.vstack([floor, wall, scattered]), eyes, views, np.array([0.05, 0.0, 1.0])
 
 
 def field(random):

@@ -313,7 +313,10 @@ def test_a_panorama_of_colmap_is_refused_by_its_name(tmp_path):
 
 
 def rig_of(shift=0.0):
-    """Two cameras that go along together, the right one of another size; shift : by which it is aside in the last moment."""
+    """Two cameras that go along together, the right one of another size;
+
+    shift : the distance by which it is aside in the last moment.
+    """
     result = []
     for i in range(3):
         angle = 0.4 * i

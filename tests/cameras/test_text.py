@@ -16,7 +16,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.scene import Scene, scene_file
 
 POSE = {"eye": (7.0, -6.0, 4.0), "look_at": (0.0, 0.0, 1.0), "up": (0.0, 0.0, 1.0)}
-# Of which nothing is like POSE: what stands where a text says nothing.
+# Stands where a text says nothing: nothing of it is like POSE.
 BASE = Pinhole((1, 2, 3), (4, 5, 7), (0, 1, 0), 1234.0, 1920, 1080, (900.0, 500.0), True)
 HD = Options(size=(1920, 1080))
 
@@ -327,7 +327,7 @@ def test_pybullets_two_matrices_are_eye_target_up_and_the_height_in_degrees():
     ("axis", "eye"), [(2, (3.34923133, -2.06898911, 4.7101006)), (1, (-1.34923146, 3.71010046, -1.06898908))]
 )
 def test_pybullets_yaw_and_pitch_are_as_pybullet_has_them(axis, eye):
-    """eye : of PyBullet 3.2.7, whose numbers are float32."""
+    """The expected `eye` is that of PyBullet 3.2.7, whose numbers are float32."""
     pinhole = pinhole_of(f"p.computeViewMatrixFromYawPitchRoll([1, 2, 3], 5, 30, -20, 0, {axis})")
     assert pinhole.eye == pytest.approx(eye, abs=1e-6) and pinhole.look_at == (1, 2, 3)
     with pytest.raises(InputError, match="no roll"):

@@ -391,7 +391,7 @@ def test_by_pov_rays_formula_what_we_write_is_the_same_picture(name):
         vectors["direction"] = ahead * np.linalg.norm(vectors["direction"])
     rays = pov_rays(*(vectors[key] for key in ("location", "right", "up", "direction")), PLACES)
     pinhole = CAMERAS[name]
-    # Of the eye far away the look-at point's rounding remains: 2⁻⁵³ of it, across the distance to it.
+    # The look-at point's rounding remains where the eye is far away: 2⁻⁵³ of it, across the distance to it.
     reach = max(map(abs, pinhole.look_at)) / math.dist(pinhole.eye, pinhole.look_at)
     assert error_of_rays(pinhole, rays, PLACES) < 1e-3 + 16 * 2.0**-53 * max(pinhole.distance) * reach
 

@@ -24,7 +24,7 @@ TRIALS = [pytest.param(50, 4, id="50"), pytest.param(200, 8, id="200", marks=pyt
 
 rows, columns = np.mgrid[:HEIGHT, :WIDTH]
 TRUTH = np.stack([0.2 + 0.5 * columns / WIDTH, 0.3 + 0.3 * rows / HEIGHT, np.full((HEIGHT, WIDTH), 0.4)], axis=-1)
-# How much of each pixel lies behind an edge that crosses the picture aslant.
+# The share of each pixel that lies behind an edge which crosses the picture aslant.
 COVER = np.clip((columns - WIDTH / 3 + 0.3 * rows) / 3, 0.0, 1.0)[..., None]
 
 
@@ -132,7 +132,7 @@ def test_a_variance_told_too_small_is_found_out():
     assert not run(lied, 256, 8)[0].ok
 
 
-# What is found
+# Faults that are found
 
 
 def visible_bias(sides, limit):

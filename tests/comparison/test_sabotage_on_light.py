@@ -197,7 +197,7 @@ GLASS = {"color": (0.95, 1.0, 0.97), "roughness": 0.0, "ior": 1.45}
 def build_artists(paint=PAINT, glass=GLASS, turn=0.0):
     """A ball of tinted paint and one of glass amid a room of windows, an image wrapped around all.
 
-    turn : of the room about the vertical, degrees.
+    turn : the room's turn about the vertical, degrees.
     """
     room = np.full((32, 64, 3), 0.15, np.float32)
     room[10:26, ::4], room[18:22, 22:26] = (0.5, 0.6, 0.9), (6.0, 5.0, 4.0)

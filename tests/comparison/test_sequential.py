@@ -79,7 +79,7 @@ def test_pictures_of_the_same_light_are_called_different_once_in_a_hundred_searc
 def test_a_bias_of_the_wanted_size_is_found_with_the_power_that_is_promised():
     trials, find = 60, 0.03
     missed = sum(searched(np.random.default_rng((seed, 2)), find, truth=(1.0 + find) * TRUTH)[0] for seed in range(trials))
-    # Of 60 that are missed with a probability of 0.01 more than four are once in three thousand times.
+    # More than four of 60 are missed once in three thousand times, if each is with a probability of 0.01.
     assert missed <= 4, f"{missed} of {trials} missed, of {100 * (1 - POWER):.0f} in a hundred promised"
 
 
@@ -92,7 +92,7 @@ def test_what_differs_by_much_is_found_in_the_first_round_and_what_differs_by_li
 def test_the_wanted_bias_is_findable_in_the_end_and_was_not_a_round_before():
     passed, search = searched(np.random.default_rng(4), 0.01)
     assert passed and 0.005 < search.least <= min(0.01, search.least_in_blocks)
-    # Of fewer than 1.28 / 0.01 samples nothing is decided, and no round ends with them.
+    # Fewer than 1.28 / 0.01 samples decide nothing, and no round ends with them.
     assert search.samples in sequential.TOTALS and search.rounds == sequential.TOTALS.index(search.samples)
 
 

@@ -14,7 +14,7 @@ from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
 
 pytestmark = pytest.mark.slow
 
-# What moves each ray of the renderer on paper, in roundings: as in conftest.py.
+# The shift of each ray of the renderer on paper, in roundings: as in conftest.py.
 ROUNDINGS_OF_A_RENDERER = 0.35
 CAMERA = Pinhole((0.3, -4.0, 3.1), (0.1, 0.2, 0.0), (0.0, 0.0, 1.0), 150.0, 120, 80)
 HAIR = 3e-4

@@ -235,7 +235,7 @@ def test_the_quaternion_has_length_1_and_its_first_number_that_is_not_0_is_posit
     texts = colmap.texts([Camera("a", Pinhole(eye, look_at, up, 1.0, 1, 1))])
     quaternion = [float(text) for text in content(texts["images.txt"])[0].split(" ")[1:5]]
     excess = abs(sum(Fraction(number) ** 2 for number in quaternion) - 1)
-    # Of the length: half of 4 roundings of the sum of squares, one of the root, and one of each quotient.
+    # The rounding of the length: half of 4 roundings of the sum of squares, one of the root, and one of each quotient.
     assert excess <= 2 * 4 * UNIT * (1 + UNIT), f"|q|² − 1 = {float(excess):.3g}"
     assert next(number for number in quaternion if number) > 0
     assert "-0.0" not in texts["images.txt"].split()

@@ -23,7 +23,7 @@ def in_columns(matrix, change):
     return matrix.tolist()
 
 
-# What may be wrong with a picture's numbers, under the names of transforms.json.
+# Faults of a picture's numbers, under the names of transforms.json.
 PICTURE = {
     "half a pixel to the right": lambda values: values | {"cx": values["cx"] + 0.5},
     "half a pixel upwards": lambda values: values | {"cy": values["cy"] - 0.5},

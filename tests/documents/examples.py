@@ -62,7 +62,12 @@ WRITTEN = {
 
 @dataclass(frozen=True)
 class Example:
-    """page : relative to the project. text : a command or a whole block. output : the block behind it, which it prints."""
+    """A command, or a block of code, that a page shows.
+
+    page : relative to the project.
+    text : a command or a whole block.
+    output : the block behind it, which it prints.
+    """
 
     page: str
     language: str
@@ -112,8 +117,11 @@ def _commands(block: str) -> list[str]:
 class Reader:
     """A reader who follows the pages: folder for its work, and the Blender that it has.
 
-    blender, viewcam : what these commands are, in a shell's words. python : the command that runs a program with `bpy`.
-    environment : more variables. package : what the add-on is called there. extension : the zip to install, where one can be.
+    blender, viewcam : these commands, in a shell's words.
+    python : the command that runs a program with `bpy`.
+    environment : more variables.
+    package : the add-on's name there.
+    extension : the zip to install, where one can be.
     """
 
     def __init__(

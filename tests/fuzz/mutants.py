@@ -47,7 +47,11 @@ _PATTERNS = (
 
 
 def of_bytes(data: bytes, other: bytes, chance: random.Random, within: int | None = None) -> bytes:
-    """One to four changes of a binary file. other : a file whose pieces may stand in it. within : changes begin before here."""
+    """One to four changes of a binary file.
+
+    other : a file whose pieces may stand in it.
+    within : changes begin before here.
+    """
     changed = bytearray(data)
     for _ in range(chance.choice((1, 1, 1, 2, 4))):
         end = max(min(len(changed), within or len(changed)), 1)

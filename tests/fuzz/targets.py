@@ -66,12 +66,12 @@ SCENE = {
     ],
     "clip": [0.1, 1000],
     "origin": [1, 2, 3],
-    "images": {"chequer": {"pixels": [[[0, 0, 0], [1, 1, 1]]], "srgb": True}, "large": {"pixels": {"npz": "i"}}},
+    "images": {"checker": {"pixels": [[[0, 0, 0], [1, 1, 1]]], "srgb": True}, "large": {"pixels": {"npz": "i"}}},
     "materials": {
         "glass": {"glass": [1, 1, 1], "ior": 1.5},
         "glowing": {"emission": [2, 1, 1], "diffuse": [0.5, 0.5, 0.5], "displacement": {"type": "wave"}},
         "drawn": {
-            "diffuse": {"image": "chequer", "closest": True, "vertex": True},
+            "diffuse": {"image": "checker", "closest": True, "vertex": True},
             "mirror": {"image": "large", "rgb": [1, 1, 1]},
         },
     },

@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
-# What a shot's name begins with says what happens to it. The diary says what happened, a line each.
+# The beginning of a shot's name says what happens to it. The diary says what happened, a line each.
 STAND_IN = """#!{python}
 import errno, hashlib, json, os, signal, sys, time
 sys.path[:0] = {path}
@@ -55,6 +55,8 @@ class Renderer:
         if kind == "slow" and first:
             note("waits", shot.name)
             time.sleep(60)
+        if kind == "steady":
+            time.sleep(0.5)
         if kind == "bad":
             raise InputError(f"{{shot.name}} has no light: add some")
         if kind == "full":

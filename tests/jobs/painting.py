@@ -31,8 +31,10 @@ DIED = 99  # exit status
 class Painter:
     """A Renderer (jobs/one.py) that draws nothing.
 
-    pause : seconds between the pieces of a file. broken : error by the name of the shot that meets it. unlike : names of shots
-    whose check fails. unlabeled : error by the name of the shot whose labels meet it.
+    pause : seconds between the pieces of a file.
+    broken : error by the name of the shot that meets it.
+    unlike : names of shots whose check fails.
+    unlabeled : error by the name of the shot whose labels meet it.
     """
 
     def __init__(self, seed=0, pause=0.0, broken=None, unlike=(), unlabeled=None):

@@ -173,7 +173,7 @@ def test_a_shot_that_ends_one_worker_after_another_fails_and_the_rest_go_on(stan
 
 def test_a_full_disk_ends_the_batch(stand_in, machines, blend, tmp_path):
     ear = Ear()
-    summary = run_on(machines, blend, tmp_path / "out", shots("full", *(f"shot_{i}" for i in range(40))), ear)
+    summary = run_on(machines, blend, tmp_path / "out", shots("full", *(f"steady_{i}" for i in range(40))), ear)
     assert summary.exit_status == 4 and summary.counts["left"] > 20
     (failure,) = ear.all("shot_failed")
     assert "No space left on device" in failure["error"]
@@ -377,7 +377,7 @@ def test_nobody_else_on_this_machine_can_have_the_workers_run_anything(stand_in,
     mark = tmp_path / "mark"
 
     async def run(address, security):
-        # What Client.run does, and what workers and nannies do among themselves.
+        # A call as by Client.run, or as by workers and nannies among themselves.
         async with distributed.core.rpc(address, timeout=3, connection_args=security.get_connection_args("client")) as server:
             return await asyncio.wait_for(server.run(function=distributed.protocol.pickle.dumps(mark.mkdir)), 3)
 

@@ -21,7 +21,7 @@ from viewcam_addon.png import encoded
 from ..labels.conftest import room
 
 STATED = Pinhole((3, -6, 2.5), (0, 0, 1), (0, 0, 1), 400.0, 320, 180)
-# What came of it in Blender, of which only the last bits differ; here it is plain to see which of the two is written.
+# The camera read back from Blender, which differs in the last bits only; here it is plain to see which of the two is written.
 STORED = replace(STATED, eye=(3.25, -6, 2.5))
 FILES = ("sparse/0/cameras.txt", "sparse/0/images.txt", "sparse/0/points3D.txt", "transforms.json")
 

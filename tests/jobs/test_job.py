@@ -22,8 +22,8 @@ from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import job, names
 from viewcam_addon.jobs.folder import settings_hash
 from viewcam_addon.jobs.job import FIELDS, Job
+from viewcam_addon.jobs.lists import ShotsError
 from viewcam_addon.jobs.plan import shard
-from viewcam_addon.jobs.problems import ShotsError
 from viewcam_addon.pinhole import ViewPlane
 
 FOUR = {"eye": (1.0, 2.0, 3.0), "look_at": (0.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0), "d": 400.0}

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import lists, makers
 from viewcam_addon.jobs.job import ENGINES, FIELDS, LEVELS, Job
+from viewcam_addon.jobs.lists import ShotsError
 from viewcam_addon.jobs.plan import shard
-from viewcam_addon.jobs.problems import ShotsError
 from viewcam_addon.pinhole import Pinhole
 
 PAGE = Path(__file__).parents[2].joinpath("docs", "batch.md").read_text(encoding="utf-8")

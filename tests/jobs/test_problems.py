@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import lists
-from viewcam_addon.jobs.lists import COLUMNS
-from viewcam_addon.jobs.problems import MOST_SHOWN, ShotsError
+from viewcam_addon.jobs.lists import COLUMNS, MOST_SHOWN, ShotsError
 
 pytestmark = pytest.mark.slow
 
@@ -33,7 +32,7 @@ GOOD = {
     "level": "",
 }
 
-# What is changed in a good row → (columns as they are named, what is said) of each problem.
+# Changes of a good row → (columns as they are named, what is said) of each problem.
 KINDS = [
     ({"name": ""}, [("name", "missing")]),
     ({"name": "SHOT2"}, [("name", "line 2 has this name already as 'shot2'")]),

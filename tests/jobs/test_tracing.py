@@ -25,7 +25,7 @@ CAMERA = Pinhole((3, -6, 2.5), (0.2, 0, 0.4), (0, 0, 1), 110.0, 96, 54, (46.0, 2
 OTHER = replace(CAMERA, eye=(-4.0, -5.0, 1.5), distance=140.0)
 CLIP = (0.1, 100.0)
 
-# What may go wrong between the numbers of a sidecar and the camera that takes the picture.
+# Faults between the numbers of a sidecar and the camera that takes the picture.
 WRONG = {
     "half a pixel to the right": replace(CAMERA, principal_point=(46.5, 28.0)),
     "half a pixel upwards": replace(CAMERA, principal_point=(46.0, 28.5)),
@@ -55,9 +55,9 @@ def made_scene(camera=CAMERA):
     balls = Spheres(
         np.array([[0, 0, 0.5], [1.2, 0.6, 0.3], [0.4, -1.5, 0.4]]), np.array([0.5, 0.3, 0.4]), np.zeros(3, np.int32)
     )
-    things = {"ground": ground, "tent": tent, "balls": balls}
-    objects = tuple(Object(name, name, np.eye(4), number) for number, name in enumerate(things, start=1))
-    return Scene(camera, things, objects, clip=CLIP)
+    geometries = {"ground": ground, "tent": tent, "balls": balls}
+    objects = tuple(Object(name, name, np.eye(4), number) for number, name in enumerate(geometries, start=1))
+    return Scene(camera, geometries, objects, clip=CLIP)
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def test_a_right_picture_passes_with_figures_that_a_sidecar_keeps(comparer, scen
     assert result["passed"] and result["verdict"].startswith("The same picture: over ")
     figures = result["figures"]
     assert figures["pixels"] > 3000 and figures["conversion"] is None and figures["mismatches"]["unexplained"] == 0
-    # What one side holds in float32 is all that the two differ by: 2⁻²⁴ · d · |P|/z at 8 units, ten times as much at most.
+    # The two differ by no more than one side's float32: 2⁻²⁴ · d · |P|/z at 8 units, ten times as much at most.
     assert figures["position"]["max"] < 10 * 2.0**-24 * 110 * 8 and max(figures["share_of_tolerance"].values()) <= 1
     assert len(json.dumps(result, allow_nan=False)) < 1500, "it stands in every sidecar"
 

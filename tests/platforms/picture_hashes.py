@@ -56,7 +56,7 @@ def hashes_of_functions() -> dict[str, str]:
             "pow of special numbers": core_probes.function("pow", first, second),
             "fresnel": core_probes.function("fresnel", np.abs(angles), 1 + np.abs(np.roll(angles, 3))),
         }
-    # What is no number has many bit patterns, which mean the same.
+    # nan has many bit patterns, which mean the same.
     return {f"function {name}": sha256(np.where(np.isnan(each), np.nan, each)) for name, each in values.items()}
 
 

@@ -47,7 +47,7 @@ class Installer:
             f"{name}_wheel_manager", scripts / "modules" / "_bpy_internal" / "extensions" / "wheel_manager.py"
         )
         sys.modules[name] = types.ModuleType(name)
-        # Whose functions bl_extension_utils hands on.
+        # The module whose functions bl_extension_utils hands on.
         loaded(f"{name}.bl_extension_utils", package / "cli" / "blender_ext.py")
         # The module as a whole needs bpy; this function of it needs whether Python is being debugged.
         source = (package / "bl_extension_ops.py").read_text(encoding="utf-8")

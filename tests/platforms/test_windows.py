@@ -24,7 +24,7 @@ DATASETS = {"coco": "coco.json", "panoptic": "panoptic.json", "bop": "bop", "col
 def colors_apart(name: str, contents: bytes) -> tuple[bytes, np.ndarray]:
     """A file of points without their colors, and these, (points, 3); of any other file all of it, and none.
 
-    name : of the file, points3D.txt of COLMAP or points3D.ply as viewcam_addon/labels writes it.
+    name : the file's name, points3D.txt of COLMAP or points3D.ply as viewcam_addon/labels writes it.
     """
     if name.endswith("points3D.ply"):
         header, body = contents.split(b"end_header\n")
@@ -59,7 +59,7 @@ def is_same(name: str, ours: bytes | None, windows_bytes: bytes | None) -> bool:
 @pytest.mark.parametrize("color", [1, 2, None])
 @pytest.mark.parametrize("name", ["points3D.txt", "sparse/0/points3D.ply"])
 def test_smoke_points_are_the_same_up_to_1_of_255_of_their_colors(name, color):
-    """color : how far one is off; None if a coordinate is."""
+    """color : the distance by which a color is off; None if a coordinate is off."""
     points = np.zeros(2, [("place", "<f4", 6), ("color", "u1", 3)])
     is_table = name.endswith(".txt")
     table = "# 3D points\n1 0.5 0.25 1 {} 0 9 0.0 1 2\n"

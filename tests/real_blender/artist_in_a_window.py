@@ -2,7 +2,9 @@
 
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python artist_in_a_window.py -- FOLDER [PICTURES]
 
-FOLDER : where rendered pictures and reports go. PICTURES : where pictures of the window go; without it none are taken.
+FOLDER : a folder for rendered pictures and reports.
+PICTURES : a folder for pictures of the window; without it none are taken.
+
 What each part of the add-on does beyond that day is in tour_in_a_window.py, handles_, proof_ and cameras_in_a_window.py.
 Leaves with status 0, or 5 and a traceback.
 """
@@ -341,7 +343,7 @@ def dolly_by_a_button():
     is_at_its_values()
 
 
-PATIENCE = 120  # seconds that one comparison may take on a busy machine
+PATIENCE = 600  # seconds that a comparison or a rendering may take on a busy machine
 
 
 def prove_two_cameras_during_playback():
@@ -361,9 +363,7 @@ def prove_two_cameras_during_playback():
         call(bpy.ops.viewcam.compare_with_cycles, camera=each.name)  # as Render › Compare with Cycles does
         yield from until(lambda: proof.background.running, f"the comparison of {each.name}")
         yield from _play_and_press_escape(proof)
-        ends = time.monotonic() + PATIENCE
-        while proof.background.running and time.monotonic() < ends:
-            yield WAITING
+        yield from until(lambda: not proof.background.running, f"the verdict on {each.name}", PATIENCE, WAITING)
         outcome = proof.background.latest
         assert outcome and outcome.answer == "same" and outcome.camera == each.name, outcome
         assert outcome.headline.startswith("Identical to ") and outcome.headline.endswith(" px"), outcome.headline
@@ -598,7 +598,7 @@ def render_two_formats():
     yield
     yield from choose_in_the_file_browser(bpy.ops.viewcam.render_all_cameras, FOLDER)
     yield from until(lambda: render_all.background.running or render_all._sheet, "the rendering's start")
-    yield from until(lambda: render_all.background.running is None, "the pictures", 2000, WAITING)
+    yield from until(lambda: render_all.background.running is None, "the pictures", PATIENCE, WAITING)
     (folder,) = [each for each in FOLDER.iterdir() if "all cameras" in each.name]
     sheet = (folder / "contact-sheet.html").read_text(encoding="utf-8")
     assert {path.stem for path in folder.glob("*.exr")} == {"Camera", "Portrait"}
@@ -701,7 +701,8 @@ def match_a_photo():
     assert _is_as_before(), "one undo does not take it back"
 
 
-# What would send an artist away again, and what is tried of it. Each part goes on where the one before it has ended.
+# Things that would send an artist away again if they failed, and the steps that try them. Each part goes on where the one
+# before it has ended.
 DAY = {
     "The lens can be set in the panel": (tick_the_box, choose_the_unit),
     "Fields go as far as Blender's own": (drag_the_fields,),

@@ -2,8 +2,11 @@
 
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python cameras_in_a_window.py -- FOLDER [PICTURES]
 
-FOLDER : has COLMAP's model `sparse` of the eyes in `cameras_of_colmap.json`, and takes the fSpy project that is made here.
-PICTURES : where pictures of the window go; without it none are taken. Leaves with status 0, or 5 and a traceback.
+FOLDER : a folder that has COLMAP's model `sparse` of the eyes in `cameras_of_colmap.json`, and takes the fSpy project that is
+    made here.
+PICTURES : a folder for pictures of the window; without it none are taken.
+
+Leaves with status 0, or 5 and a traceback.
 """
 
 import json

@@ -58,8 +58,10 @@ class Host:
     ) -> subprocess.CompletedProcess:
         """Run a script (hands.py) in the real Blender's window on a virtual screen, and keep what it says.
 
-        size : of the window, pixels at scale 1. scale : of Blender's interface and of the window.
-        simulated : mouse and keys are the script's. patience : seconds, many times what it takes, on a busy machine too.
+        size : the window's size, pixels at scale 1.
+        scale : the scale of Blender's interface and of the window.
+        simulated : mouse and keys are the script's.
+        patience : seconds, many times what it takes, on a busy machine too.
         """
         corner = ("-p", "0", "0", *(str(int(scale * pixels)) for pixels in size))
         events = ["--enable-event-simulate"] if simulated else []

@@ -19,7 +19,8 @@ from bpy_extras.object_utils import world_to_camera_view
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Euler, Vector
 
-# Of the interface and of all places here: a window of half the width and height is drawn in software in a third of the time.
+# The scale of the interface and of all places here: a window of half the width and height is drawn in software in a third of
+# the time.
 SCALE = float(os.environ.get("VIEWCAM_UI_SCALE", "1"))
 NOWHERE = (int(600 * SCALE), int(500 * SCALE))  # a place in the 3D viewport
 # A step that yields these seconds leaves the processors to what it waits for: where events are simulated, Blender never sleeps.
@@ -141,8 +142,8 @@ def start(steps, interval=0.01):
 SIDEBAR, PROPERTIES, VIEWPORT = ("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW"), ("VIEW_3D", "WINDOW")
 SCREEN_HEIGHT = 2000
 _HEADER = int(60 * SCALE)  # pixels from the panel's top within which its checkbox stands
-_PATIENCE = 4  # looks
-_STEPS = 200  # that something may take to happen
+_LOOKS = 4  # at a button
+_PATIENCE = 120  # seconds that something may take to happen
 _ROW = int(18 * SCALE)  # pixels between two looks, less than a button's height
 _NOTHING = 25  # rows without a button, more than a panel's texts and closed sub-panels are, below which there is none
 # Where in a row its buttons are looked for, as shares of the panel's width; of operators there are many in a row.
@@ -205,7 +206,7 @@ def find(button, where=SIDEBAR):
 def seek(button, where):
     """Steps that end with where the button stands, as of `find`, or None if there is no such button."""
     if place := _remembered(button, where):
-        for _ in range(_PATIENCE):  # the button that the mouse comes from may want to be left first
+        for _ in range(_LOOKS):  # the button that the mouse comes from may want to be left first
             if (yield from look(*place, where)).startswith(button):
                 return place
     print(f"looking for {button}", flush=True)
@@ -424,13 +425,15 @@ def call(operator, where=VIEWPORT, **properties):
         return operator("INVOKE_DEFAULT", True, **properties)  # with its undo step
 
 
-def until(is_so, what, steps=_STEPS, seconds=0):
-    """Steps until something has happened: none is counted on to take a time. seconds : of each, where it does take some."""
-    for _ in range(steps):
-        if is_so():
-            return
+def until(is_so, what, patience=_PATIENCE, seconds=0):
+    """Steps until something has happened: none is counted on to take a time.
+
+    patience : seconds, many times what it takes on a quiet machine. seconds : of each step, where it does take some.
+    """
+    ends = time.monotonic() + patience
+    while not is_so():
+        assert time.monotonic() < ends, f"{what} does not happen within {patience} s"
         yield seconds
-    raise AssertionError(f"{what} does not happen")
 
 
 def settle():
@@ -454,7 +457,7 @@ def hide_the_sidebar(hidden=True):
 def photograph(where, path, share=100, pointer=None):
     """Save what the screen shows of (left, bottom, width, height), in percent of its size and few colors.
 
-    pointer : where the mouse is, window coordinates, and its arrow is drawn: simulated events move none.
+    pointer : the mouse's place, window coordinates, at which its arrow is drawn: simulated events move none.
     """
     left, bottom, width, height = map(int, where)
     screen = ("import", "-window", "root", "-crop", f"{width}x{height}+{left}+{SCREEN_HEIGHT - bottom - height}", "+repage")

@@ -2,9 +2,11 @@
 
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python pictures_in_a_window.py -- FOLDER PHOTO [PART…]
 
-FOLDER : docs/images. PHOTO : that of photo_of_a_room.py. PART : a function of STEPS; without any, all of them. test_tour.py
-runs this.
-Leaves with status 0, or 5 and a traceback.
+FOLDER : docs/images.
+PHOTO : the photograph that photo_of_a_room.py draws.
+PART : the name of a function of STEPS; without any, all of them run.
+
+test_window.py runs this. Leaves with status 0, or 5 and a traceback.
 """
 
 import subprocess
@@ -37,7 +39,7 @@ FOLDER, PHOTO, *PARTS = sys.argv[sys.argv.index("--") + 1 :]
 FOLDER, PHOTO = Path(FOLDER), Path(PHOTO)
 STUDIO = Path(__file__).resolve().parent.parent.parent / "sample_scenes" / "studio.blend"
 LISTED = 222  # pixels of the file browser's list
-SAMPLES, PATIENCE = 8, 100_000  # of light, and steps until it is there
+SAMPLES, PATIENCE = 8, 3000  # of light, and seconds until it is there
 EDGE, LEGEND = 24, 70  # pixels around the pictures of a proof, and below them
 # (axis, start, end) of edges of the room, world space.
 EDGES = (

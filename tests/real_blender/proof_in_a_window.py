@@ -3,8 +3,10 @@ Write Labels, to its files.
 
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python proof_in_a_window.py -- FILE FOLDER [PICTURES]
 
-FILE : a small scene with a camera, saved. FOLDER : where the script writes which temporary folder the last comparison had, when
-it quits Blender. PICTURES : where pictures of the window go; without it none are taken.
+FILE : a small scene with a camera, saved.
+FOLDER : a folder in which the script writes, when it quits Blender, which temporary folder the last comparison had.
+PICTURES : a folder for pictures of the window; without it none are taken.
+
 Leaves through Blender's own door with status 0, or with 5 and a traceback.
 """
 
@@ -25,7 +27,7 @@ FILE, FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
 ADDON = "bl_ext.user_default.virtual_pinhole"
 PROOF, LABELS = (f"{ADDON}.viewcam_addon.blender.interface.{name}" for name in ("proof", "labels"))
 ROW = 12  # pixels between two looks for a button, less than its height
-PATIENCE = 60  # seconds that one comparison may take on a busy machine
+PATIENCE = 600  # seconds that one comparison may take on a busy machine
 LEFT, MIDDLE, RIGHT, CANCEL = 0.3, 0.5, 0.7, 0.83  # shares of the sidebar's width
 
 opened = []

@@ -3,10 +3,15 @@
 import json
 import os
 import re
+import sys
+from pathlib import Path
 
 import numpy as np
 import OpenEXR
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+import disturbed
 
 from viewcam_addon.commands.demo import SCENE as DEMO_SCENE
 
@@ -162,3 +167,14 @@ def test_a_calibrated_lens_bends_picture_and_labels_alike(real_blender, tmp_path
     ends = np.flatnonzero(is_box.any(axis=1))[[4, -5]]
     left = [int(np.flatnonzero(is_box[row])[0]) for row in (*ends, 180)]
     assert left[2] <= min(left[:2]) - 1, left
+
+
+class TestWhateverDisturbsIt(disturbed.Disturbances):
+    @pytest.fixture(scope="class")
+    @classmethod
+    def blender(cls, real_blender):
+        def command(shots: Path) -> disturbed.Command:
+            words = [*real_blender.command, "-b", disturbed.STUDIO, "--command", "viewcam", "batch", shots]
+            return disturbed.Command(words, {"BLENDER_USER_RESOURCES": str(real_blender.user_folder)})
+
+        return command

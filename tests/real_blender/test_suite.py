@@ -1,7 +1,7 @@
 """The tests of viewcam_addon/blender once more, inside a real Blender: its own Python, its own NumPy, no wheel of bpy.
 
 Without those of light against Cycles, which look at what the two render: the wheels' Cycles is that of the program; without
-batches, which test_batch_command.py has as their users type them; without the tour, which test_tour.py takes by hand; and
+batches, which test_batch_command.py has as their users type them; without the tour, which test_window.py takes by hand; and
 without what following costs, which is counted. With few examples of each property: `make test` has the many.
 """
 

@@ -2,8 +2,10 @@
 
 blender --enable-event-simulate -p 0 0 1600 2000 --addons … --python tour_in_a_window.py -- [FOLDER [STEP…]]
 
-FOLDER : where the pictures of docs/artists.md go; every step is taken by script then, for hands take ten times as long. STEP :
-those alone are photographed. Leaves with status 0, or 5 and a traceback.
+FOLDER : a folder for the pictures of docs/artists.md; every step is taken by script then, for hands take ten times as long.
+STEP : the name of a step; these alone are photographed.
+
+Leaves with status 0, or 5 and a traceback.
 """
 
 import sys

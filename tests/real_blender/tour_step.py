@@ -11,17 +11,20 @@ import bpy
 import numpy as np
 
 SIZE = (640, 360)
-# Of the largest area: below there is nothing to see, since the window is as tall as the panel with all of its parts open.
+# A part of the largest area: below there is nothing to see, since the window is as tall as the panel with all of its parts
+# open.
 UPPER_PART = (0.0, 0.35, 1.0, 1.0)
 
 
 class Step:
     """One thing that an artist does.
 
-    picture : file in docs/images/artists, taken when the step is done. shows : "sidebar", "area" (the largest), "camera
-        view", or where in the largest area, as shares of it: left, bottom, right and top.
+    picture : file in docs/images/artists, taken when the step is done.
+    shows : the part of the window, "sidebar", "area" (the largest), "camera view", or where in the largest area, as shares of
+        it: left, bottom, right and top.
     with_before : the picture shows on its left what was there before.
-    edits : how many undo steps it makes; each is undone and redone. needs_a_window : there is nothing to it without one.
+    edits : the number of undo steps that it makes; each is undone and redone.
+    needs_a_window : there is nothing to it without one.
     """
 
     picture: str | None = None

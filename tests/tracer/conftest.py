@@ -79,15 +79,15 @@ def make_spheres():
 def make_scene():
     """make_scene(camera, geometry, (geometry, matrix), …) → Scene; the objects' indices count from 1."""
 
-    def build(camera: Pinhole, *things, clip=(0.0, float("inf"))) -> Scene:
-        things = [thing if isinstance(thing, tuple) else (thing, np.eye(4)) for thing in things]
-        names = {id(geometry): f"geometry {number}" for number, (geometry, _) in enumerate(things)}
+    def build(camera: Pinhole, *bodies, clip=(0.0, float("inf"))) -> Scene:
+        bodies = [body if isinstance(body, tuple) else (body, np.eye(4)) for body in bodies]
+        names = {id(geometry): f"geometry {number}" for number, (geometry, _) in enumerate(bodies)}
         return Scene(
             camera=camera,
-            geometries={names[id(geometry)]: geometry for geometry, _ in things},
+            geometries={names[id(geometry)]: geometry for geometry, _ in bodies},
             objects=tuple(
                 Object(f"object {number}", names[id(geometry)], matrix, number)
-                for number, (geometry, matrix) in enumerate(things, start=1)
+                for number, (geometry, matrix) in enumerate(bodies, start=1)
             ),
             clip=clip,
         )
@@ -99,11 +99,11 @@ def make_scene():
 def make_lit():
     """make_lit(camera, (geometry, material), …, lamps=…, world=…, film=…, bounces=…) → Scene; no material is the plain one."""
 
-    def build(camera: Pinhole, *things, **light) -> Scene:
-        materials = {f"material {number}": material for number, (_, material) in enumerate(things) if material is not None}
+    def build(camera: Pinhole, *bodies, **light) -> Scene:
+        materials = {f"material {number}": material for number, (_, material) in enumerate(bodies) if material is not None}
         return Scene(
             camera=camera,
-            geometries={f"geometry {number}": geometry for number, (geometry, _) in enumerate(things)},
+            geometries={f"geometry {number}": geometry for number, (geometry, _) in enumerate(bodies)},
             objects=tuple(
                 Object(
                     f"object {number}",
@@ -112,7 +112,7 @@ def make_lit():
                     number + 1,
                     materials=() if material is None else (f"material {number}",),
                 )
-                for number, (_, material) in enumerate(things)
+                for number, (_, material) in enumerate(bodies)
             ),
             materials=materials,
             **light,
@@ -157,8 +157,8 @@ def random_scene(ball, make_scene, make_mesh, make_spheres, random_matrix):
             (width * rng.uniform(0.3, 0.7), height * rng.uniform(0.3, 0.7)),
             bool(rng.integers(2)),
         )
-        things = [(geometry, random_matrix(rng)) for geometry in (shared, shared, ball(5), soup, spheres)]
-        return make_scene(camera, *things, clip=(rng.uniform(0, 1.5), rng.uniform(6, 14)))
+        bodies = [(geometry, random_matrix(rng)) for geometry in (shared, shared, ball(5), soup, spheres)]
+        return make_scene(camera, *bodies, clip=(rng.uniform(0, 1.5), rng.uniform(6, 14)))
 
     return build
 

@@ -132,7 +132,9 @@ def looked_up(picture: Picture, uv, closest: bool):
 class ScatteredBy:
     """A shader node of one closure on a floor, z up: what it sends on of light from a direction, and what it samples.
 
-    incoming, direction : (3, n), unit; incoming goes downwards. u : (3, n) numbers. behind : whether the floor is met so.
+    incoming, direction : (3, n), unit; incoming goes downwards.
+    u : (3, n) numbers.
+    behind : true if the floor is met from behind.
     """
 
     def __init__(self, shader, incoming, direction, u, behind=False, version=502) -> None:

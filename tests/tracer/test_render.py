@@ -209,7 +209,7 @@ def test_what_lies_before_the_clip_range_is_looked_through_and_what_lies_behind_
         return make_mesh([[-9, -9, -depth], [9, -9, -depth], [0, 20, -depth]], [[0, 1, 2]])
 
     camera = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 10, 4, 4)
-    things = (wall(1), make_spheres([[0, 0, -3]], 0.5), wall(5))  # objects 1, 2 and 3
+    bodies = (wall(1), make_spheres([[0, 0, -3]], 0.5), wall(5))  # objects 1, 2 and 3
     for clip, seen in (
         ((0, 100), 1),
         ((2, 100), 2),
@@ -218,7 +218,7 @@ def test_what_lies_before_the_clip_range_is_looked_through_and_what_lies_behind_
         ((4, 5), 3),
         ((0, 0.9), 0),
     ):
-        rendered = objects_seen(make_scene(camera, *things, clip=clip))[2, 2]
+        rendered = objects_seen(make_scene(camera, *bodies, clip=clip))[2, 2]
         assert rendered == seen, f"clip {clip}: object {rendered} instead of {seen}"
 
 
@@ -226,7 +226,7 @@ def test_scenes_and_meshes_that_are_empty_or_degenerate_show_nothing(make_scene,
     camera = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 10, 8, 8)
     flat = np.diag([1.0, 1.0, 0.0, 1.0])
     flat[2, 3] = -2
-    for things in (
+    for bodies in (
         (),
         (make_mesh([], []),),
         (make_spheres([], []),),
@@ -236,8 +236,8 @@ def test_scenes_and_meshes_that_are_empty_or_degenerate_show_nothing(make_scene,
         (make_spheres([[0, 0, -2]], 0.0),),
         ((make_spheres([[0, 0, 0]], 1.0), flat),),  # a sphere that its matrix flattens
     ):
-        scene = make_scene(camera, *things)
-        assert not objects_seen(scene).any(), f"{things}: {np.unique(objects_seen(scene))}"
+        scene = make_scene(camera, *bodies)
+        assert not objects_seen(scene).any(), f"{bodies}: {np.unique(objects_seen(scene))}"
 
 
 def test_an_eye_inside_a_sphere_sees_through_it_and_one_just_outside_sees_it(make_scene, make_spheres):
@@ -317,9 +317,9 @@ def scene(make_lit, make_mesh, make_spheres, ball):
     soup = make_mesh(rng.normal(size=(60, 3)), np.arange(60))
     spheres = make_spheres(rng.uniform(-2, 2, (12, 3)), rng.uniform(0.1, 0.4, 12))
     ground = make_mesh(GROUND, [[0, 1, 2], [0, 2, 3]])
-    things = ((ball(12), GREEN), (soup, RED), (ground, None), (spheres, RED))
+    bodies = ((ball(12), GREEN), (soup, RED), (ground, None), (spheres, RED))
     lamps = (Sun("sun", towards=(0.48, -0.6, 0.64), irradiance=(2.0, 2.0, 2.0)),)
-    lit = make_lit(camera(), *things, lamps=lamps, bounces=Bounces().none)
+    lit = make_lit(camera(), *bodies, lamps=lamps, bounces=Bounces().none)
     objects = tuple(replace(o, hidden_from=frozenset({"shadow"}) if o.name == "object 1" else frozenset()) for o in lit.objects)
     return replace(lit, objects=objects)
 

@@ -64,14 +64,14 @@ def traced(core: CoreScene, starts, directions, lengths=np.inf) -> tuple[np.ndar
 
 
 @pytest.mark.parametrize(("scale", "far"), PLACES)
-@pytest.mark.parametrize("thing", ["ball", "spheres", "floor", "wide floor"])
-def test_no_ray_meets_the_convex_thing_that_it_leaves_outwards(ball, make_mesh, make_spheres, thing, scale, far):
+@pytest.mark.parametrize("body", ["ball", "spheres", "floor", "wide floor"])
+def test_no_ray_meets_the_convex_thing_that_it_leaves_outwards(ball, make_mesh, make_spheres, body, scale, far):
     rng, count, matrix = np.random.default_rng(1), 20_000, placing(scale, far)
-    extent = 1e4 if thing == "wide floor" else 3.0
-    things = {"ball": lambda: ball(20), "spheres": lambda: make_spheres([[0, 0, 0]], 1.0)}
-    core = core_of(things.get(thing, lambda: make_mesh(SQUARE * extent, HALVES))(), matrix)
+    extent = 1e4 if body == "wide floor" else 3.0
+    bodies = {"ball": lambda: ball(20), "spheres": lambda: make_spheres([[0, 0, 0]], 1.0)}
+    core = core_of(bodies.get(body, lambda: make_mesh(SQUARE * extent, HALVES))(), matrix)
     eyes = np.array([0.3, 2.5, 1.6]) + rng.normal(size=(count, 3)) * 0.1
-    aims = rng.normal(size=(count, 3)) * 0.5 * ([1, 1, 0] if "floor" in thing else [1, 1, 1])
+    aims = rng.normal(size=(count, 3)) * 0.5 * ([1, 1, 0] if "floor" in body else [1, 1, 1])
     rays = rays_at(core, matrix, eyes, aims)
     _, normals, _, _, _ = core.leaving(rays, np.array([0.0, 0.0, 1.0]))
     directions = onwards(np.nan_to_num(normals), rng)

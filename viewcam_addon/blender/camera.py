@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from .. import intrinsics, rotation
 from .. import roll as rolls
-from ..camera_values import HOLD, CameraValues, moved_poses, without_border
+from ..camera_values import FACTORS, HOLD, CameraValues, moved_poses, without_border
 from ..errors import InputError
 from ..pinhole import Pinhole, Triple, basis, make_views
 from . import causes, conversion, datablocks, findings, hold, pose, preferences, storage, targets
@@ -80,8 +80,8 @@ class CameraSync:
     def __init__(self) -> None:
         self.camera_object: bpy.types.Object = None
         self.is_being_set = False  # the values were edited, and the camera does not stand there yet: neither has been moved
-        # What was placed last, with the state that it left. Blender tells of each edit once more when it evaluates it, and a
-        # camera that follows something would be placed where it stands already.
+        # The camera as it was placed last, with the state that it left. Blender tells of each edit once more when it evaluates
+        # it, and a camera that follows something would be placed where it stands already.
         self._placed: tuple = ()
         # The camera's state and its stored values as they were last seen to agree; None where nobody has looked.
         self._state: Any = None  # a tuple, and CameraValues; None until it is first seen
@@ -146,14 +146,16 @@ class CameraSync:
         if not storage.is_counted_in_earlier(camera_object, before):
             before = replace(before, counted_in=without_border(frame))
         values = before.stating(eye, look_at, up, distance, frame, camera_object.data.sensor_fit)
-        names = [*storage.EXACT, "counted_in", "enabled", *(["zoom"] if values.zoom != before.zoom else [])]
+        changed = [name for name in FACTORS if getattr(values, name) != getattr(before, name)]
+        names = [*storage.EXACT, "counted_in", "enabled", *changed]
         storage.store(camera_object, values, *names)
         storage.settle(camera_object, values, frame)
 
     def edited(self, scene: bpy.types.Scene, names: frozenset[str] = ALL) -> None:
         """Move an enabled camera to where its values, edited or not, say; a held roll is carried along (hold.py).
 
-        names : of the values that count, wherever Blender has moved the camera since its last update; the others follow it.
+        names : the names of the values that count where Blender has moved the camera since its last update; the others follow
+            it.
 
         Raises
         ------
@@ -261,21 +263,24 @@ class CameraSync:
         except InputError:  # no picture at all
             return [sync for sync, _ in cameras]
         for sync, evaluated in cameras:
-            camera_object, raw = sync.camera_object, None
-            if sync._carried_in == picture and not camera_object.parent and not camera_object.constraints:
-                raw = storage.raw(evaluated)
-            if raw is None:
+            camera_object = sync.camera_object
+            if sync._carried_in != picture or camera_object.parent or camera_object.constraints:
+                left.append(sync)
+                continue
+            if not datablocks.is_known_as_animated(camera_object):
+                state = conversion.state_of(camera_object)
+                if state != sync._state and sync._is_free(state):
+                    moved.append((sync, evaluated, state))
+                elif state != sync._state:
+                    left.append(sync)
+                continue
+            raw = storage.raw(evaluated)
+            if raw is None or conversion.state_of(camera_object) != sync._state:
                 left.append(sync)
                 continue
             values = sync._values if raw == sync._raw else storage.animated(sync._values, raw)
-            is_stated, state = values is not sync._values, conversion.state_of(camera_object)
-            if state == sync._state:
-                if is_stated:
-                    stated.append((sync, values, raw))
-            elif not is_stated and sync._is_free(state):
-                moved.append((sync, evaluated, state))
-            else:
-                left.append(sync)
+            if values is not sync._values:
+                stated.append((sync, values, raw))
         if moved:
             left += cls._follow(moved, picture)
         poses = _poses_of([values for _, values, _ in stated])
@@ -313,7 +318,7 @@ class CameraSync:
         is_moved = np.array([here.location != there.location for here, there in channels])
         is_turned = np.array([here[:3:2] != there[:3:2] for here, there in channels])  # in its mode or its rotation
         rounding, eyes = findings.LARGEST_TURN, matrices[:, :3, 3]
-        after = moved_poses(before, is_moved, is_turned, eyes, rotation.nearest(axes), preferences.up_axis(), rounding)
+        after = moved_poses(before, is_moved, is_turned, eyes, rotation.straightened(axes), preferences.up_axis(), rounding)
         is_view = make_views(*after.swapaxes(0, 1)) & (np.abs(after) <= intrinsics.LARGEST_FLOAT32).all(axis=(-2, -1))
         left = []
         for (sync, _, state), is_valid, is_changed, pose_after, vectors in zip(
@@ -331,8 +336,8 @@ class CameraSync:
                 continue
             if is_changed or distance != values.distance:
                 eye, look_at, up = map(tuple, pose_after)
-                sync._values = values.animated(eye, look_at, up, distance, values.zoom, 2.0**-53)
-                sync._raw = storage.follow(sync.camera_object, sync._values, vectors)
+                sync._values, sync._raw = values.animated(eye, look_at, up, distance, 2.0**-53), None
+                storage.follow(sync.camera_object, sync._values, vectors)
             sync._state, sync._rests, sync._is_moving, sync._placed = state, (), False, ()
         return left
 
@@ -350,10 +355,9 @@ class CameraSync:
         return distance if 0 < distance <= intrinsics.LARGEST_FLOAT32 else None
 
     def _is_free(self, state: tuple) -> bool:
-        """True if no value decides where the camera is that Blender has moved, and nothing keeps its values from following."""
+        """True if nothing keeps the values of a camera that Blender has moved from following."""
         camera_object, (channels, kind, *_) = self.camera_object, state
-        is_linked = camera_object.library or camera_object.data.library
-        return channels.is_plain and kind == "PERSP" and not is_linked and not datablocks.is_animated(camera_object)
+        return channels.is_plain and kind == "PERSP" and not camera_object.library and not camera_object.data.library
 
     @classmethod
     def _bring(
@@ -366,8 +370,11 @@ class CameraSync:
     ) -> list["CameraSync"]:
         """Place n cameras that nothing carries by their new values.
 
-        mode : of their rotations. locations : (n, 3). axes : (n, 3, 3), u, v and w as columns. Returns those that have no such
-        lens.
+        mode : their rotation mode.
+        locations : their places, (n, 3).
+        axes : (n, 3, 3), u, v and w as columns.
+
+        Returns those that have no such lens.
         """
         left, cameras = [], [sync.camera_object for sync, *_ in stated]
         turns = pose.set_rotations(cameras, mode, rotation.numbers(axes, mode), axes)
@@ -379,7 +386,7 @@ class CameraSync:
                 conversion.store(camera_object.data.dof, focus_distance=math.dist(values.eye, values.look_at))
             sync._state = (rotation.Channels(mode, location, tuple(turn), *channels[3:]), *lens)
             sync._values, sync._raw, sync._rests, sync._is_moving, sync._placed = values, raw, (), False, ()
-            if (values.distance, values.zoom) != (before.distance, before.zoom):
+            if values.zoomed_distance != before.zoomed_distance:
                 try:
                     sync.resized(scene)
                     sync._agree()
@@ -476,8 +483,11 @@ class CameraSync:
         The look-at point keeps its distance to the eye, and up stays where it gives the picture. What follows an object or has
         a driver stays as that says, and the camera is brought back to it.
 
-        depsgraph : in which the camera was evaluated just now. since : the values before some were edited, where the camera
-            does not stand there yet. edited : the names of these, which stay. Returns whether there was anything to adopt.
+        depsgraph : in which the camera was evaluated just now.
+        since : the values before some were edited, where the camera does not stand there yet.
+        edited : the names of these, which stay.
+
+        Returns whether there was anything to adopt.
 
         Raises
         ------
@@ -713,7 +723,7 @@ def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use
     """The pinhole that `adopt` states, unstated: the camera as it stands, with a look-at point and an up that people would
     choose.
 
-    in_use : whether the look-at point has the distance from the eye that the values say, if they say any.
+    in_use : true to put the look-at point as far from the eye as the values say, if they say anything.
 
     Raises
     ------

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import bpy
 
+from ..camera_values import DECIDES
 from ..errors import listed
 from . import datablocks, pose, storage, versions
 from .findings import APPLY_OR_ADOPT, CENTER, DISTANCE, EYE, LENS, POSE, VIEW, Button, Cause
@@ -21,20 +22,9 @@ def causes(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[
     yield from _sharers(camera_object)
 
 
-# What each value decides where it is animated: a moving eye turns the view, since the look-at point stands still.
-_DECIDES = {
-    "eye": POSE,
-    "look_at": frozenset({VIEW}),
-    "up": frozenset({VIEW}),
-    "held_roll": frozenset({VIEW}),
-    "distance": frozenset({DISTANCE}),
-    "zoom": frozenset({DISTANCE}),
-}
-
-
 def decided_by(names: Iterable[str]) -> frozenset[str]:
     """The parts of EYE, VIEW and DISTANCE that values, by their names, decide."""
-    return frozenset().union(*(_DECIDES.get(name, frozenset()) for name in names))
+    return frozenset().union(*(DECIDES.get(name, frozenset()) for name in names))
 
 
 def decided_by_values(camera_object: bpy.types.Object) -> frozenset[str]:
@@ -157,7 +147,10 @@ def _drivers(camera_object: bpy.types.Object) -> Iterator[Cause]:
 def keyed(
     camera_object: bpy.types.Object, curves: Callable[[bpy.types.ID], list[bpy.types.FCurve]]
 ) -> list[tuple[bpy.types.ID, str]]:
-    """The camera's own channels that keyframes set: (object or data, data path). curves : of a datablock."""
+    """The camera's own channels that keyframes set: (object or data, data path).
+
+    curves : a function: datablock → its curves.
+    """
     blocks = camera_object, camera_object.data
     return [(block, path) for block in blocks for path in _paths(curves(block)) if _channel(path)[0] not in (None, CENTER)]
 
@@ -185,7 +178,10 @@ def _is_moving(block: bpy.types.Object) -> bool:
 
 
 def _libraries(camera_object: bpy.types.Object) -> Iterator[Cause]:
-    blocks = ((camera_object, "Camera", POSE), (camera_object.data, "The camera data", LENS))
+    data = camera_object.data
+    blocks = [(camera_object, "Camera", POSE), (data, "The camera data", LENS)]
+    if camera_object.library == data.library:  # one sentence is enough
+        blocks = [(camera_object, "Camera", POSE | LENS)]
     for block, kind, acts_on in blocks:
         if block.library:
             clause = f"{kind} {block.name!r} is linked from {block.library.name!r}, and what is set here is not saved"

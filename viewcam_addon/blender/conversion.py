@@ -41,10 +41,11 @@ def place(
 ) -> None:
     """Move a perspective camera to `pinhole`, without reading back.
 
-    pinhole : of the picture that `scene` renders, world space.
-    depsgraph : where to look up what carries the camera; None: that of the scene. A camera whose pose tells what carries it
-        is then placed once more from there, since it may have been far away.
-    parts : those of PARTS to set; the others stay as they are. parent : `parent_matrix`, where that is known.
+    pinhole : the camera of the picture that `scene` renders, in world space.
+    depsgraph : the depsgraph in which to look up what carries the camera; the scene's where None. A camera whose pose tells
+        what carries it is then placed once more from there, since it may have been far away.
+    parts : the PARTS to set; the others stay as they are.
+    parent : `parent_matrix`, where that is known.
 
     Raises
     ------
@@ -151,9 +152,9 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     if skew > pose.LARGEST_SKEW:
         raise InputError(f"camera {camera_object.name!r} is oblique, {pose.who_shears(camera_object)}")
     mirrored = bool(volume < 0)
-    _, v, w = rotation.nearest(axes).T
+    _, v, w = rotation.straightened(axes).T
     eye = matrix[:3, 3]
-    # As far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.
+    # The look-at point is as far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.
     reach = 2.0 ** math.ceil(math.log2(max(1.0, np.abs(eye).max())))
     plane = datablocks.view_plane(datablocks.camera_data_of(camera), datablocks.frame_of(scene))
     return Pinhole(

@@ -27,8 +27,9 @@ def of_file(
 ) -> list[Camera]:
     """The cameras of a .blend as it renders them.
 
-    shots : (name, frame) of each; None for all cameras of the scene at the frame in which the file was saved. name : of the
-    camera of these frames; None for the one that Blender would render there. trust : as `opened` has it.
+    shots : (name, frame) of each; None for all cameras of the scene at the frame in which the file was saved.
+    name : the name of the camera at these frames; None for the one that Blender would render there.
+    trust : see `opened`.
 
     Raises
     ------
@@ -55,7 +56,8 @@ def of_frames(
 ) -> list[Camera]:
     """A camera at many frames as the scene renders it; the scene is at its own frame again afterwards.
 
-    shots : (name, frame) of each. camera_object : None for the one that Blender would render there.
+    shots : (name, frame) of each.
+    camera_object : None for the one that Blender would render there.
 
     Raises
     ------
@@ -78,7 +80,8 @@ def of_frames(
 def of_pictures(names: Iterable[str], blend: str | os.PathLike[str], trust: bool = False) -> list[Camera]:
     """The camera of each picture that the .blend has one for, as it renders it, with notes on what of the file is off.
 
-    names : of the pictures, without folder and suffix. trust : as `opened` has it.
+    names : the pictures' names, without folder and suffix.
+    trust : see `opened`.
 
     Raises
     ------

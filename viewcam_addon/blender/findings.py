@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..camera_values import PARTS
 from ..pinhole import Pinhole
 
 _FLOAT32 = 2.0**-24  # the relative error of storing a number as float32
@@ -27,7 +28,7 @@ LARGEST_ZOOM = 3 * _FLOAT32
 # The roundings of the shift: itself, and its product with the size.
 _SHIFT_ROUNDINGS = 2
 
-EYE, VIEW, DISTANCE, CENTER = "eye", "view", "distance", "center"
+EYE, VIEW, DISTANCE, CENTER = *PARTS, "center"
 POSE, LENS = frozenset({EYE, VIEW}), frozenset({DISTANCE, CENTER})
 APPLY_OR_ADOPT = "apply the values again, or adopt the camera as it stands"
 
@@ -43,8 +44,11 @@ class Button(enum.Enum):
 class Cause:
     """Something that may keep a camera from being what its four values say.
 
-    clause : who does what, in words. acts_on : some of EYE, VIEW, DISTANCE, CENTER.
-    remedy : what to do. always : told even where nothing differs yet. mended_by : the button that does it, if there is one.
+    clause : a clause that says what does this, such as "The shift was changed since".
+    acts_on : some of EYE, VIEW, DISTANCE, CENTER.
+    remedy : a sentence that says what to do about it.
+    always : true to tell it even where nothing differs yet.
+    mended_by : the button that does it, if there is one.
     """
 
     clause: str
@@ -56,7 +60,11 @@ class Cause:
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding about a camera. cause : None where the words say all. differing : in words, what of the camera it explains."""
+    """A finding about a camera.
+
+    cause : None where the words say all.
+    differing : in words, what of the camera it explains.
+    """
 
     words: str = ""
     cause: Cause | None = None
@@ -71,7 +79,7 @@ class Finding:
         return f"{self.cause.clause}{figures}: {self.cause.remedy}"
 
 
-# What has moved a camera where nothing that is known did.
+# The causes where nothing that is known has moved the camera.
 _MOVED = Cause("The camera or its parent was moved since", POSE, APPLY_OR_ADOPT, mended_by=Button.APPLY_AGAIN)
 _LENS = Cause(
     "The lens, sensor or pixel aspect was changed since", frozenset({DISTANCE}), APPLY_OR_ADOPT, mended_by=Button.APPLY_AGAIN
@@ -84,7 +92,8 @@ def differences(
 ) -> dict[str, str]:
     """The differences beyond what Blender's float32 storage explains: its name → the figures, in words. Pure.
 
-    reach : the largest coordinate that went into the camera's location, world units. length : a length in words, with its unit.
+    reach : the largest coordinate that went into the camera's location, world units.
+    length : a length in words, with its unit.
     """
     result = {}
     apart = math.dist(wanted.eye, read_back.eye)

@@ -74,8 +74,9 @@ def obstacle(camera_object: bpy.types.Object) -> str | None:
 def after_edit(before: Pinhole, stated: Pinhole, roll: float, within: float) -> float:
     """The roll, in [−π, π], of an edited view: carried along if the way there leads by the pole, else as it was.
 
-    before, stated : the views without roll, as up alone says. roll : radians, that of `before`.
-    Rounded to float32, as the property will have it, so that the camera is what its values say.
+    before, stated : the views without roll, as up alone says.
+    roll : radians, that of `before`. Rounded to float32, as the property will have it, so that the camera is what its values
+        say.
     """
     turn = _step([_numbers(before), _numbers(stated)], within)
     return roll if turn is None else float(np.float32(math.remainder(roll + turn, 2 * math.pi)))

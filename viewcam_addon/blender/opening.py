@@ -23,10 +23,11 @@ from ..errors import InputError
 from . import ensure_registered
 from .temporary_settings import Overrides, overridden
 
-# What a .blend starts with: itself, or a gzip or Zstandard stream.
+# The first bytes of a .blend: its own, or those of a gzip or Zstandard stream.
 _MAGIC = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 
-# What a render would write beside its picture: each pass for the compositor (in the temporary folder), images as tx (5.2).
+# Settings by which a render writes files beside its picture: each pass for the compositor (in the temporary folder), images as
+# tx (5.2).
 _WRITING = ("use_render_cache", "use_auto_generate_texture_cache")
 
 _WAITED = 5.0
@@ -39,8 +40,8 @@ _Put = Callable[[bpy.types.bpy_struct, str, Any], None]
 def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterator[tuple[Overrides, tuple[str, ...]]]:
     """Open a .blend, or take the file that is open (None), for the time of a job.
 
-    trust : whether what is in it may run and write. A file that is open was opened by Blender, by its own `--enable-autoexec`
-    or preference; here only the rest is decided.
+    trust : true if its scripts may run and write. A file that is open was opened by Blender, by its own `--enable-autoexec` or
+        preference; here only the rest is decided.
 
     Gives a Overrides, and a sentence for each thing that is off and might be seen, or that Blender could not read.
 

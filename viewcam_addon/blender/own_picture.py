@@ -24,8 +24,10 @@ def _on_use(group: "OwnPicture", context: bpy.types.Context) -> None:
 class OwnPicture(bpy.types.PropertyGroup):
     """`object.virtual_pinhole_picture` of a camera, and `scene.virtual_pinhole_picture`: the scene's numbers, put aside.
 
-    use : whether the camera has its own. is_stated : whether the numbers have ever been set. camera : of a scene, whose numbers
-    it has, None where they are its own. is_lent : whether they are another's, which may be gone.
+    use : true if the camera has a picture of its own.
+    is_stated : true once the numbers have been set.
+    camera : the camera whose numbers a scene has, None where they are its own.
+    is_lent : true if they are a camera's, which may be gone.
     """
 
     use: bpy.props.BoolProperty(

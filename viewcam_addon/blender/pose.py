@@ -69,7 +69,10 @@ def set_rotation(camera_object: bpy.types.Object, turn: Array, before: Sequence[
 def set_rotations(cameras: Sequence[bpy.types.Object], mode: str, numbers: Array, axes: Array) -> NDArray[np.float32]:
     """Rotate n cameras of one mode, each by its numbers or those beside them that float32 makes the better matrix of.
 
-    numbers : (n, k), of the mode. axes : (n, 3, 3), those wanted, as columns. Returns the numbers that were set.
+    numbers : (n, k), of the mode.
+    axes : (n, 3, 3), those wanted, as columns.
+
+    Returns the numbers that were set.
     """
     name, best = _ROTATIONS.get(mode, "rotation_euler"), numbers.astype(np.float32)
     for camera_object, turn in zip(cameras, best.tolist(), strict=True):

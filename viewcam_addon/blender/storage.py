@@ -10,6 +10,7 @@ gone. `picture` and `counted_in` keep resolution, percentage and pixel aspect. R
 import contextlib
 import functools
 import json
+import struct
 from collections.abc import Collection, Iterator
 from dataclasses import fields, replace
 
@@ -18,21 +19,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import checks
-from ..camera_values import FIELD_OF_VIEW, HOLD, CameraValues, without_border
+from ..camera_values import FACTORS, FIELD_OF_VIEW, HOLD, CameraValues, without_border
 from ..errors import InputError
 from ..intrinsics import Frame
 from . import datablocks, versions
 
-Raw = tuple[tuple[float, ...], str, float | None]
+Raw = tuple[tuple[float, ...], str, tuple[float | None, ...]]
 
 EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
 _VECTORS = ("eye", "look_at", "up")
-# What is no property of its own, or not as it is; a property with the name of each other value holds it.
+# Values that are no property of their own, or not as they are; each other one is held by the property of its name.
 _NOT_PLAIN = EXACT | {"counted_in", "set_for", "view_when_set", "precision", "follows", "asked"}
 _PLAIN = tuple(each.name for each in fields(CameraValues) if each.name not in _NOT_PLAIN)
 _ASKED = "asked"  # where Blender keeps what `ask` has noted
-# What is noted of a camera once it has been set.
+# Values that are noted of a camera once it has been set.
 _NOTED = ("distance", "counted_in", "set_for", "view_when_set", "held_roll")
+_NUMBERS = struct.Struct("<10d")
 is_storing = False  # else the artist or a script sets a property, and the camera moves
 
 
@@ -90,7 +92,7 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
 
 
 def raw(camera_object: bpy.types.Object) -> Raw | None:
-    """The four values and the zoom as Blender holds them: ten numbers, `exact`, and the factor, None where that is the default.
+    """The four values and FACTORS as Blender holds them: ten numbers, `exact`, and the factors, None where one is the default.
 
     It takes a third of the time that the properties take. The evaluated object may be given as well. Returns None where a curve
     asks for another look at a value, or where a value has never been set.
@@ -100,27 +102,33 @@ def raw(camera_object: bpy.types.Object) -> Raw | None:
         rounded = (*stored["eye"], *stored["look_at"], *stored["up"], stored["distance"])
     except KeyError:
         return None
-    return None if _ASKED in stored else (rounded, stored.get("exact", ""), stored.get("zoom"))
+    return None if _ASKED in stored else (rounded, stored.get("exact", ""), tuple(map(stored.get, FACTORS)))
 
 
 def animated(before: CameraValues, changed: Raw) -> CameraValues:
     """The values of a camera of which curves alone can have changed any: `before` itself if none has.
 
-    before : values that follow no target. changed : what is held of them now, by `raw`.
+    before : the values before, which follow no target.
+    changed : the numbers that Blender holds of them now, see `raw`.
     """
-    rounded, exact, zoom = changed
-    zoom = before.zoom if zoom is None else zoom
+    rounded, exact, stored = changed
+    factors = {
+        name: number
+        for name, number in zip(FACTORS, stored, strict=True)
+        if number is not None and number != getattr(before, name)
+    }
     numbers, is_exact = _numbers(exact, rounded)
-    if zoom == before.zoom and numbers == (*before.eye, *before.look_at, *before.up, before.distance):
+    if not factors and numbers == (*before.eye, *before.look_at, *before.up, before.distance):
         return before
     precision = 2.0**-53 if is_exact else 2.0**-24
-    return before.animated(numbers[0:3], numbers[3:6], numbers[6:9], numbers[9], zoom, precision)
+    return before.animated(numbers[0:3], numbers[3:6], numbers[6:9], numbers[9], precision, **factors)
 
 
 def _numbers(text: str, rounded: tuple[float, ...]) -> tuple[tuple[float, ...], bool]:
     """Eye, look-at, up and distance, ten numbers, and whether all of them are known in float64.
 
-    text : `exact` of the camera. rounded : the ten numbers of its properties.
+    text : `exact` of the camera.
+    rounded : the ten numbers of its properties.
     """
     exact = _parsed(text, 10)
     if not exact:
@@ -175,29 +183,27 @@ def store(camera_object: bpy.types.Object, values: CameraValues, *names: str) ->
                 setattr(group, name, value)
         forget_asked(camera_object, names)
         if not EXACT.isdisjoint(names):
-            group.exact = json.dumps([*values.eye, *values.look_at, *values.up, values.distance])
+            group.exact = _digits(values)
     finally:
         is_storing = before
 
 
-def follow(camera_object: bpy.types.Object, values: CameraValues, vectors: list[list[float]]) -> Raw:
+def follow(camera_object: bpy.types.Object, values: CameraValues, vectors: list[list[float]]) -> None:
     """Write the four values of a camera, each of which has been set before, and move nothing: as `store`, in half of the time.
 
     vectors : eye, look-at and up as `zeroed` has them. Blender hears of the distance, which is set last, and evaluates anew all
-    that looks at any of them. Returns them as `raw`.
+    that looks at any of them.
     """
     global is_storing
     group, before, is_storing = camera_object.virtual_pinhole, is_storing, True
     stored = versions.stored_properties(group)
     for name, vector in zip(_VECTORS, vectors, strict=True):
         stored[name][:] = vector
-    stored["exact"] = exact = json.dumps([*values.eye, *values.look_at, *values.up, values.distance])
+    stored["exact"] = _digits(values)
     try:
         group.distance = values.distance
     finally:
         is_storing = before
-    eye, look_at, up = vectors
-    return (*eye, *look_at, *up, stored["distance"]), exact, stored.get("zoom")
 
 
 def stated(camera_object: bpy.types.Object) -> frozenset[str]:
@@ -285,11 +291,21 @@ def _shown_values(numbers: tuple[float, ...]) -> tuple[float, ...]:
         return tuple(np.array(rounded, dtype=np.float32).tolist())
 
 
+def _digits(values: CameraValues) -> str:
+    """Eye, look-at, up and distance with all their digits: hexadecimal, since JSON takes twenty times as long."""
+    return _NUMBERS.pack(*values.eye, *values.look_at, *values.up, values.distance).hex()
+
+
 @functools.lru_cache(maxsize=4096)
 def _parsed(text: str, count: int) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
-    """So many finite numbers from JSON, and what float32 makes of them; None if it holds anything else."""
-    with contextlib.suppress(ValueError, RecursionError), np.errstate(over="ignore"):  # InputError is a ValueError
-        numbers = checks.vector("the text", json.loads(text), count)
+    """So many finite numbers of a text, as `_digits` writes them or in JSON, and what float32 makes of them; None if it holds
+    anything else."""
+    with (
+        contextlib.suppress(ValueError, RecursionError, struct.error),
+        np.errstate(over="ignore"),
+    ):  # InputError is a ValueError
+        stated = json.loads(text) if text.startswith("[") else _NUMBERS.unpack(bytes.fromhex(text))
+        numbers = checks.vector("the text", stated, count)
         return numbers, tuple(np.array(numbers, dtype=np.float32).tolist())
     return None
 

@@ -154,7 +154,10 @@ def _aims_of(driver: bpy.types.Driver) -> list[bpy.types.DriverTarget]:
 
 
 def _depend(driver: bpy.types.Driver, *followed: tuple[bpy.types.Object, str, str]) -> None:
-    """followed : (object, bone, data path) each; without a path its transform."""
+    """Make a driver depend on what its camera follows.
+
+    followed : (object, bone, data path) each; without a path its transform.
+    """
     driver.type = "SUM"
     for target, bone, path in followed:
         variable = driver.variables.new()

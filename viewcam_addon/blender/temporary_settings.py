@@ -62,7 +62,10 @@ class Overrides:
 
 @contextlib.contextmanager
 def overridden(lasting: Overrides | None = None) -> Iterator[Overrides]:
-    """Give overrides; at the end of the block everything is as it was. lasting : as of Overrides."""
+    """Give overrides; at the end of the block everything is as it was.
+
+    lasting : see Overrides.
+    """
     with contextlib.ExitStack() as stack:
         yield Overrides(stack, lasting)
 
@@ -77,8 +80,9 @@ def still_of_one_layer(
     """Make `bpy.ops.render.render` render this view layer through this camera, sharp, and nothing after it.
 
     What both sides of a comparison have in common: compositor and sequencer, motion blur, stereo and Freestyle are off, and a
-    render border is cropped to. Simplify stays as the artist has it. camera_object : the one that Blender chooses itself, as
-    markers bind it, where None. keep : whether what Blender and Cycles have built is kept, for the next render.
+    render border is cropped to. Simplify stays as the artist has it.
+    camera_object : the camera; where None, the one that Blender chooses itself, as markers bind it.
+    keep : true to keep what Blender and Cycles have built, for the next render.
     """
     render = scene.render
     overrides.set(render, "use_persistent_data", keep)
@@ -116,7 +120,7 @@ def cameras_unbound(overrides: Overrides, scene: bpy.types.Scene) -> None:
 def numbered_indices(kinds: Collection[str] = ("objects", "materials")) -> Iterator[None]:
     """Number the file's objects from 1, and its materials, where all of them have the index 0, for the index passes.
 
-    kinds : which of the two.
+    kinds : one of the two, or both.
 
     As soon as one of them carries a number its artist has a use for them, and they stay. Rejected: `foreach_set`, which passes
     over what is linked from a library.

@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from ..image import OLDER_NAMES
 
-# Whose materials a scene from here has: the tracer knows what Cycles changed (core/closures/shading_point.h).
+# The Cycles whose materials a scene from here has: the tracer knows what Cycles changed (core/closures/shading_point.h).
 CYCLES = bpy.app.version[:2]
-# What Light Falloff does to suns: nothing, or before, it multiplies them by as good as infinity.
+# True if Light Falloff does nothing to suns; before, it multiplies them by as good as infinity.
 SUNS_HAVE_NO_FALLOFF = bpy.app.version >= (4, 4)
 # True if lights are objects to their nodes, in whose space places are; before, these are the world's.
 LIGHTS_HAVE_SPACES = bpy.app.version >= (4, 5)
 _LINEAR = 1  # an enum's number, as foreach_set takes it
-# What Cycles draws without a material: a diffuse surface, and since 5.0 a Principled one, which bends grazing smooth normals.
+# True if Cycles draws a Principled surface where there is no material, which bends grazing smooth normals; before 5.0, a
+# diffuse one.
 DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
 # True if Cycles has one normal a vertex, and splits those at sharp edges (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
 CYCLES_HAS_VERTEX_NORMALS = bpy.app.version < (5, 1)
@@ -114,6 +115,11 @@ def _collections_of(source: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy
     return [bag.fcurves for bag in bags if bag]
 
 
+def slot_of(data: bpy.types.AnimData) -> int:
+    """The handle of the slot that a datablock uses of its action."""
+    return data.action_slot_handle if bpy.app.version >= (4, 4) else 0
+
+
 def remove_curves(block: bpy.types.ID, data_path: str) -> None:
     """Take the curves of a property out of a datablock's own action."""
     for collection in _collections_of(block.animation_data) if block.animation_data else []:
@@ -168,7 +174,7 @@ def modifier_input(modifier: bpy.types.NodesModifier, identifier: str) -> Any:
     return getattr(getattr(modifier.properties.inputs, identifier, None), "value", None)
 
 
-# What EEVEE is called among the render engines. The one of 4.2 was the next one then.
+# EEVEE's name among the render engines. The one of 4.2 was the next one then.
 EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
 
 
@@ -222,7 +228,8 @@ def pass_name(name: str) -> str:
 def linear_keyframes(block: bpy.types.ID, path: str, at: Sequence[float], values: NDArray[np.float64]) -> None:
     """Put keyframes in the place of a property's curves; a single one for a number that stands still.
 
-    at : frames, of the curves. values : (frames, numbers of the property).
+    at : frames, of the curves.
+    values : (frames, numbers of the property).
     """
     remove_curves(block, path)
     for index, column in enumerate(values.T):

@@ -199,7 +199,8 @@ def writable() -> list[str]:
 def read(content: str | Path, *, format: str | None = None, options: Options | None = None) -> list[Camera]:
     """The cameras of a text, a file or a folder.
 
-    content : a text, or the Path of a file or folder. format : one of `readable()`; None to recognize it by its content.
+    content : a text, or the Path of a file or folder.
+    format : one of `readable()`; None to recognize it by its content.
 
     Raises
     ------

@@ -57,7 +57,10 @@ _TOOLBOX = re.compile(r"^[ \t]*(fc|cc|kc|nx|ny|alpha_c|omc_\d+|Tc_\d+)[ \t]*=[ \
 
 @dataclass(frozen=True)
 class _Unknown:
-    """An array that is computed from what the text does not say. name : as it stands there."""
+    """An array that is computed from what the text does not say.
+
+    name : its name in the text.
+    """
 
     name: str
 

@@ -59,10 +59,15 @@ _OPENCV = np.array([1.0, -1, -1])
 class Views:
     """All cameras of a dataset as arrays.
 
-    axes : (n, 3, 3), columns u, v, w; their determinants may be −1. eye : (n, 3). focal : (n, 2), pixels. center : (n, 2),
-    the principal point from the left and the top. size : (n, 2), pixels. depth_scale : world units of one of the depth maps'.
-    along_ray : whether depth is the distance from the eye, and not along w. shifted : by how many pictures the cameras are
-    late. lenses : of each camera; without any all are pinholes.
+    axes : (n, 3, 3), columns u, v, w; their determinants may be −1.
+    eye : (n, 3).
+    focal : (n, 2), pixels.
+    center : (n, 2), the principal point from the left and the top.
+    size : (n, 2), pixels.
+    depth_scale : the world units in one unit of the depth maps.
+    along_ray : true where depth is the distance from the eye, false where it is counted along w.
+    shifted : the number of pictures by which the cameras are late.
+    lenses : each camera's lens; without any all are pinholes.
     """
 
     axes: Array
@@ -116,9 +121,15 @@ def views_of(cameras: Sequence[Camera]) -> Views:
 
 @dataclass(frozen=True)
 class Tracks:
-    """Points and where pictures show them. which : (m,), the picture; places : (m, 2), pixels from the left and the top;
-    points : (m, 3), world space. floor : the least error, in pixels, that such places have. part : of the errors, whose largest
-    is the usual one. plausible : the largest usual error that right cameras have."""
+    """Points and where pictures show them.
+
+    which : (m,), the number of the picture.
+    places : (m, 2), pixels from the left and the top.
+    points : (m, 3), world space.
+    floor : the least error, in pixels, that such places have.
+    part : the part of the errors whose largest is the usual one.
+    plausible : the largest usual error that right cameras have.
+    """
 
     which: NDArray
     places: Array
@@ -142,7 +153,7 @@ _SAMPLES, _NEIGHBORS = 60, 4  # points of a picture, and how many of the next pi
 class Depths:
     """Depth maps, one a picture: (height, width), rows from the top, not finite or ≤ 0 where nothing is."""
 
-    # What one picture sees the next may not: of the errors the lowest fifth are those of what both see, if anything is.
+    # Pictures of depth may see little in common: the lowest fifth of the errors are those of what both see, if anything is.
     floor, unit, plausible, part = 1e-6, "of the depth", 0.02, 0.2
 
     def __init__(self, maps: Sequence[Array]) -> None:
@@ -283,9 +294,15 @@ _UNITS |= {"0.3048 (feet)": 0.3048, "0.0254 (inches)": 0.0254, "1/0.3048 (feet)"
 
 @dataclass(frozen=True)
 class Mistake:
-    """kind : a name for programs. sentence : what was done. undone : the cameras without it. of_depth : whether only depth maps
-    can show it. of_world : whether all cameras are turned together, which depth maps can't show: each sees what it saw.
-    is_fitted : whether it has numbers that are fitted to the evidence: it explains whatever a known one does, too."""
+    """A mistake that data sets' cameras are known to have.
+
+    kind : a name for programs.
+    sentence : a sentence that says what was done.
+    undone : a function that gives the cameras without it.
+    of_depth : true if only depth maps can show it.
+    of_world : true if it turns all cameras together, which depth maps can't show: each sees what it saw.
+    is_fitted : true if it has numbers that are fitted to the evidence, so that it explains whatever a known one does, too.
+    """
 
     kind: str
     sentence: str
@@ -478,10 +495,13 @@ _OF_LENSES = [
 class Verdict:
     """The verdict of the evidence.
 
-    kind : a Mistake's, "none" if the cameras are right, "unknown" if they are wrong in no known way, "unsure" if the evidence
-    is too little. sentence : for people. others : kinds that explain it as well; of right cameras, those that the evidence is
-    too little to exclude. error, error_as_is : the usual error with the mistake undone and with the cameras as they are.
-    certainty : log likelihood over the cameras as they are; of right ones, theirs over that of the likeliest mistake.
+    kind : a Mistake's kind, "none" if the cameras are right, "unknown" if they are wrong in no known way, "unsure" if the
+        evidence is too little.
+    sentence : a sentence for people.
+    others : kinds that explain the evidence as well; of right cameras, those that the evidence can't exclude.
+    error, error_as_is : the usual error with the mistake undone and with the cameras as they are.
+    certainty : the log likelihood over that of the cameras as they are; of right ones, theirs over that of the likeliest
+        mistake.
     """
 
     kind: str
@@ -698,12 +718,13 @@ def _fitted(
     """The lens that takes a pinhole's points to places in pictures, the factor of the focal length and the usual error in
     pixels; None where there is none that does.
 
-    points, taken : (m, 2), in the view plane at distance 1. count : of its terms k1, k2, k3, p1, p2. By least squares, each
-    observation weighted by Cauchy's cost, so that outliers count little.
+    points, taken : (m, 2), in the view plane at distance 1.
+    count : the number of its terms k1, k2, k3, p1, p2. By least squares, each observation weighted by Cauchy's cost, so that
+        outliers count little.
     """
     base = Lens((), projection).distort(points)
     off = taken - base
-    # What is farther from where the projection alone shows it than lenses bend is an outlier, or beyond the picture.
+    # A point that is farther from where the projection alone shows it than lenses bend is an outlier, or beyond the picture.
     usable = np.hypot(*off.T) < np.maximum(0.5 * np.hypot(*base.T), 0.1)
     if usable.sum() < _FEWEST:
         return None

@@ -38,7 +38,7 @@ _TURNS: dict[str, tuple[Callable[[Triple], Triple] | None, Callable[[Triple], Tr
     "y_down": (lambda p: (p[0], p[2], -p[1]), lambda p: (p[0], -p[2], p[1])),
 }
 _NO_MEAN = 1e-6  # of the length of a mean of unit vectors
-# How far a rotation in a file, whose numbers have few digits, may be off: without a note, and as a rotation at all.
+# The errors that a rotation in a file may have, whose numbers have few digits: without a note, and as a rotation at all.
 _NOTED, _NO_ROTATION, _NO_QUATERNION = 1e-5, 2e-3, 1e-2
 _SCALED = 1e-3
 _FARTHEST = 2.0**1022  # as far again as the eye from the origin there must be room for the look-at point
@@ -88,8 +88,10 @@ def view_plane(f_x: float, f_y: float, c_x: float, c_top: float, size: tuple[int
 def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False) -> tuple[Pinhole, tuple[str, ...]]:
     """The camera of a matrix, and what is to be said of it.
 
-    matrix : 3 × 4 or 4 × 4, for column vectors, from camera to world as `camera_to_world` has it. plane : its view plane.
-    what : whose matrix, as a sentence names it. scaled : whether the format lets nodes be scaled without scaling the camera.
+    matrix : 3 × 4 or 4 × 4, for column vectors, from camera to world as `camera_to_world` has it.
+    plane : the camera's view plane.
+    what : the matrix' owner, as a sentence names it.
+    scaled : true if the format lets nodes be scaled without scaling the camera.
 
     The look-at point, which no matrix says, lies as far before the eye as the eye from the origin, at least 1: so its rounding
     does not turn the view by more than 2⁻⁵².
@@ -131,7 +133,8 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
 def pinholes(matrices: np.ndarray, planes: Sequence[ViewPlane], whats: Sequence[str]) -> list[tuple[Pinhole, tuple[str, ...]]]:
     """The results of `pinhole` for many matrices: for files of thousands of poses, in a tenth of the time.
 
-    matrices : (n, 3, 4), finite. planes, whats : of each.
+    matrices : (n, 3, 4), finite.
+    planes, whats : the view plane and the owner's name of each.
     """
     turn, eye = matrices[:, :, :3], matrices[:, :, 3]
     with np.errstate(all="ignore"):
@@ -154,7 +157,9 @@ def _lengths(vectors: np.ndarray) -> np.ndarray:
 def rotation(rows: Sequence[Sequence[float]], what: str, scaled: bool = False) -> tuple[tuple[Triple, ...], tuple[str, ...]]:
     """The three columns of a rotation's rows, each of length 1, and notes; they may be left-handed.
 
-    In plain floats, which for nine numbers are ten times as fast as arrays. scaled : as of `pinhole`.
+    In plain floats, which for nine numbers are ten times as fast as arrays.
+
+    scaled : see `pinhole`.
 
     Raises
     ------
@@ -247,7 +252,10 @@ def rotation_of(quaternion: Sequence[float], what: str) -> np.ndarray:
 
 
 def rotations_of(quaternions: np.ndarray, whats: Sequence[str]) -> np.ndarray:
-    """(n, 3, 3) of many quaternions (n, 4), finite, as `rotation_of` has them. whats : of each."""
+    """(n, 3, 3) of many quaternions (n, 4), finite, as `rotation_of` has them.
+
+    whats : the owner's name of each.
+    """
     lengths = np.sqrt((quaternions * quaternions).sum(axis=-1))
     for i in np.flatnonzero(~(np.abs(lengths - 1) <= _NO_QUATERNION)):
         _check_length(lengths[i], whats[i])
@@ -316,7 +324,9 @@ def leveled(cameras: Sequence[Camera]) -> list[Camera]:
 def turned_up(cameras: Sequence[Camera], up: Sequence[float], what: str, rise: float = 0.0) -> list[Camera]:
     """The cameras in a world that is turned by the least angle after which `up` is z, and then moved up; each says so.
 
-    up : of length 1. what : it, as the note calls it. rise : along z.
+    up : a vector of length 1.
+    what : `up`, as the note calls it.
+    rise : the distance along z by which they move.
     """
     x, y, z = up
     rows = np.diag([1.0, -1.0, -1.0])  # of the world that is upside down

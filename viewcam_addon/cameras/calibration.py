@@ -32,7 +32,11 @@ _BAND = 2**19  # pixels that are computed at a time
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibrated camera without its pose. plane : of its picture. lens : what bends that."""
+    """A calibrated camera without its pose.
+
+    plane : the view plane of its picture.
+    lens : the lens that bends the picture.
+    """
 
     plane: ViewPlane
     lens: Lens
@@ -89,8 +93,9 @@ class Calibration:
     def distorted(self, picture: np.ndarray, cut: ViewPlane, nearest: bool = False) -> np.ndarray:
         """The picture as the calibrated camera shows it, of the same type; black where it has nothing.
 
-        picture : of a pinhole, (height, width, channels), rows from the top. cut : its view plane. nearest : takes the nearest
-        pixel's number, of masks and depths.
+        picture : a pinhole's picture, (height, width, channels), rows from the top.
+        cut : that picture's view plane.
+        nearest : true to take the nearest pixel's number, as for masks and depths.
         """
         plane = self.plane
         at = places_back(self.lens, plane, cut)
@@ -114,7 +119,11 @@ class Calibration:
 
 @dataclass(frozen=True)
 class Rig:
-    """The calibrated cameras of a file. source : the file, as a sentence names it. by_name : those that have a lens."""
+    """The calibrated cameras of a file.
+
+    source : the file, as a sentence names it.
+    by_name : the cameras that have a lens.
+    """
 
     source: str
     by_name: Mapping[str, Calibration]
@@ -149,7 +158,10 @@ class Rig:
 
 
 def of_cameras(read: Sequence[Camera], source: str, name: str | None = None) -> Rig:
-    """The calibrations of one file's cameras. source : the file, as a sentence names it. name : of the only one wanted.
+    """The calibrations of one file's cameras.
+
+    source : the file, as a sentence names it.
+    name : the name of the only one wanted.
 
     Raises
     ------

@@ -37,13 +37,17 @@ _NAMED = 8
 class Camera:
     """A named, complete camera.
 
-    name : as the file has it, or made from its number. pinhole : all of it, but for the lens: it shows the undistorted picture.
-    lens : what bends the picture that was taken; None where nothing does. size_stated : whether the file says how many
-    pixels the picture has, or tells it by the picture itself; else they are those of `Options`. notes : sentences on what was
-    in the file and did not come along, or how it was taken. image : the picture's path, as the file has it. picture : the
-    picture itself, encoded, where the file holds it. time : seconds, where the file says when. left_out : (name, sentence) of
-    each camera of the same file that is no pinhole. world : 3 × 4, from the world of the file to this one, where `Options` had
-    it turned, scaled or moved; None where not.
+    name : the name in the file, or one made from its number there.
+    pinhole : the camera without its lens: it shows the undistorted picture.
+    lens : the lens that bends the picture; None where nothing does.
+    size_stated : true if the file says how many pixels the picture has, or tells it by the picture itself; else they are those
+        of `Options`.
+    notes : sentences on what was in the file and did not come along, or how it was taken.
+    image : the picture's path, as the file has it.
+    picture : the picture itself, encoded, where the file holds it.
+    time : the seconds at which it stands so, where the file says when.
+    left_out : (name, sentence) of each camera of the same file that is no pinhole.
+    world : 3 × 4, from the world of the file to this one, where `Options` had it turned, scaled or moved; None where not.
     """
 
     name: str
@@ -66,15 +70,21 @@ class Camera:
 class Options:
     """The choices where a format leaves one. Reading what was written with the same options gives the same cameras.
 
-    axes : one of AXES. scale : > 0; world units here of one of the file's. size : (width, height) in pixels, where a file
-    says none. pixel_aspect : width of a pixel over its height, where a file says none. view_plane : the intrinsics where a
-    file says none. base : the camera whose values stand where a text says only some. angle_unit : one of ANGLES, where a text
-    says none. pixel : one of PIXELS, in place of what the format has by habit. pose : one of POSES, where a name does not say
-    which way a matrix goes. without_distortion : take a camera without its lens. unmirrored : take a camera that mirrors its
-    picture without that. original_world : undo the turn and scale that a file says were applied to its world. size_fits :
-    whether the size is that of whatever scene is open, whose shape gives way to that of a text's camera, and not the
-    picture's own. up_from : one of UPS, by what the world is turned upright, once axes and scale are applied; None to leave
-    it so.
+    axes : one of AXES.
+    scale : > 0; world units here of one of the file's.
+    size : (width, height) in pixels, where a file says none.
+    pixel_aspect : width of a pixel over its height, where a file says none.
+    view_plane : the intrinsics where a file says none.
+    base : the camera whose values stand where a text says only some.
+    angle_unit : one of ANGLES, where a text says none.
+    pixel : one of PIXELS, in place of what the format has by habit.
+    pose : one of POSES, where a name does not say which way a matrix goes.
+    without_distortion : true to take a camera without its lens.
+    unmirrored : true to take a camera that mirrors its picture without that.
+    original_world : true to undo the turn and scale that a file says were applied to its world.
+    size_fits : true if the size is that of whatever scene is open, whose shape gives way to that of a text's camera; false if
+        it is the picture's own.
+    up_from : one of UPS, by what the world is turned upright, once axes and scale are applied; None to leave it so.
 
     Raises
     ------
@@ -118,7 +128,7 @@ class Options:
     def size_or_refuse(self, what: str) -> tuple[int, int]:
         """The size to take where a file says none.
 
-        what : what lacks it, as a sentence names it.
+        what : the thing that lacks a size, as a sentence names it.
 
         Raises
         ------
@@ -191,7 +201,10 @@ class LeftOut:
 
     @contextlib.contextmanager
     def unless_pinhole(self, name: str) -> Iterator[None]:
-        """The block makes one camera. name : by which it would be chosen."""
+        """The block makes one camera.
+
+        name : the name by which it would be chosen.
+        """
         try:
             yield
         except self._kind as error:

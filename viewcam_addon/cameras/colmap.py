@@ -106,9 +106,10 @@ class _Image(NamedTuple):
 class Tracks(NamedTuple):
     """Points in world space, and where pictures show them.
 
-    positions : (n, 3). colors : (n, 3), 0 … 255.
-    observations : of each picture the numbers of the points that it shows, (m,) from 0, and their places, (m, 2): x to the
-        right and y down from the picture's corner.
+    positions : the points' places, (n, 3).
+    colors : the points' colors, (n, 3), 0 … 255.
+    observations : (numbers, places) for each picture: the numbers of the points that it shows, (m,) from 0, and their places,
+        (m, 2): x to the right and y down from the picture's corner.
     """
 
     positions: np.ndarray
@@ -415,7 +416,7 @@ def check_names(files: Iterable[str]) -> None:
 def texts(cameras: Iterable[Camera], tracks: Tracks | None = None) -> dict[str, str]:
     """Name of the file → what it holds; cameras, images and points are numbered from 1, in their order.
 
-    tracks : of the cameras' pictures, in their order; without them there are no points.
+    tracks : the points of the cameras' pictures, in the cameras' order; without them there are none.
 
     Raises
     ------

@@ -33,10 +33,15 @@ _STEP = 1e-6  # of the differences that make its Jacobian: they are right to 1e-
 class Lens:
     """The lens: how it bends a pinhole's picture.
 
-    terms : (name, value) of its coefficients, as its program calls them. projection : one of PROJECTIONS, and parameters its
-    own. radial : of r², r⁴, … of the polynomial. divisor : the same of what divides it. tangential : OpenCV's p1, p2. prism :
-    its s1, s2 (across) and s3, s4 (down), on r² and r⁴. tilt : its τx and τy, radians. skew : what is added to x, times y.
-    radial_first : whether the tangential and prism terms are of the point that the radial ones have moved.
+    terms : (name, value) of its coefficients, as its program calls them.
+    projection : one of PROJECTIONS, and parameters its own.
+    radial : the polynomial's coefficients of r², r⁴, …
+    divisor : the coefficients of r², r⁴, … of the polynomial that divides it.
+    tangential : OpenCV's p1, p2.
+    prism : its s1, s2 (across) and s3, s4 (down), on r² and r⁴.
+    tilt : its τx and τy, radians.
+    skew : the factor of y in what is added to x.
+    radial_first : true if the tangential and prism terms are computed at the point that the radial ones have moved.
     """
 
     terms: tuple[tuple[str, float], ...] = field(compare=False)
@@ -188,8 +193,10 @@ _COUNTS = {"parameters": 0, "radial": 0, "divisor": 0, "tangential": 2, "prism":
 def view_plane(pinhole: Pinhole, lens: Lens | None, columns: ArrayLike, rows: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """The view plane's points that places in the photograph show: as Pinhole.view_plane has them, x and y at distance 1.
 
-    pinhole : of the photograph's own plane. columns, rows : of the photograph, from its left and bottom edge; broadcast where
-    there is a lens. NaN where it shows nothing.
+    pinhole : the camera with the photograph's own view plane.
+    columns, rows : places in the photograph, from its left and bottom edge; broadcast where there is a lens.
+
+    Returns NaN where the photograph shows nothing.
     """
     x, y = pinhole.view_plane(columns, rows)
     if lens is None:
@@ -201,7 +208,10 @@ def view_plane(pinhole: Pinhole, lens: Lens | None, columns: ArrayLike, rows: Ar
 def project(pinhole: Pinhole, lens: Lens | None, points: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The places in the photograph at which points appear, and their depths, as Pinhole.project has them.
 
-    pinhole : of the photograph's own plane. points : (..., 3), world space. NaN where the lens folds: it shows no point there.
+    pinhole : the camera with the photograph's own view plane.
+    points : (..., 3), world space.
+
+    Returns NaN where the lens folds: it shows no point there.
     """
     column, row, depth = pinhole.project(points)
     if lens is None:
@@ -216,8 +226,9 @@ def project(pinhole: Pinhole, lens: Lens | None, points: ArrayLike) -> tuple[np.
 def opencv(k: Mapping[str, float], terms: Mapping[str, float] | None = None, skew: float = 0.0) -> Lens:
     """OpenCV's lens: radial k1 … k6 (k4 … k6 divide), tangential p1 p2, thin prism s1 … s4, tilt tx ty. What is missing is 0.
 
-    The further radial term of nerfstudio, Metashape and RealityCapture is `r8`, on r⁸. terms : what its program calls them, if
-    otherwise.
+    The further radial term of nerfstudio, Metashape and RealityCapture is `r8`, on r⁸.
+
+    terms : our name of a term → the program's, where they differ.
     """
     k1, k2, k3, r8, k4, k5, k6, p1, p2, s1, s2, s3, s4, tx, ty = (
         k.get(name, 0.0) for name in ("k1", "k2", "k3", "r8", "k4", "k5", "k6", "p1", "p2", "s1", "s2", "s3", "s4", "tx", "ty")
@@ -275,7 +286,8 @@ def _tilted(tau_x: float, tau_y: float) -> np.ndarray:
 def settle(lens: Lens, plane: ViewPlane, what: str, left_out: bool) -> tuple[Lens | None, tuple[str, ...]]:
     """The lens that a camera has, None where that is none that a picture shows; and notes.
 
-    what : whose, as a sentence names it. left_out : whether it is not wanted.
+    what : the lens's owner, as a sentence names it.
+    left_out : true if no lens is wanted.
     """
     if lens.projection == "pinhole" and not any(value for _, value in lens.terms):
         return None, ()
@@ -287,7 +299,10 @@ def settle(lens: Lens, plane: ViewPlane, what: str, left_out: bool) -> tuple[Len
 
 
 def refuse(lens: Lens | None, plane: ViewPlane, what: str, place: str) -> None:
-    """Raise InputError if there is a lens, where only a pinhole can be said. place : what can't say it."""
+    """Raise InputError if there is a lens, where only a pinhole can be said.
+
+    place : the thing that can't say it.
+    """
     if lens is not None:
         raise InputError(
             f"{what} has lens distortion ({_listed(lens)}) that {_moves(displacement(lens, plane))}, which {place} can't say: "

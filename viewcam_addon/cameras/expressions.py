@@ -77,7 +77,8 @@ class _Failed(Exception):
 class Expressions:
     """The values of a text.
 
-    names : what a name stands for, or None. angled : whether <1, 2, 3> is a vector, as in POV-Ray.
+    names : a function: name → its value, or None.
+    angled : true if <1, 2, 3> is a vector, as in POV-Ray.
     """
 
     def __init__(self, text: str, names: Callable[[str], object] = lambda name: None, angled: bool = False) -> None:

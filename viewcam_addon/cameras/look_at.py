@@ -90,7 +90,7 @@ _SPECIFIC = {
     **dict.fromkeys(["parallelprojection", "cameraparallelprojection"], "parallel"),
     **dict.fromkeys(["aperture", "lensradius", "defocusangle", "aperturesize"], "blur"),
 }
-# What says something of a camera only where the object is one.
+# Names that say something of a camera only where the object is one.
 _GENERIC = {
     **dict.fromkeys(["position", "location", "origin", "pos", "from"], "eye"),
     **dict.fromkeys(["center", "center", "target", "at", "to"], "target"),
@@ -131,7 +131,7 @@ _TURNED = {"rotation", "quaternion", "matrix", "matrixworld", "rotate"}
 _CONTROLS = {"OrbitControls", "TrackballControls", "MapControls", "ArcballControls"}
 _OTHER_CONTROLS = {"FirstPersonControls", "DeviceOrientationControls"}
 _PLACES = {"position", "up", "direction"}
-# What turns or moves a view that a look-at made: glm::rotate(view, …), mat4.rotateY(view, view, …).
+# Functions that turn or move a view that a look-at made: glm::rotate(view, …), mat4.rotateY(view, view, …).
 _VIEW_MOVED = re.compile(r"(?:rotate|translate|scale)\w{0,3}", re.IGNORECASE)
 _GL_MOVES = {"gltranslatef", "gltranslated", "glrotatef", "glrotated", "glscalef", "glscaled", "glmultmatrixf", "glmultmatrixd"}
 _CHANGES_BY = {*"+-*/"}
@@ -446,7 +446,7 @@ class _Code:
             values = [self._at(place) for place in self.assigned[last]]
         finally:
             self._following.discard(last)
-        # What is known once and computed elsewhere is not known.
+        # A value that is known in one place and computed in another is not known.
         value = values[0] if not any(map(_is_unknown, values)) and all(each == values[0] for each in values) else None
         if not self._following:
             self._values[last] = value
@@ -940,7 +940,8 @@ def _part_of_picture(
 ) -> tuple[ViewPlane, bool, tuple[str, ...]]:
     """The view plane of three.js' setViewOffset(fullWidth, fullHeight, x, y, width, height), x and y from the top left.
 
-    size : of the picture that shows this part; by default its own. fov_y : radians, of the full picture. As of `_plane`.
+    size : the size of the picture that shows this part; by default the part's own.
+    fov_y : the full picture's vertical angle of view, radians. See `_plane`.
     """
     place = scene.values["view_offset"][1]
     part = _known(scene.values, "view_offset", text, "give six plain numbers: fullWidth, fullHeight, x, y, width, height")

@@ -64,13 +64,16 @@ def inside(path: str) -> str:
 def picture_of(camera: Camera, folder: Path) -> Path | None:
     """The file of a camera's picture, or None where there is none near the camera's own file.
 
-    folder : where that file stands.
+    folder : the folder of the camera's own file.
     """
     return near(image_of(camera) if camera.image is None else camera.image, folder)
 
 
 def near(path: str, folder: Path) -> Path | None:
-    """The file that a data set's file names by a path, or None where there is none near it. folder : where that file stands."""
+    """The file that a data set's file names by a path, or None where there is none near it.
+
+    folder : the folder of the data set's file.
+    """
     path = inside(path.replace("\\", "/"))
     for name in dict.fromkeys((path, path.rpartition("/")[2])):
         for place in _PLACES:
@@ -109,7 +112,7 @@ def check_image(file: object) -> None:
 def checked(cameras: Iterable[Camera], written: str) -> tuple[Camera, ...]:
     """The cameras, if a dataset can be made of them.
 
-    written : what they are for, as a sentence names it.
+    written : the dataset, as a sentence names it.
 
     Raises
     ------
@@ -161,7 +164,7 @@ def refuse_mirrored(cameras: Iterable[Camera], written: str) -> None:
 def refuse_shifted(cameras: Iterable[Camera], written: str, square: bool) -> None:
     """Raise InputError if a camera's principal point is not the middle, or, if `square`, its pixels are not square.
 
-    written : what can't say it, as a sentence names it.
+    written : the format that can't say it, as a sentence names it.
     """
     for camera in cameras:
         pinhole = camera.pinhole

@@ -111,8 +111,10 @@ def write(cameras: Sequence[Camera], options: Options) -> str | dict[str, str]:
 
 
 def half_pixel(options: Options, habit: str = "center") -> float:
-    """The amount to add to a format's principal point to count it from the picture's corner. habit : of the format, one of
-    PIXELS."""
+    """The amount to add to a format's principal point to count it from the picture's corner.
+
+    habit : the format's habit, one of PIXELS.
+    """
     return 0.5 if (options.pixel or habit) == "center" else 0.0
 
 
@@ -421,7 +423,9 @@ def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float
 
 
 def plane_of_k(values: Sequence[float], size: tuple[int, int], half: float, what: str) -> ViewPlane:
-    """The view plane of K's numbers. half : what to add to its principal point.
+    """The view plane of K's numbers.
+
+    half : the amount to add to its principal point.
 
     Raises
     ------
@@ -485,7 +489,7 @@ def settled(
 ) -> tuple[distortion.Lens | None, tuple[str, ...]]:
     """The lens of OpenCV's coefficients, in its order or by name, and notes.
 
-    is_fisheye : whether they are those of `cv2.fisheye`, k1 … k4.
+    is_fisheye : true if they are those of `cv2.fisheye`, k1 … k4.
 
     Raises
     ------

@@ -37,7 +37,7 @@ KEY = "virtual_pinhole"
 
 _DOCUMENTS = re.compile(rf"{KEY}[^\w{{]{{0,4}}(?:\d{{1,18}} )?(\{{[^{{}}]*\}})")
 _BEGINNINGS = re.compile(rf"^(?:#|//) {KEY} of (\"(?:[^\"\\\n]|\\.){{0,1000}}\")", re.MULTILINE)
-# What a text says, checked: eye, look_at, up; distance (one or two), width, height, principal_point, mirrored; fov, fov_x,
+# The checked values of a text: eye, look_at, up; distance (one or two), width, height, principal_point, mirrored; fov, fov_x,
 # fov_y with their axis, degrees or radians as `_Angle` says.
 Values = dict[str, Any]
 
@@ -139,7 +139,7 @@ def comment(pinhole: Pinhole) -> str:
 def beginning(camera: Camera, sign: str) -> list[str]:
     """The lines with which a camera's code begins where that of others stands before or after it: its name and its values.
 
-    sign : of a comment.
+    sign : the characters with which a comment begins.
     """
     return [f"{sign} {KEY} of {json.dumps(camera.name)}", f"{sign} {comment(camera.pinhole)}"]
 
@@ -260,7 +260,7 @@ def _document(source: Source) -> object:
 
 
 def _of_json(document: dict) -> Values:
-    # What was asked for comes before what Blender made of it.
+    # The camera that was asked for comes before the one that Blender made of it.
     camera = next((document[key] for key in ("stated_camera", "camera") if isinstance(document.get(key), dict)), document)
     values: Values = {}
     for key, value in camera.items():

@@ -105,7 +105,10 @@ def _camera(
     options: Options,
     image: str | None = None,
 ) -> Camera:
-    """The camera of P. program : whose pixels count from the first one's center; None where they do from the corner."""
+    """The camera of P.
+
+    program : the program whose pixels count from the first one's center; None where they count from the corner.
+    """
     half = opencv.half_pixel(options, habit)
     matrix = np.array([[1, 0, half], [0, 1, half], [0, 0, 1]]) @ matrix
     determinant = float(np.linalg.det(matrix[:, :3]))

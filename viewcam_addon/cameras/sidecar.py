@@ -34,7 +34,8 @@ CONVENTION = (
 def record(pinhole: Pinhole, camera_data: CameraData | None = None, lens: Lens | None = None) -> dict[str, Any]:
     """The camera as JSON has it, every number a float64 to the bit.
 
-    camera_data : lens, sensor and shift, where it is a Blender camera. lens : what bends the picture.
+    camera_data : lens, sensor and shift, where it is a Blender camera.
+    lens : the lens that bends the picture.
 
     Returns `camera` (the keys and conventions of a scene file: `Pinhole(**record["camera"])` is the pinhole), `cameraToWorld`
     and `worldToCamera` (4 × 4), `K` (3 × 3), `convention` (what these mean, see axes.py), and `blender` (the fields of

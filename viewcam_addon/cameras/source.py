@@ -237,7 +237,10 @@ class Source:
 
 
 class Record:
-    """A JSON object whose values are checked where they are taken. place : what a sentence calls it ("frame 3")."""
+    """A JSON object whose values are checked where they are taken.
+
+    place : its name in sentences ("frame 3").
+    """
 
     def __init__(self, values: object, place: str) -> None:
         if not isinstance(values, dict):
@@ -287,7 +290,10 @@ class Record:
         return Record(self.needed(key), self.called(key))
 
     def records(self, key: str, kind: str) -> list["Record"]:
-        """The objects of a list, or of an object by their keys. kind : what one of them is ("frame")."""
+        """The objects of a list, or of an object by their keys.
+
+        kind : the name of one of them in sentences ("frame").
+        """
         values = self.values.get(key)
         if isinstance(values, dict):
             return [Record(value, f"{kind} {checks.quoted(name)}") for name, value in values.items()]

@@ -86,7 +86,9 @@ def closing(text: str, opened: int, brackets: str) -> int:
 class Film:
     """The picture that a text's camera is for.
 
-    width, height : pixels. pixel_aspect : width of a pixel over its height. is_stated : whether the text says the pixels.
+    width, height : pixels.
+    pixel_aspect : width of a pixel over its height.
+    is_stated : true if the text says the pixels.
     """
 
     width: int
@@ -133,8 +135,9 @@ def film(
 ) -> Film:
     """The picture: as the text says, else as the options say, else the program's own.
 
-    size : pixels, if the text says them. aspect : the picture's width over its height, if it says no more than that; the
-    height is kept then. default : the program's own size.
+    size : pixels, if the text says them.
+    aspect : the picture's width over its height, if it says no more than that; the height is kept then.
+    default : the program's own size.
 
     Raises
     ------
@@ -166,7 +169,7 @@ def posed(
 ) -> Pinhole:
     """The pinhole of a look-at and a view plane; the numbers of the look-at stay as they are.
 
-    may_be_singular : whether the program knows the canonical axes of a view along up, as the text's own does.
+    may_be_singular : true if the program knows the canonical axes of a view along up, as ours does.
 
     Raises
     ------

@@ -22,7 +22,12 @@ _OUTSIDE = re.compile(r"[\"'()\[\]{},;]")
 
 
 class Token(NamedTuple):
-    """kind : "name", "number", "sign", or "" at the text's end. text : its characters. start, end : its place."""
+    """A piece of a text.
+
+    kind : "name", "number", "sign", or "" at the text's end.
+    text : its characters.
+    start, end : its place.
+    """
 
     kind: str
     text: str

@@ -87,8 +87,9 @@ def document(
 ) -> dict[str, Any]:
     """The content of the file, frames in the order of the cameras.
 
-    aabb_scale : for instant-ngp alone: how many times the unit cube it looks for the scene in. Not said if None.
-    more : further keys at the top. of_frames : further keys of each frame.
+    aabb_scale : the size, in unit cubes, of the box in which instant-ngp looks for the scene. Left out if None.
+    more : further keys at the top.
+    of_frames : further keys of each frame.
 
     Raises
     ------

@@ -42,7 +42,8 @@ _FOLDERS = {"mask_path": "masks", "depth_file_path": "depths"}  # by the keys of
 def undistorted(lens: Lens, plane: ViewPlane, blank: float = 0.0) -> ViewPlane:
     """The view plane of the picture without the lens, as large as COLMAP makes it.
 
-    plane : of the photograph. blank : 0: no pixel is empty, 1: none of the photograph's is cut off; between them some.
+    plane : the photograph's view plane.
+    blank : 0 to leave no pixel empty, 1 to cut off none of the photograph's; between them some of both.
 
     Raises
     ------
@@ -82,7 +83,10 @@ def undistorted(lens: Lens, plane: ViewPlane, blank: float = 0.0) -> ViewPlane:
 def places(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> np.ndarray:
     """The places in the photograph at which the centers of the undistorted picture's pixels are seen.
 
-    plane : of the photograph. cut : of the picture. (rows, columns, 2), from the corner, y down; NaN where the lens shows none.
+    plane : the photograph's view plane.
+    cut : the undistorted picture's view plane.
+
+    Returns (rows, columns, 2), from the corner, y down; NaN where the lens shows none.
     """
     middle = np.array([plane.principal_point[0], plane.height - plane.principal_point[1]])
     columns = (np.arange(cut.width) + 0.5 - cut.principal_point[0]) / cut.distance[0]
@@ -99,8 +103,10 @@ def places(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> np.ndarray:
 def points(lens: Lens, plane: ViewPlane, place: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
     """The pinhole's points that the centers of the photograph's pixels show, or another place in each.
 
-    plane : of the photograph. place : in a pixel, from its upper left corner. (rows, columns, 2), in the view plane at
-    distance 1, y down, rows from the top; NaN where none is.
+    plane : the photograph's view plane.
+    place : the place in a pixel, from its upper left corner.
+
+    Returns (rows, columns, 2), in the view plane at distance 1, y down, rows from the top; NaN where none is.
     """
     middle = np.array([plane.principal_point[0], plane.height - plane.principal_point[1]])
     result = np.empty((plane.height, plane.width, 2))
@@ -113,7 +119,10 @@ def points(lens: Lens, plane: ViewPlane, place: tuple[float, float] = (0.5, 0.5)
 def places_back(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> np.ndarray:
     """The places in the pinhole's picture at which the centers of the photograph's pixels are seen.
 
-    plane : of the photograph. cut : of the picture. (rows, columns, 2), from the corner, y down; NaN where none is.
+    plane : the photograph's view plane.
+    cut : the undistorted picture's view plane.
+
+    Returns (rows, columns, 2), from the corner, y down; NaN where none is.
     """
     return points(lens, plane) * cut.distance + (cut.principal_point[0], cut.height - cut.principal_point[1])
 
@@ -126,9 +135,13 @@ def _bands(cut: ViewPlane, at_once: int = _BAND) -> list[slice]:
 def st_maps(lens: Lens, plane: ViewPlane, cut: ViewPlane) -> tuple[np.ndarray, np.ndarray]:
     """The maps by which compositors take a lens off a photograph and put it on a pinhole's picture.
 
-    plane : of the photograph. cut : of the picture. The first has the picture's size and tells places in the photograph, the
-    second the other way round. (rows, columns, 4) float32, rows from the top: s from the left and t from the **bottom**, 0 … 1
-    from edge to edge, 0, and 1; all 0 where it is nothing of the other, a pixel around which counts: sizes are whole numbers.
+    plane : the photograph's view plane.
+    cut : the undistorted picture's view plane.
+
+    Returns two maps, (rows, columns, 4) float32, rows from the top. The first has the undistorted picture's size and says where
+    in the photograph each pixel is, the second the other way round: s from the left and t from the **bottom**, 0 … 1 from edge
+    to edge, then 0 and 1. All four are 0 where a pixel is not in the other picture; a margin of a pixel around that counts as
+    in it, since sizes are whole numbers.
     """
     return _st(places(lens, plane, cut), plane), _st(places_back(lens, plane, cut), cut)
 
@@ -160,7 +173,9 @@ def straight(cameras: Sequence[Camera], blank: float) -> list[Camera]:
 def of_screen(photograph: np.ndarray, lens: Lens, plane: ViewPlane, widest: int) -> np.ndarray:
     """The photograph as its pinhole shows it: the same focal length, axis and sides, but no more pixels than a screen has.
 
-    photograph : rows from the top, of floats. plane : its own. widest : pixels along the longer side, at most.
+    photograph : rows from the top, of floats.
+    plane : its own view plane.
+    widest : pixels along the longer side, at most.
     """
     times = math.ceil(max(plane.width, plane.height) / widest)
     width, height = plane.width // times, plane.height // times
@@ -183,8 +198,8 @@ def _smaller(plane: ViewPlane, across: float, down: float, width: int, height: i
 def resampled(photograph: np.ndarray, lens: Lens, plane: ViewPlane, cut: ViewPlane, nearest: bool = False) -> np.ndarray:
     """The picture without the lens, black where the photograph has nothing.
 
-    photograph : (height, width) or (height, width, channels), rows from the top. nearest : takes the nearest pixel's number,
-    of masks and depths.
+    photograph : (height, width) or (height, width, channels), rows from the top.
+    nearest : true to take the nearest pixel's number, as for masks and depths.
     """
     picture = np.zeros((cut.height, cut.width, *photograph.shape[2:]), photograph.dtype)
     pixels = places(lens, plane, cut)
@@ -196,7 +211,9 @@ def resampled(photograph: np.ndarray, lens: Lens, plane: ViewPlane, cut: ViewPla
 def looked_up(photograph: np.ndarray, at: np.ndarray, nearest: bool = False) -> np.ndarray:
     """The picture's colors at places in it, of its own type; black beside it.
 
-    photograph : as of `resampled`. at : (..., 2), from the corner, y down; NaN is beside it. nearest : as of `resampled`.
+    photograph : see `resampled`.
+    at : (..., 2), from the corner, y down; NaN is beside it.
+    nearest : see `resampled`.
     """
     result = np.zeros((*at.shape[:-1], *photograph.shape[2:]), photograph.dtype)
     limits = np.array(photograph.shape[1::-1])
@@ -218,7 +235,8 @@ def looked_up(photograph: np.ndarray, at: np.ndarray, nearest: bool = False) -> 
 def save(cameras: Sequence[Camera], dataset: Path, out: Path, form: str, blank: float = 0.0) -> list[Camera]:
     """Write the undistorted pictures of a data set, and its cameras as pinholes; returns these.
 
-    dataset : the file or folder of which the cameras were read, near which their pictures are. out : a folder, new or empty.
+    dataset : the file or folder of which the cameras were read, near which their pictures are.
+    out : a folder, new or empty.
     form : one of FORMS: transforms.json with masks and depth maps, or sparse/0 with COLMAP's points, beside images/.
 
     Raises

@@ -21,9 +21,9 @@ from ..jobs import run as running
 from ..jobs.folder import Folder, settings_hash
 from ..jobs.interruption import Interruption
 from ..jobs.job import Job
+from ..jobs.lists import ShotsError
 from ..jobs.names import one_file
 from ..jobs.plan import Plan, shard
-from ..jobs.problems import ShotsError
 from ..jobs.summary import Summary
 from ..terminal import say, silent_libraries
 from . import blender_room
@@ -34,8 +34,13 @@ _OPEN_TO_ALL = "whoever reaches {} can run any program on its workers: docs/farm
 
 @dataclasses.dataclass(frozen=True)
 class _WorkList:
-    """jobs : those of this run. all_jobs : those of a dataset, or of this run. made_from : all but the job that decides a
-    picture; settings : the hash of what each of all_jobs is made from, by its name."""
+    """The jobs to carry out, and the hashes of what they are made from.
+
+    jobs : the jobs of this run.
+    all_jobs : the jobs of a dataset, else those of this run.
+    made_from : everything but the job that decides what a picture looks like.
+    settings : the hash of what each of all_jobs is made from, by its name.
+    """
 
     all_jobs: Sequence[Job]
     jobs: Sequence[Job]
@@ -68,8 +73,9 @@ def carry_out(
 ) -> Summary:
     """Carry out jobs of one file, here or on a cluster, and tell what it came to.
 
-    jobs_of : a renderer (BlenderRenderer) → the jobs. complete : gives each what it does not say itself. source : the list that
-    they are from.
+    jobs_of : a renderer (BlenderRenderer) → the jobs.
+    complete : gives each what it does not say itself.
+    source : the list that they are from.
 
     Raises
     ------
@@ -161,7 +167,10 @@ def _refuse_names_of_labels(shots: Sequence[Job]) -> None:
 
 
 def _tell(plan: Plan, events: Events, summary: Summary, folder: Folder, unknown: Sequence[str]) -> None:
-    """In one line what the batch came to. unknown : what may have changed the pictures that were kept."""
+    """In one line what the batch came to.
+
+    unknown : sentences on what may have changed in the pictures that were kept.
+    """
     counts = summary.counts
     shots = "1 shot" if counts["shots"] == 1 else f"{counts['shots']} shots"
     if counts["failed"] or counts["left"]:

@@ -51,7 +51,7 @@ def add_of_job(added: argparse._ActionsContainer, *names: str) -> None:
     for field in _optional():
         if field.name in names:
             how = {"action": "store_true"} if field.default is False else {"default": field.default}
-            added.add_argument(f"--{field.name}", **how | dict(field.metadata))
+            added.add_argument(f"--{field.name.replace('_', '-')}", **how | dict(field.metadata))
 
 
 def add_scene_choices(added: argparse.ArgumentParser) -> None:
@@ -80,7 +80,10 @@ def add_light(added: argparse.ArgumentParser, samples: argparse._ActionsContaine
 
 
 def add_error(added: argparse._ActionsContainer, text: str) -> None:
-    """Add the wanted error. text : who takes as many samples as it needs."""
+    """Add the wanted error.
+
+    text : the help's beginning, which says what takes the samples or stands in their place.
+    """
     text = f"for light: {text} as many samples of each pixel as it takes for a standard error of E, in the picture's units"
     added.add_argument("--error", type=types.above_zero, metavar="E", help=text)
 
@@ -94,7 +97,10 @@ def add_report(added: argparse.ArgumentParser) -> None:
 
 
 def job_of(options: argparse.Namespace, *names: str) -> "Job":
-    """The job that the words ask for. names : of its fields that only this command has an option for."""
+    """The job that the words ask for.
+
+    names : the names of further fields, for which only this command has an option.
+    """
     from ..jobs.job import Job
 
     width, height = getattr(options, "size", None) or (None, None)
@@ -145,8 +151,10 @@ def say_level(scene: Any) -> dict[str, str]:
 
 
 def ledger_lines(ledger: Sequence[dict[str, str]]) -> list[str]:
-    """The ledger of a scene, for a terminal: what did not come whole, and what is said of the world. ledger : as --json has
-    it."""
+    """The ledger of a scene, for a terminal: what did not come whole, and what is said of the world.
+
+    ledger : the entries as --json has them.
+    """
     exported = sum(entry["status"] == "exported" for entry in ledger)
     rest = [
         f"  {entry['object']}: {entry['status']}, {entry['reason']}"

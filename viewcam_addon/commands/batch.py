@@ -208,7 +208,10 @@ def _shots(options: argparse.Namespace, rig: Rig | None, renderer: Any) -> Seque
 
 
 def _completed(job: Job, options: argparse.Namespace, rig: Rig | None) -> Job:
-    """The job, with what the command line says where it says nothing itself. rig : of --distort."""
+    """The job, with what the command line says where it says nothing itself.
+
+    rig : the calibrated cameras of --distort.
+    """
     width, height = options.size or (None, None)
     stated = {field: getattr(options, field) for field in ("frame", "engine", "samples", "level", "seed", "threads")}
     stated |= {"width": width, "height": height}

@@ -44,7 +44,10 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
 
 
 def add_reading_options(added: argparse._ActionsContainer, size: bool = True) -> None:
-    """Add the options that say how cameras are read. size : whether --size is one of them, and not there already."""
+    """Add the options that say how cameras are read.
+
+    size : true to add --size, too; false where the command has it already.
+    """
     if size:
         added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
     added.add_argument(

@@ -55,7 +55,10 @@ def check_one(
     sides: str | None = None,
     command: str = "",
 ) -> Result:
-    """Check one job. report, difference, sides, command : as of tracing.Written; the report's folder keeps all pictures."""
+    """Check one job.
+
+    report, difference, sides, command : see tracing.Written; the report's folder keeps all pictures.
+    """
     from ..comparison.answer import exit_status
     from ..jobs.plan import Plan
     from ..jobs.tracing import Written

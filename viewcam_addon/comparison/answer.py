@@ -28,10 +28,12 @@ COLORS = {SAME: "green", SAME_BUT: "amber", DIFFERENT: "red"}
 class NotModeled:
     """The part of a picture that the answer says nothing of.
 
-    names : of the objects, those that the ledger has as approximated or skipped and that are in the picture, or may be, and
-    those whose light is a renderer's choice. share : of the pixels, 0 to 1: those that show them or differ by them; None where
-    that was not measured. visible : those that show them alone. in_one_place : of the names those of surfaces in one place.
-    seen_otherwise : those whose shadows not all kinds of rays see.
+    names : the objects that the ledger has as approximated or skipped and that are in the picture, or may be, and those whose
+        light is a renderer's choice.
+    share : the share of the pixels, 0 to 1, that show them or differ by them; None where it was not measured.
+    visible : the share of the pixels that show them.
+    in_one_place : the names among them of surfaces in one place.
+    seen_otherwise : the names among them of objects whose shadows not all kinds of rays see.
     """
 
     names: tuple[str, ...] = ()
@@ -60,8 +62,10 @@ class NotModeled:
 class Answer:
     """The answer of comparing two pictures.
 
-    answer : one of ANSWERS. headline : a few words. text : the figures that stand for it, or what differs.
-    not_modeled : of the picture, whatever the answer.
+    answer : one of ANSWERS.
+    headline : a few words.
+    text : the figures that stand for it, or a clause that says what differs.
+    not_modeled : the part of the picture that is not modeled, whatever the answer.
     """
 
     answer: str
@@ -106,7 +110,8 @@ def exit_status(answer: str, strict: bool) -> int:
 def answered(same: bool, headline: str, text: str, not_modeled: NotModeled) -> Answer:
     """The answer, whose headline names what is not modeled where the rest is the same.
 
-    same : whether nothing differs. headline : without what is not modeled.
+    same : true if nothing differs.
+    headline : without what is not modeled.
     """
     if not same:
         return Answer(DIFFERENT, headline, text, not_modeled)
@@ -120,9 +125,11 @@ def in_the_picture(
 ) -> NotModeled:
     """The part of a picture that is not modeled.
 
-    names : of the objects that are not. surfaces : name → (height, width), the pixels that show it, of those that are surfaces
-    in the scene. changed : (height, width), those where the picture with everything is another than the one with stand-ins;
-    None where there is none. is_lit : whether light is compared, so that what is not seen may still light what is.
+    names : the names of the objects that are not modeled.
+    surfaces : name → (height, width), true for pixels that show the object, of those that are surfaces in the scene.
+    changed : (height, width), true for pixels in which the picture with everything is another than the one with stand-ins; None
+        where there is none.
+    is_lit : true if light is compared, so that what is not seen may still light what is.
     """
     if changed is not None and not is_lit:  # bits tell what a stand-in changes, where there is no noise
         surfaces = {name: pixels & changed for name, pixels in surfaces.items()}
@@ -142,7 +149,7 @@ def in_the_picture(
 def but_for(not_modeled: Mapping[str, Any]) -> str:
     """but for 2 objects that are not modeled and 1 shadow that not all rays see
 
-    not_modeled : as of NotModeled.to_json.
+    not_modeled : see NotModeled.to_json.
     """
     one_place, otherwise = (not_modeled.get(key, ()) for key in ("in_one_place", "seen_otherwise"))
     modeled = {*one_place, *otherwise}

@@ -32,7 +32,8 @@ class ConversionError:
     """Stated camera against camera read back, in pixels.
 
     largest : the largest displacement over corners, edges and center of the picture, at the depths seen.
-    tolerance : what the float32 storage of matrix and lens allows at that place. share : the worst displacement / tolerance.
+    tolerance : the displacement that the float32 storage of matrix and lens allows there.
+    share : the worst displacement / tolerance.
     """
 
     largest: float
@@ -52,8 +53,10 @@ class Systematic:
     """The systematic part of the errors, the same for all pixels of the test picture, by least squares.
 
     shift_x, shift_y : pixels, to the right and upwards: the mean displacement at the picture's principal point.
-    zoom_x, zoom_y : relative magnification, 0 for none. roll : radians, counter-clockwise.
-    tolerance : pixels, for the mean displacement over all hits. mean : its length.
+    zoom_x, zoom_y : relative magnification, 0 for none.
+    roll : radians, counter-clockwise.
+    tolerance : pixels, for the mean displacement over all hits.
+    mean : its length.
     """
 
     shift_x: float
@@ -97,10 +100,11 @@ def systematic_error(
 ) -> Systematic:
     """Shift, zoom and roll that explain the displacements best.
 
-    pixels : (n,) int, row after row. off_x, off_y : (n,) displacements there, pixels to the right and upwards.
+    pixels : (n,) int, row after row.
+    off_x, off_y : (n,) displacements there, pixels to the right and upwards.
     one_rounding : (n,) `position_shift`. A pixel weighs as much as it is certain, so that a few slender triangles do not hide
-        what all the others share. The mean of the errors can't exceed their typical size. center : pixels that the renderer's
-        rays are beside the pixels' centers by design.
+        what all the others share. The mean of the errors can't exceed their typical size.
+    center : pixels that the renderer's rays are beside the pixels' centers by design.
     """
     row, column = np.divmod(pixels, pinhole.width)
     x, y = column + 0.5 - pinhole.principal_point[0], row + 0.5 - pinhole.principal_point[1]

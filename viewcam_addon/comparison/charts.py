@@ -63,7 +63,8 @@ def histogram(roundings: NDArray[np.floating]) -> str:
 def bell(errors: NDArray[np.float64], limit: float) -> str:
     """A chart of the tiles' differences, in standard errors, below the curve that chance alone makes.
 
-    errors : (n,). limit : standard errors, what is allowed.
+    errors : (n,).
+    limit : standard errors, what is allowed.
     """
     reach = max(math.ceil(1.2 * limit), 4)
 

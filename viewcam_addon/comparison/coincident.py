@@ -43,10 +43,11 @@ _LEAST_LEFT = 0.1
 class CoincidentLight:
     """The light that is a renderer's choice, at most.
 
-    light : its passes. total : (height, width, 3), all light, traced with the same seed, which is not the reference's: pixels
-    that were taken out because the reference is dark there would leave those where it is bright. pairs : two names in order of
-    the alphabet → how often rays found these in one place. seen_otherwise : objects and lamps whose shadows not all kinds of
-    rays see → how often that made a difference.
+    light : its passes.
+    total : (height, width, 3), all light, traced with the same seed, which is not the reference's: pixels that were taken out
+        because the reference is dark there would leave those where it is bright.
+    pairs : two names in order of the alphabet → how often rays found these in one place.
+    seen_otherwise : objects and lamps whose shadows not all kinds of rays see → how often that made a difference.
     """
 
     light: Image
@@ -97,8 +98,10 @@ MakeCoincidentLight = Callable[[], CoincidentLight]
 class TakenOut:
     """The pixels that were taken out of a comparison of light.
 
-    pixels : (height, width) bool, that show surfaces in one place or are lit by them, or past what not all kinds of rays see.
-    pairs, seen_otherwise : as of CoincidentLight. share_of_lit : of the pixels that have light on either side, 0 to 1.
+    pixels : (height, width) bool, true for pixels that show surfaces in one place or are lit by them, or past what not all
+        kinds of rays see.
+    pairs, seen_otherwise : see CoincidentLight.
+    share_of_lit : their share among the pixels that have light on either side, 0 to 1.
     """
 
     pixels: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((1, 1), bool))

@@ -33,9 +33,11 @@ def not_modeled(
 ) -> NotModeled:
     """The part of a picture that is not modeled.
 
-    names : of the objects that are not. pixels : name → (height, width), the pixels that show it, of those that are surfaces in
-    the scene. reference, tests : what was compared. everything : Cycles' picture of the seed of the first test, with as many
-    samples, or None where there is none. pinhole : the camera where light was compared, None where geometry was.
+    names : the names of the objects that are not modeled.
+    pixels : name → (height, width), true for pixels that show the object, of those that are surfaces in the scene.
+    reference, tests : the pictures that were compared.
+    everything : Cycles' picture of the seed of the first test, with as many samples, or None where there is none.
+    pinhole : the camera where light was compared, None where geometry was.
     """
     if not names:
         return NotModeled()
@@ -51,8 +53,8 @@ def not_modeled(
 def _changed_geometry(test: Image, everything: Image, surfaces: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(height, width): the pixels where some pass has other bits.
 
-    test, everything : the pictures of geometry with stand-ins and without. surfaces : (height, width), the pixels that show an
-    object that is not modeled; of all others no normals count.
+    test, everything : the pictures of geometry with stand-ins and without.
+    surfaces : (height, width), the pixels that show an object that is not modeled; of all others no normals count.
     """
 
     def differs(name: str) -> NDArray[np.bool_]:

@@ -36,7 +36,7 @@ from .statistics import PassErrors, measure
 from .tolerances import Array, Seen, in_float32
 from .verdict import GeometryComparison, allowed_unexplained, far_from_origin
 
-# Which of the passes both pictures must have.
+# The passes that both pictures must have.
 _NEEDED = ("Depth", "Position", "Object Index")
 # Pixels whose centers are traced again, to see whether the reference shows the scene.
 _ASKED_OF_THE_REFERENCE = 1000
@@ -57,10 +57,12 @@ def compare(
 ) -> GeometryComparison:
     """Compare two pictures of one camera.
 
-    pinhole : the camera that traced the reference. surfaces_at : re-traces sub-pixel positions of the reference's
-    scene; without it no mismatch can be explained. stated : the camera as the four values state it; with it the
-    conversion's error is measured too. origin : that of both pictures, in the world. renderer : the test's.
-    partial : whether the test may lack passes, all but one of Depth, Distance and Position; they are not judged then.
+    pinhole : the camera that traced the reference.
+    surfaces_at : re-traces sub-pixel positions of the reference's scene; without it no mismatch can be explained.
+    stated : the camera as the four values state it; with it the conversion's error is measured too.
+    origin : the point of the world from which both pictures count.
+    renderer : the renderer that made the test picture.
+    partial : true to let the test lack passes, all but one of Depth, Distance and Position; they are not judged then.
 
     Whatever float32 can hold may stand in the pictures: what can't be computed with is not within tolerance.
 
@@ -93,7 +95,7 @@ def compare(
     mismatches = _mismatches(kinds, seen, reach, around, surfaces_at)
 
     compared = hit & np.isin(kinds, (-1, KINDS.index("material index"), KINDS.index("surface")))
-    # What is explained, or few enough to be let pass, is no error of the passes; what is not, shows in their figures.
+    # Pixels that are explained, or few enough to be let pass, are no error of the passes; all others show in their figures.
     settled = mismatches.explained | (mismatches.unexplained_count <= allowed_unexplained(pinhole))
     compared[mismatches.rows[settled] * pinhole.width + mismatches.columns[settled]] = False
     chosen = np.flatnonzero(compared)

@@ -54,8 +54,10 @@ _KNIGHTS_MOVES = tuple((i, j) for i in (-2, -1, 1, 2) for j in (-2, -1, 1, 2) if
 class Place:
     """The place of a difference.
 
-    columns, rows : first and last, rows from the bottom. channel : its name, empty where there is one only.
-    reference, test : means there, in that channel. errors : the difference in standard errors, signed.
+    columns, rows : first and last, rows from the bottom.
+    channel : its name, empty where there is one only.
+    reference, test : means there, in that channel.
+    errors : the difference in standard errors, signed.
     """
 
     columns: tuple[int, int]
@@ -70,12 +72,14 @@ class Place:
 class HypothesisTest:
     """One size of tiles, asked in one quantity.
 
-    size : one of SIZES. errors : (rows, columns, channels), each tile's difference in standard errors, signed; of contours
-    negative where the test is softer.
-    allowed : (rows, columns, channels) what chance allows. limit : that at the worst place.
+    size : one of SIZES.
+    errors : (rows, columns, channels), each tile's difference in standard errors, signed; of contours negative where the test
+        is softer.
+    allowed : (rows, columns, channels) what chance allows.
+    limit : that at the worst place.
     worst : the place that is farthest beyond it, or closest to it.
     findable : (rows, columns, channels) the least share of its light that a tile may be off and be found with the probability
-    POWER; inf of contours, and where nothing would be.
+        POWER; inf of contours, and where nothing would be.
     """
 
     size: int
@@ -132,7 +136,8 @@ class HypothesisTest:
 def run(sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: float) -> tuple[HypothesisTest, ...]:
     """All sizes, asked so that chance makes any of them fail with the probability `level` at most.
 
-    allowed : what rounding may do to these sides. freedom : the degrees of freedom of both sides' variances.
+    allowed : the allowance for rounding on these sides.
+    freedom : the degrees of freedom of both sides' variances.
     level : shared out evenly over the sizes, and over the tiles and channels of each after Šidák.
     """
     share = level / len(SIZES)

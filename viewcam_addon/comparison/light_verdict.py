@@ -45,11 +45,14 @@ _MOST_DIGITS = 12
 class LightRow:
     """The result for one quantity.
 
-    reference, test : means over the picture and its channels. ratio : test over reference, nan where that is 0.
-    ratio_error : its standard error. visible : the least relative bias of all that is compared that is found in 99 of
-    100 cases; inf where none is.
-    hypothesis_tests : none where there is no noise. noise_free, edges : the exact comparison, None where there is noise.
-    broken : pixels that are no numbers on one side or both. factor : the one that explains all of the difference, or None.
+    reference, test : means over the picture and its channels.
+    ratio : test over reference, nan where that is 0.
+    ratio_error : its standard error.
+    visible : the least relative bias of all that is compared that is found in 99 of 100 cases; inf where none is.
+    hypothesis_tests : none where there is no noise.
+    noise_free, edges : the exact comparison, None where there is noise.
+    broken : pixels that are no numbers on one side or both.
+    factor : the one that explains all of the difference, or None.
     """
 
     name: str
@@ -92,10 +95,15 @@ class LightRow:
 class Search:
     """The state of a comparison in rounds that searches for a bias (sequential.py).
 
-    find : the bias, a share of the light. least : that which would be found in 99 of 100 cases so far, if it is everywhere;
-    least_in_blocks : if it is in a typical block of 32 × 32 pixels alone; both 0 without noise.
-    samples : so far, of each side. rounds : so far. is_decided : whether that was the last. expected : samples that it takes.
-    following : samples after the next round, if there is to be one; None after all.
+    find : the bias, a share of the light.
+    least : the bias that would be found in 99 of 100 cases so far, if it is everywhere.
+    least_in_blocks : the bias that would be found if it is in a typical block of 32 × 32 pixels alone; both are 0 without
+        noise.
+    samples : the samples of each side so far.
+    rounds : the rounds so far.
+    is_decided : true if that was the last.
+    expected : the samples that the search is expected to take.
+    following : the samples after the next round, if there is to be one; None after the last.
     """
 
     find: float
@@ -121,12 +129,18 @@ class Search:
 class RadianceComparison:
     """The comparison of a reference with the mean of some test pictures, in light.
 
-    samples : of the reference, and of all test pictures together; None where the files do not tell. seeds : test pictures.
-    is_noisy : whether chance had a part in it. rows : one for each quantity, Combined first. equal : further quantities, the
-    same to the last bit. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
+    samples : the samples of the reference, and of all test pictures together; None where the files do not tell.
+    seeds : the number of test pictures, each of its own seed.
+    is_noisy : true if chance had a part in it.
+    rows : one for each quantity, Combined first.
+    equal : further quantities, the same to the last bit.
+    appearance : relMSE and FLIP.
+    test : the mean of the test pictures' Combined, (height, width, 3).
     maps : name to (height, width) float32, rows from the bottom: what differs in Combined and in quantities that fail.
-    not_modeled : what of the picture neither side models as it is. taken_out : pixels that the rest says nothing of.
-    stated : the camera that was asked for, or None. search : of a comparison in rounds.
+    not_modeled : the part of the picture that neither side models as it is.
+    taken_out : the pixels of which the verdict says nothing.
+    stated : the camera that was asked for, or None.
+    search : the state of the search, of a comparison in rounds.
     """
 
     pinhole: Pinhole

@@ -55,10 +55,11 @@ _CENTERS = 50_000
 class Mismatches:
     """The pixels that see another surface in the test picture than in the reference.
 
-    columns, rows : (n,) int, rows from the bottom. kinds : (n,) int, index in KINDS.
+    columns, rows : (n,) int, rows from the bottom.
+    kinds : (n,) int, index in KINDS.
     shifts : (n,) float64, pixels: the smallest shift that explains each; nan where none within tolerance does.
     reach : (n,) float64, pixels: the tolerance up to which shifts were tried.
-    retraced : how many were re-traced; 0 without a scene to trace.
+    retraced : the number of pixels that were re-traced; 0 without a scene to trace.
     """
 
     columns: NDArray[np.intp]
@@ -105,7 +106,8 @@ class SurfaceAgreement:
     """Judges whether the test picture shows the surface that a ray sees, within the tolerance of the last percentile.
 
     across : (n,) pixels, how far each of the test's positions, projected, lies from the center of its pixel.
-    slopes : pass name to (n,), how much Normal and UV change per pixel there (tolerances.slopes). renderer : the test's.
+    slopes : pass name to (n,), how much Normal and UV change per pixel there (tolerances.slopes).
+    renderer : the test's.
     enlargement : (n,) or a number, times the error of stored corner normals, that of the normal between them.
     """
 
@@ -189,8 +191,12 @@ def _uv_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Error
 
 @dataclass(frozen=True)
 class ComparedPass:
-    """channels : the first of them. unit : of its figures. errors : as of `SurfaceAgreement`; without, they must be equal.
-    has_slope : whether its slope counts.
+    """A pass by which surfaces are told apart.
+
+    channels : the number of channels that count, from the first on.
+    unit : the unit of its figures.
+    errors : the errors, see `SurfaceAgreement`; without them the passes must be equal.
+    has_slope : true if its slope counts.
     """
 
     channels: int
@@ -251,8 +257,8 @@ def contrast(values: Array) -> Array:
 class InOnePlace:
     """The pixels where several surfaces lie in one place, and the test picture shows another of them than the reference.
 
-    columns, rows : (n,) int, rows from the bottom. objects : (n, 2), the names of those that the reference and the test show,
-    which may be the same.
+    columns, rows : (n,) int, rows from the bottom.
+    objects : (n, 2), the names of those that the reference and the test show, which may be the same.
     """
 
     columns: NDArray[np.intp]
@@ -277,7 +283,8 @@ def settle(
     """Settle pixels that differ by what the scene tells at their centers: how steep the surface itself is, and what else is in
     its place. So it is asked, too, where normal or UV is off by more than half of all pixels may be.
 
-    kinds : of all pixels, as `kinds_of` has them. borders : those where the picture does not tell all of their slopes.
+    kinds : the kinds of all pixels, see `kinds_of`.
+    borders : true for pixels of whose slopes the picture does not tell all.
 
     Returns the kinds and the reference's passes, in which pixels that show another surface in the same place show that; the
     agreement with their slopes; and which pixels these are.
@@ -321,7 +328,8 @@ def settle(
 def in_one_place(agreement: SurfaceAgreement, rays: NDArray, traced: Seen) -> NDArray[np.bool_]:
     """(m,) bool: which of the surfaces of some rays are where the nearest one of their ray is, within tolerance.
 
-    agreement : its camera and renderer count. rays, traced : as of SurfacesAt.
+    agreement : gives camera and renderer.
+    rays, traced : see SurfacesAt.
     """
     nearest = np.searchsorted(rays, rays)
     depth, renderer = traced["Depth"][:, 0].astype(np.float64), agreement.renderer
@@ -336,7 +344,10 @@ def explain(
 ) -> tuple[Array, int]:
     """The smallest shift of the ray that explains what the test picture shows.
 
-    columns, rows : (n,) the pixels. seen : what the test shows there. reach : (n,) pixels. agreement : of these pixels.
+    columns, rows : (n,) the pixels.
+    seen : the test's passes there.
+    reach : (n,) pixels.
+    agreement : the agreement of these pixels.
 
     Returns (n,) pixels, nan where no shift within reach explains it, and the number of pixels that were re-traced: all, unless
     most of a batch stays unexplained. Such a picture has failed, and tracing the rest of it would only take time.

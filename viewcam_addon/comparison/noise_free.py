@@ -63,8 +63,10 @@ class Edges:
 class Allowance:
     """The allowance for rounding in one quantity, each (height, width), the largest of its channels.
 
-    moved : by the shift of the picture, for one rounding. value : by one rounding of its own figures. floor : by storage.
-    shift : pixels, that of the picture for one rounding.
+    moved : the error by the shift of the picture, for one rounding.
+    value : the error by one rounding of the quantity's own figures.
+    floor : the error by storage.
+    shift : the shift of the picture for one rounding, pixels.
     """
 
     moved: Array
@@ -86,9 +88,10 @@ class Allowance:
 class Rounding:
     """The rounding of the light of a picture.
 
-    test : one of the test pictures, which tells its Blender. samples : of each picture, the most.
-    belongs : (height, width) the object of each pixel, 0 for none or where nobody knows.
-    rest : what is compared where light comes by surfaces in one place, else None.
+    test : one of the test pictures, which tells its Blender.
+    samples : the most samples of any picture.
+    belongs : (height, width), the object of each pixel, 0 for none or where nobody knows.
+    rest : the rest that is compared where light comes by surfaces in one place, else None.
     """
 
     def __init__(self, pinhole: Pinhole, reference: Image, test: Image, samples: int, rest: Rest | None = None) -> None:
@@ -98,8 +101,8 @@ class Rounding:
         self.belongs: NDArray = np.zeros(self._shift.shape)
         if "Object Index" in reference.passes:
             self.belongs = reference["Object Index"][..., 0]
-        # What the light on a surface would be if it came from straight above, as far as the picture tells: the largest
-        # Diffuse Direct anywhere, in the surface's color.
+        # The light on a surface if it came from straight above, as far as the picture tells: the largest Diffuse Direct
+        # anywhere, in the surface's color.
         self._brightest: Array | float = 0.0
         self._tables = tolerances.ALBEDO_TABLES if "albedo tables" in reference.attributes else 0.0
         self._triangles = tolerances.SHINING_TRIANGLES if "shining surfaces" in reference.attributes else 0.0
@@ -132,7 +135,8 @@ class Rounding:
 def compare(sides: Sides, allowed: Allowance, belongs: NDArray) -> tuple[PassErrors, Edges, Array]:
     """The figures of all pixels, those on edges, and the error of each pixel in roundings.
 
-    allowed : of these sides. belongs : the object of each pixel.
+    allowed : the allowance for rounding on these sides.
+    belongs : the object of each pixel.
 
     Returns the row, relative errors; the edges; (height, width) float64.
     """

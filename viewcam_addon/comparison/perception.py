@@ -19,9 +19,12 @@ from .tolerances import Array
 
 @dataclass(frozen=True)
 class Appearance:
-    """relmse : of Combined. expected_relmse : that of the noise that both sides tell of, None where one does not tell.
+    """The difference of two pictures as an eye sees it.
 
-    flip : mean over the picture, 0 to 1; None where the package flip-evaluator is not installed.
+    relmse : the relMSE of Combined.
+    expected_relmse : the relMSE of the noise that both sides tell of, None where one does not tell.
+
+    flip : FLIP's mean over the picture, 0 to 1; None where the package flip-evaluator is not installed.
     """
 
     relmse: float

@@ -55,10 +55,11 @@ def compare(
 ) -> RadianceComparison:
     """Compare one reference with one test picture or with several of different seeds.
 
-    pinhole : the camera of the reference, which must have the passes Combined and Depth. test_samples : of each test picture,
-    where that is not what its file tells (Cycles counts a first sample that it leaves out). make_coincident : traces the light
-    that is a renderer's choice, which is taken out; asked where the pictures differ. trace_anew : traces the reference with
-    SEEDS other seeds; asked where they still differ, and not beyond doubt.
+    pinhole : the camera of the reference, which must have the passes Combined and Depth.
+    test_samples : the samples of each test picture, where its file does not tell them (Cycles counts a first sample that it
+        leaves out).
+    make_coincident : traces the light that is a renderer's choice, which is taken out; asked where the pictures differ.
+    trace_anew : traces the reference with SEEDS other seeds; asked where they still differ, and not beyond doubt.
     false_alarms : the probability, at most, that two sides of the same light are called different.
 
     Whatever float32 can hold may stand in the pictures: what is no number is told as broken.
@@ -103,8 +104,9 @@ def compare(
 class QuantityComparison:
     """The arrays that the verdict stands on.
 
-    combined : both sides of it. samples : of the reference, and of each test picture. rows, equal, maps : as in
-    RadianceComparison, but no map of what an eye sees.
+    combined : both sides of Combined.
+    samples : the samples of the reference, and of each test picture.
+    rows, equal, maps : see RadianceComparison; but there is no map of what an eye sees.
     """
 
     combined: Sides
@@ -125,8 +127,11 @@ def compare_quantities(
     anew: Sequence[Image] = (),
     false_alarms: float = FALSE_ALARMS,
 ) -> QuantityComparison:
-    """`compare` without what decides nothing. rest : what is compared where light is a renderer's choice. anew : the reference
-    with several other seeds."""
+    """`compare` without what decides nothing.
+
+    rest : the rest that is compared where light is a renderer's choice.
+    anew : the reference with several other seeds.
+    """
     quantities = list(all_sides(reference, tests, anew))
     if rest is not None:
         quantities = [rest.of(sides) for sides in quantities]

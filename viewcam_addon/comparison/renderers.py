@@ -35,8 +35,10 @@ MARK = "viewcam"
 class Renderer:
     """The deviations of a renderer by design, beside its roundings.
 
-    center : pixels that its rays are beside the pixels' centers. edges : pixels that its edges are beside the scene's. normal :
-    radians that its storage turns a normal by. near : of the depth buffer that its depths come from, world units; or None.
+    center : pixels that its rays are beside the pixels' centers.
+    edges : pixels that its edges are beside the scene's.
+    normal : radians that its storage turns a normal by.
+    near : the near end of the depth buffer that its depths come from, world units; or None.
     """
 
     name: str
@@ -78,7 +80,10 @@ def read(path: str | os.PathLike[str]) -> tuple[Image, Renderer]:
 
 
 def note(engine: str, near: float) -> str:
-    """The note in a picture of EEVEE or Workbench. near : where the camera's clipping starts, world units."""
+    """The note in a picture of EEVEE or Workbench.
+
+    near : the depth at which the camera's clipping starts, world units.
+    """
     return f"{MARK} {engine} {near!r}"
 
 

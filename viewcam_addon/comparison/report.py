@@ -40,8 +40,10 @@ SWAP = "Point at the picture, tap it, or press the space bar to swap the two."
 class Legend:
     """A color scale below a picture.
 
-    strip : the scale, as a data: URI. figures : numbers along it, from end to end, each after its place, 0 to 1. limits : words
-    for what is allowed, after their places. unit : of the numbers.
+    strip : the scale, as a data: URI.
+    figures : numbers along it, from end to end, each after its place, 0 to 1.
+    limits : words for what is allowed, after their places.
+    unit : the unit of the numbers.
     """
 
     strip: str
@@ -54,8 +56,10 @@ class Legend:
 class Tab:
     """One of the pictures to choose from.
 
-    name : in the page's address. words : what it shows. caption : a sentence. pictures : data: URIs by side, "image", or
-    "reference" and "test", which are swapped.
+    name : its name in the page's address.
+    words : the button's text, which says what it shows.
+    caption : a sentence.
+    pictures : data: URIs by side, "image", or "reference" and "test", which are swapped.
     """
 
     name: str
@@ -77,7 +81,8 @@ class Crop:
 def write(folder: str | os.PathLike[str], template: str, values: Mapping[str, Any]) -> Path:
     """Write folder/index.html and return its path.
 
-    template : report_geometry.html or report_light.html. values : what it names, those of `common` among them.
+    template : report_geometry.html or report_light.html.
+    values : values for the names in it, those of `common` among them.
 
     Raises
     ------
@@ -103,9 +108,10 @@ def common(
 ) -> dict[str, Any]:
     """The values that both reports give report.html; the views, the crops and their own parts are added to it.
 
-    comparison : whose `answer` is told, with its `pinhole`, `stated` and `renderer`. ledger : the scene's entries, with
-    `object`, `status` and `reason`.
-    command : what repeats the comparison. origin : the point of the world that the camera's coordinates are counted from.
+    comparison : the comparison whose `answer` is told, with its `pinhole`, `stated` and `renderer`.
+    ledger : the scene's entries, with `object`, `status` and `reason`.
+    command : the command that repeats the comparison.
+    origin : the point of the world that the camera's coordinates are counted from.
     """
     answer = comparison.answer
     names = [Path(image.source).name for image in (reference, test)]
@@ -175,7 +181,11 @@ def _strip(scale: NDArray[np.uint8] | None = None) -> str:
 
 
 def _camera(pinhole: Pinhole, stated: Pinhole | None, origin: Sequence[float]) -> dict[str, Any]:
-    """pinhole : as it was read back. stated : as it was typed, None where nobody did."""
+    """The rows of the page's table of the camera.
+
+    pinhole : the camera as it was read back.
+    stated : the camera as it was typed, None where nobody did.
+    """
     angle = f"{math.degrees(math.asin(min(pinhole.sine_to_up, 1.0))):.4g}° from up"
     return {
         "pinhole": pinhole,
@@ -216,7 +226,8 @@ def write_geometry(
 ) -> Path:
     """Write folder/index.html and return its path.
 
-    ledger : the scene's entries, with `object`, `status` and `reason`. command : what repeats the comparison.
+    ledger : the scene's entries, with `object`, `status` and `reason`.
+    command : the command that repeats the comparison.
 
     Raises
     ------
@@ -287,7 +298,8 @@ def write_light(
 ) -> Path:
     """Write folder/index.html and return its path.
 
-    tests : the pictures that were compared, in any number. ledger, command : as for common.
+    tests : the pictures that were compared, in any number.
+    ledger, command : see common.
 
     Raises
     ------

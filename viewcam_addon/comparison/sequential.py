@@ -48,8 +48,9 @@ _MEANS = ("Combined", "Emission", "Environment", "Diffuse Color")
 class Rounds:
     """The pictures of all rounds so far, each the mean over all of its samples.
 
-    samples : of each side. reference, tests, everything : as of radiance.compare and everything.not_modeled. Each of the tests
-    has had a share of every round, so that they are alike and independent, and their spread tells their noise as ever.
+    samples : the samples of each side.
+    reference, tests, everything : see radiance.compare and everything.not_modeled. Each of the tests has had a share of every
+        round, so that they are alike and independent, and their spread tells their noise as ever.
     """
 
     samples = 0
@@ -59,7 +60,10 @@ class Rounds:
     everything: Image | None
 
     def add(self, samples: int, reference: Image, tests: Sequence[Image], everything: Image | None) -> None:
-        """samples : of this round, on each side."""
+        """Add the pictures of one more round.
+
+        samples : the samples of this round, on each side.
+        """
         self.samples += samples
         self.count += 1
         if self.count == 1:
@@ -96,7 +100,10 @@ def _least(comparison: RadianceComparison) -> tuple[float, float]:
 
 
 def _pooled(before: Image, now: Image, share: float) -> Image:
-    """The mean of two pictures. share : of the samples of both, those of the second."""
+    """The mean of two pictures.
+
+    share : the second one's share of the samples of both.
+    """
     passes = dict(before.passes)
     for name in _MEANS:
         if name in passes:

@@ -39,10 +39,12 @@ _MOST_DIGITS = 9
 class Sides:
     """One quantity on both sides, each (height, width, channels) float64, rows from the bottom.
 
-    test_variance : of `test`, which is a mean, from the test pictures' differences; inf where there is one picture only.
-    variance : variance of `reference`; inf where it is not known. broken : (height, width) bool, no number on one side or both;
-    there both are 0. shared : variance of `reference` that its pixels may have shared with their neighbors, or 0. certain :
-    (height, width, 1) bool, pixels that have no noise, whatever is beside them.
+    test_variance : the variance of `test`, which is a mean, from the test pictures' differences; inf where there is one picture
+        only.
+    variance : the variance of `reference`; inf where it is not known.
+    broken : (height, width) bool, true where one side or both have no number; there both are 0.
+    shared : the variance of `reference` that its pixels may have shared with their neighbors, or 0.
+    certain : (height, width, 1) bool, true for pixels that have no noise, whatever is beside them.
     """
 
     name: str
@@ -168,7 +170,10 @@ def _variance(reference: Image) -> Array:
 
 
 def _sides(name: str, references: Sequence[Image], tests: Sequence[Image], variance: Array | None) -> Sides:
-    """variance : of the reference; None where that of several tells it."""
+    """Both sides of a quantity.
+
+    variance : the variance of the reference; None where several references tell it.
+    """
     expected, own = _mean_and_variance(name, references)
     mean, test_variance = _mean_and_variance(name, tests)
     broken = ~(np.isfinite(expected).all(axis=-1) & np.isfinite(mean).all(axis=-1))

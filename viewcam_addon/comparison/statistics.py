@@ -21,9 +21,9 @@ class PassErrors:
     """One line of the table.
 
     name, unit : the pass and the unit of its figures.
-    count : pixels compared.
+    count : the number of pixels compared.
     values : the error at each of tolerances.PERCENTILES, in `unit`.
-    tolerances : what is allowed at each of them, at the median pixel, in `unit`.
+    tolerances : the tolerance at each of them, at the median pixel, in `unit`.
     shares : the error at each of them as a share of the tolerance of its own pixel; 1 is the limit.
     """
 
@@ -55,7 +55,8 @@ class PassErrors:
 def measure(name: str, unit: str, errors: Array, one_rounding: Array, floor: Array | float = 0.0) -> PassErrors:
     """Errors against their tolerances.
 
-    errors : (n,) in `unit`, finite. one_rounding : (n,) in `unit`, what one rounding causes at each pixel.
+    errors : (n,) in `unit`, finite.
+    one_rounding : (n,) in `unit`, what one rounding causes at each pixel.
     floor : in `unit`, what storage alone may cause at every percentile; (n,) or one number.
     """
     if not len(errors):
@@ -70,7 +71,7 @@ def measure(name: str, unit: str, errors: Array, one_rounding: Array, floor: Arr
 
 
 def plain(value: float | None, digits: int = 2) -> str:
-    """A few significant digits without powers of ten: 0.000052; 1,700. None : what JSON can't hold."""
+    """A few significant digits without powers of ten: 0.000052; 1,700; ∞ for None, which stands for it in JSON."""
     if value is None or not math.isfinite(value):
         return "∞"
     rounded = float(f"{value:.{digits - 1}e}")

@@ -38,7 +38,7 @@ PERCENTILES = (50.0, 90.0, 99.0, 99.9, 100.0)
 # hundreds of pixels, and more than all roundings where it has a few.
 FILTER_BIAS = 3.505e-6 * 2**0.5
 
-# How many roundings of 2⁻²⁴ · (M + t) a position is off at each of PERCENTILES. The form of s is derived, these factors are
+# The error of a position at each of PERCENTILES, in roundings of 2⁻²⁴ · (M + t). The form of s is derived, these factors are
 # calibrated, on pictures of the renderer under test: half as much again as in the worst of 120 pictures by Cycles of Blender
 # 4.2, 4.5, 5.0 and 5.2 against the tracer, 24 million hits, and twice as much at the maximum. They were views of 0.14° to 170°,
 # up to 8 km from the origin, of smooth and flat meshes, faces of 270 m and text: worst 0.41, 0.94, 1.96, 3.2 and 10, over all
@@ -176,7 +176,8 @@ def radiance_error(value: Array, brightest: Array | float, samples: int) -> Arra
 def slopes(values: NDArray, belongs: NDArray) -> Array:
     """The change of a pass from pixel to pixel: the largest distance to the four neighbors that show the same object.
 
-    values : (height, width, channels). belongs : (height, width), the object of each pixel, negative for none.
+    values : (height, width, channels).
+    belongs : (height, width), the object of each pixel, negative for none.
 
     Returns (height, width) float64, in the pass's unit a pixel.
     """

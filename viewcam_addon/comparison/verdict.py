@@ -24,8 +24,9 @@ class FarFromOrigin:
     seen. With the origin at the eye that would be C′ = |P − e|: the difference is what the distance from the origin costs. What
     a long lens, a slender triangle or a grazing view costs is in neither, and no other origin mends it.
 
-    error : pixels, the median. measured : whether it is that of the picture, or the tolerance where pixels can't be
-    compared. away : how far the eye is from the origin, world units.
+    error : the median error, pixels.
+    measured : true if it was measured in the picture, false if it is the tolerance where pixels can't be compared.
+    away : the eye's distance from the origin, world units.
     """
 
     error: float
@@ -47,7 +48,8 @@ class FarFromOrigin:
 def far_from_origin(pinhole: Pinhole, expected: Seen, compared: NDArray, position: PassErrors) -> FarFromOrigin | None:
     """The cost of the distance from the origin; None unless another origin would mend a visible error.
 
-    expected : the reference's passes, (pixels, channels). compared : (n,), the pixels of `position`.
+    expected : the reference's passes, (pixels, channels).
+    compared : (n,), the pixels of `position`.
     """
     hits = compared if position.count else np.flatnonzero(tolerances.is_hit(expected))
     if not len(hits):
@@ -86,20 +88,22 @@ NOTHING_TO_COMPARE = (
 class GeometryComparison:
     """The comparison of a reference with a test picture.
 
-    pinhole : the camera of the reference. stated : the camera that was asked for, or None.
+    pinhole : the camera of the reference.
+    stated : the camera that was asked for, or None.
     hits : pixels that hit something in (reference, test).
-    rows : one for each measured pass. mismatches : pixels that see another surface.
-    systematic : what is the same for all pixels, None where nothing was compared.
+    rows : one for each measured pass.
+    mismatches : pixels that see another surface.
+    systematic : the error that is the same for all pixels, None where nothing was compared.
     conversion : the camera's own error, None where nobody stated a camera.
     maps : pass name to (height, width) float32, rows from the bottom: the error of each pixel in the unit of the pass's row,
-    nan
-        where it was not compared.
+        nan where it was not compared.
     roundings : (n,) float64, the error of each compared position over what one rounding of float32 causes there.
-    far_from_origin : what the distance from the origin costs, None where that is nothing to speak of.
+    far_from_origin : the error by the distance from the origin, None where it is too small to speak of.
     origin : the point of the world from which the coordinates of both pictures are counted.
-    lacking : passes that only the reference has. in_one_place : pixels that show another of several surfaces in one place,
-    which is as right as the reference's. renderer : who made the test, by name. not_modeled : what of the picture neither
-    side models as it is.
+    lacking : passes that only the reference has.
+    in_one_place : pixels that show another of several surfaces in one place, which is as right as the reference's.
+    renderer : the name of the renderer that made the test picture.
+    not_modeled : the part of the picture that neither side models as it is.
     """
 
     pinhole: Pinhole

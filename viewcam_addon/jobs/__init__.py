@@ -2,11 +2,10 @@
 
 What is to be done
     job                   one picture, to be rendered, labeled or checked, and how: the one record of work, to JSON and back
-    lists                 CSV, JSON and JSON Lines (docs/batch.md) → jobs, by documents, table, rows, problems
+    lists                 CSV, JSON and JSON Lines (docs/batch.md) → jobs, or all that is wrong with them
     makers                jobs by rule: an orbit, frames, cameras
     names                 what a shot, a job of several, may be called: its name is that of its files
     plan                  how several are carried out: where, by which processes, what is kept
-    settings, shards      what a picture was made from; which of many machines makes it
 
 Doing it, many shots of one file, each with a sidecar
     folder                what stands where, and whether a shot is there already

@@ -4,7 +4,7 @@ import argparse
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from .tracing import Tracing, Written
 
 File = str | os.PathLike[str]
 
-_FLAGS = ("strict", "recenter", "clay", "trust")
+_FLAGS = {field.name for field in fields(Job) if field.default is False}
 _WHOLE = ("frame", "samples", "seed", "threads")
 
 
@@ -25,8 +25,10 @@ _WHOLE = ("frame", "samples", "seed", "threads")
 class Check:
     """The result of `check`, or of a comparison of files.
 
-    passed : whether Cycles renders the camera, or the pictures are the same. sentence : by how much. figures : all that --json
-    writes. answer : one of "same", "same_but" (the same, but for objects that are not modeled) and "different".
+    passed : true if Cycles renders the camera, or the pictures are the same.
+    sentence : a sentence that says by how much they differ.
+    figures : all that --json writes.
+    answer : one of "same", "same_but" (the same, but for objects that are not modeled) and "different".
     """
 
     passed: bool
@@ -51,7 +53,7 @@ def check(
     Parameters
     ----------
     blend : the file.
-    words : those of the command line, as "--camera", "Camera": deprecated, give keywords.
+    words : words of the command line, as "--camera", "Camera". Deprecated: give keywords.
     size : (width, height) in pixels, or "320x180"; the scene's where None.
     report : a folder for the HTML page, the scene and all pictures.
     difference : a PNG of what differs.
@@ -96,8 +98,10 @@ def compare(
 ) -> Check:
     """Compare EXRs of one camera, in a process of its own; see tracing.compare_files.
 
-    channels : by pass, or as the command line has them. report : a folder for the HTML page. difference : a PNG.
-    strict : whether pictures that are the same but for what is not modeled fail.
+    channels : the channels' names by pass, or as the command line has them.
+    report : a folder for the HTML page.
+    difference : a PNG.
+    strict : true to fail pictures that are the same but for what is not modeled.
 
     Raises
     ------

@@ -49,7 +49,7 @@ _CLOSED_WITHIN = 10.0
 def opened(scheduler: str | None, workers: int | None, blender: str | None = None) -> Iterator["Cluster"]:
     """A cluster for a batch: that of a scheduler (`tcp://host:port`), or one of `workers` processes of this machine.
 
-    blender : for the latter, the Blender that they run, unless VIEWCAM_BLENDER names one.
+    blender : the Blender that processes of this machine run, unless VIEWCAM_BLENDER names one.
 
     The processes of this machine talk by TLS with credentials that exist in their memory alone, so that nobody else on it can
     have them run anything. Rejected: Unix sockets, which Dask does not have.
@@ -95,7 +95,10 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
 
 
 class Cluster:
-    """Workers that a scheduler knows. threads : for each, unless the command line says."""
+    """Workers that a scheduler knows.
+
+    threads : the number of threads of each, unless the command line says.
+    """
 
     def __init__(self, client: Any, threads: int | None) -> None:
         self._client, self.threads = client, threads
@@ -113,7 +116,8 @@ class Cluster:
     ) -> Work:
         """The work of the workers on one file; the same bytes as one.in_turn's but for `timing`.
 
-        settings : the shots' hashes, by name. made_from : what the file is made from, which must be the same for each worker.
+        settings : the hash of what each shot is made from, by its name.
+        made_from : a record of what the file is made from, which must be the same for each worker.
 
         The work raises InputError if no worker can render any of the shots. If all are lost later, the shots in flight fail
         and no more are taken.

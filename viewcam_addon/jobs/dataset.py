@@ -43,7 +43,10 @@ _NGP_SCALE = 0.33
 
 
 def refuse(shots: Sequence[Job], suffix: str, test: str | None = None) -> None:
-    """Raise InputError for what no dataset could say, before any shot is rendered. suffix, test : as of `write`."""
+    """Raise InputError for what no dataset could say, before any shot is rendered.
+
+    suffix, test : see `write`.
+    """
     colmap.check_names([f"{shot.name}.{suffix}" for shot in shots])
     place = Pinhole((0, 0, 1), (0, 0, 0), (0, 1, 0), 1, 1, 1)
     firsts = {shot.calibration: str(shot.name) for shot in reversed(shots)}
@@ -70,9 +73,10 @@ def check_folder(folder: Folder) -> None:
 def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suffix: str, test: str | None = None) -> str:
     """Write transforms.json and sparse/0 into the folder, each file whole or not at all, if all shots are there.
 
-    shots : all of the list, whose order the dataset has. settings : the hash of what each is made from, by its name.
-    suffix : "png" for the previews as pictures, "exr" for the pictures themselves. test : which pictures are held out, as
-    `--test` says: "8" for every eighth from the first on, or names with * ? [abc].
+    shots : all of the list, whose order the dataset has.
+    settings : the hash of what each is made from, by its name.
+    suffix : "png" for the previews as pictures, "exr" for the pictures themselves.
+    test : the pictures to hold out, as `--test` says: "8" for every eighth from the first on, or names with * ? [abc].
 
     Returns a sentence: that it is written, or which shots are missing.
 

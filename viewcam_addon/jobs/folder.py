@@ -30,9 +30,11 @@ _TEMPORARY = re.compile(r"\.(.+)-[0-9a-f]{8}\.(?:exr|png|json|html|txt|labels)")
 class Outputs:
     """The files that a batch makes of each shot, beside its sidecar.
 
-    picture : EXR and preview. check : whether it is compared with the tracer: of a picture its geometry, else the job's engine
-    at its level. labels : kinds of labels.KINDS. depth_steps : of the labels' 16-bit depth, in a scene unit. report : whether a
-    check without a picture writes its page and a thumbnail.
+    picture : true for EXR and preview.
+    check : true to compare with the tracer: a picture's geometry, else the job's engine at its level.
+    labels : kinds of labels, of labels.KINDS.
+    depth_steps : the steps of the labels' 16-bit depth in a scene unit.
+    report : true if a check without a picture writes its page and a thumbnail.
     """
 
     picture: bool = True
@@ -76,7 +78,8 @@ class Folder:
     def refuse_what_is_in_the_way(self, shots: Iterable[str], outputs: Outputs) -> None:
         """Raise InputError where a folder, or anything else that is no file, has the name of a file that a batch would write.
 
-        shots : their names. outputs : what is made of each.
+        shots : the shots' names.
+        outputs : the files that are made of each.
         """
         endings = ["json", *(("exr", "png") if outputs.picture else ()), *(("html", SIDES["test"]) if outputs.report else ())]
         if outputs.labels:
@@ -93,7 +96,7 @@ class Folder:
     def finished(self, name: str, settings: str, outputs: Outputs | None = None) -> dict[str, Any] | None:
         """The sidecar of the shot, if all that it tells of is there whole and made from these settings, else None.
 
-        outputs : what it must tell of; by default the picture alone.
+        outputs : the files of which it must tell; by default the picture alone.
         """
         outputs, record = outputs or Outputs(), self.record(name)
         try:

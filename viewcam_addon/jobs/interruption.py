@@ -19,10 +19,10 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 class Interruption:
     """Listens while its block runs; in the main thread only, since signals are the main thread's. Elsewhere it does nothing.
 
-    number : of the signal that asked for the end, None so far.
+    number : the number of the signal that asked for the end; None until there is one.
     on_signal : called once, as on_signal(signal="SIGINT"), from another thread.
     passed_on : signals by which one process tells this one of a SIGINT or SIGTERM of its own → which; this one may have had it
-    as well, so that only the second of either way is a second one.
+        as well, so that only the second of either way is a second one.
     """
 
     def __init__(self, on_signal: Callable[..., None], passed_on: Mapping[int, int] = MappingProxyType({})) -> None:

@@ -51,7 +51,11 @@ BESIDE_THEM = ("principal_point", "pixel_aspect", "mirrored")
 
 
 def _option(words: str, default: Any = None, **how: Any) -> Any:
-    """A field that commands have an option for. words : its help. how : more of what argparse's add_argument takes."""
+    """A field that commands have an option for.
+
+    words : the option's help.
+    how : further arguments of argparse's add_argument.
+    """
     return dataclasses.field(default=default, metadata={"help": words, **how})
 
 
@@ -61,23 +65,24 @@ class Job:
 
     Parameters
     ----------
-    name : of its files, without a suffix; a job alone needs none.
-    eye, look_at, up : three floats, world space; d : view-plane distance in pixels, > 0. All four, or `camera`.
+    name : the name of its files, without a suffix; a job alone needs none.
+    eye, look_at, up : three floats, world space;
+    d : view-plane distance in pixels, > 0. All four, or `camera`.
     camera : the name of a camera of the .blend, in place of the four values. Without either it is the scene's own at the frame,
         which markers may bind.
     width, height : pixels of the picture, both or none.
-    frame : whole.
-    engine : one of ENGINES, who renders.
-    samples : a pixel; of a check at a level of light those of all of Cycles' pictures together.
-    level : one of LEVELS, how much the tracer models.
+    frame : the frame, a whole number.
+    engine : the renderer, one of ENGINES.
+    samples : the samples of each pixel; of a check at a level of light, of all of Cycles' pictures together.
+    level : the amount that the tracer models, one of LEVELS.
     principal_point : (c_x, c_y), where the view axis meets the picture, pixels from its left and bottom edge; its middle where
         None.
     pixel_aspect : width of a pixel over its height, from 1/200 to 200.
-    mirrored : whether the picture is. These three go with the four values, `principal_point` with a size as well.
+    mirrored : true to mirror the picture. These three go with the four values, `principal_point` with a size as well.
     blend : the path of the file; the one that is open where None.
-    trust : whether what is in the file may run and write.
-    seed : of all noise.
-    threads : to render and trace with, all where None.
+    trust : true if the file's scripts may run and write.
+    seed : the seed of all noise.
+    threads : the number of threads to render and trace with, all where None.
     calibration : the calibrated camera whose picture is made of this one's, which covers it (`cover` is its view plane), and
         whose labels are traced.
 
@@ -87,9 +92,9 @@ class Job:
     find : a share in percent, "0.5%": the bias that a check at a level of light takes as many samples to find as it needs, on
         both sides (comparison/sequential.py).
     device : one of DEVICES, what Cycles renders on.
-    clay : whether one matte material covers everything, on both sides.
-    recenter : whether both sides see the scene with its origin at the eye.
-    strict : whether anything that is not modeled is an error; of a check, anything in the picture.
+    clay : true to cover everything with one matte material, on both sides.
+    recenter : true to show both sides the scene with its origin at the eye.
+    strict : true to make anything that is not modeled an error; of a check, anything in the picture.
     scene : the path of the scene file that the engine must show, in place of what the .blend holds.
 
     None stands for what the .blend or the command line says.
@@ -177,7 +182,8 @@ class Job:
         optional = [field.name for field in dataclasses.fields(self) if field.metadata]
         for name in (*optional, "level", "samples", "error", "seed"):
             if name in stated:
-                words += [f"--{name}"] if stated[name] is True else [f"--{name}", str(stated[name])]
+                option = f"--{name.replace('_', '-')}"
+                words += [option] if stated[name] is True else [option, str(stated[name])]
         return shlex.join(["check", Path(self.blend or "FILE.blend").name, *words])
 
     def to_json(self) -> dict[str, Any]:
@@ -197,8 +203,8 @@ class Job:
 def conflicts(values: Mapping[str, object], in_list: bool = False) -> list[tuple[tuple[str, ...], str]]:
     """The conflicts among the values of one job: (fields, sentence) of each problem.
 
-    values : what is stated, by field; None where it is wrong already, and no more is to be told of it. in_list : whether it is
-    one of several, which needs a name, and a camera that is not the scene's own.
+    values : the stated values by field; None where one is wrong already, and no more is to be told of it.
+    in_list : true for one of several jobs, which needs a name, and a camera that is not the scene's own.
     """
     result: list[tuple[tuple[str, ...], str]] = []
     if "name" not in values and in_list:

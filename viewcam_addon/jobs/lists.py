@@ -1,10 +1,12 @@
 """Lists of jobs in files: all of them read and checked before the first is rendered.
 
 A reader (`read_table`, `read_document`, `read_lines`) knows the file's syntax and where everything stands; `shots_of` knows
-what a row means. Nothing here knows Blender: what the .blend says, its cameras' names, is handed in.
+what a row means. All that is wrong with a list is gathered, so that it is put right in one go. Nothing here knows Blender: what
+the .blend says, its cameras' names, is handed in.
 """
 
 import codecs
+import contextlib
 import csv
 import difflib
 import json
@@ -19,21 +21,64 @@ from typing import Any, NamedTuple
 from .. import checks
 from ..errors import InputError
 from ..files import read_bytes
+from ..terminal import plain
 from . import names
 from .job import BESIDE_THEM, FIELDS, Job, conflicts
-from .problems import MOST_SHOWN, Problems
 
 VECTORS = ("eye", "look_at", "up")
 LISTS = (*VECTORS, "principal_point")
 TEXTS = ("name", "camera", "engine", "level", "mirrored")
 
-# How each field may be written: as a whole, by another name, in three parts.
+# The forms in which a field may be written: as a whole, by another name, in three parts.
 _PARTS = {vector: tuple(f"{vector}_{axis}" for axis in "xyz") for vector in VECTORS}
 _SPELLINGS = {name: (name, *_PARTS.get(name, ())) for name in FIELDS} | {"d": ("d", "distance")}
 _FIELD_OF = {spelling: name for name, spellings in _SPELLINGS.items() for spelling in spellings}
 
 COLUMNS = tuple(_FIELD_OF)
 """All that a column or a key may be called."""
+
+MOST_SHOWN = 100
+"""The number of problems that are told one by one."""
+
+
+class ShotsError(InputError):
+    """A list of shots that can't be used. The message is the list of problems; `problems` has all, one sentence each."""
+
+    def __init__(self, source: str, problems: tuple[str, ...]) -> None:
+        super().__init__(source, problems)
+        self.source, self.problems = source, problems
+
+    def __str__(self) -> str:
+        count = len(self.problems)
+        lines = [f"{plain(self.source)}: {'one problem' if count == 1 else f'{count} problems'}, nothing is rendered"]
+        lines += [f"  {plain(problem)}" for problem in self.problems[:MOST_SHOWN]]
+        if count > MOST_SHOWN:
+            lines.append(f"  … and {count - MOST_SHOWN} more")
+        return "\n".join(lines)
+
+
+class Problems:
+    """The problems found so far, each sentence once."""
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+        self._sentences: dict[str, None] = {}
+
+    def add(self, sentence: str) -> None:
+        self._sentences[sentence] = None
+
+    @contextlib.contextmanager
+    def caught(self) -> Iterator[None]:
+        """Keep the InputError of the block, and go on after it."""
+        try:
+            yield
+        except InputError as error:
+            self.add(str(error))
+
+    def raise_any(self) -> None:
+        """Raise ShotsError if there are any."""
+        if self._sentences:
+            raise ShotsError(self._source, tuple(self._sentences))
 
 
 class Cell(NamedTuple):
@@ -47,8 +92,11 @@ class Cell(NamedTuple):
 class Row:
     """One row.
 
-    place : "line 17" of a CSV, say. kind : "column" or "key". cells : by column, those that say something. columns : all that
-    the row could have had. excused : fields whose lack is told elsewhere.
+    place : its place in the list, "line 17" of a CSV, say.
+    kind : the word for a field in this list, "column" or "key".
+    cells : the cells that say something, by column.
+    columns : the columns that the row could have had.
+    excused : fields whose lack is told elsewhere.
     """
 
     place: str

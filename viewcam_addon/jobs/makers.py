@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..pinhole import Pinhole
 from . import names
 from .job import Job
-from .problems import Problems
+from .lists import Problems
 
 _MOST = 1_000_000
 _RANGE = re.compile(r"([-+]?\d{1,9})\.\.([-+]?\d{1,9})", re.ASCII)
@@ -22,7 +22,8 @@ _RANGE = re.compile(r"([-+]?\d{1,9})\.\.([-+]?\d{1,9})", re.ASCII)
 class _Made(Sequence[Job]):
     """Shots that are made when they are asked for: of a million views, one of many machines renders a few.
 
-    make : a number → its shot. numbers : those of the shots, in their order.
+    make : a function: a number → its shot.
+    numbers : the shots' numbers, in their order.
     """
 
     def __init__(self, make: Callable[[int], Job], numbers: range) -> None:
@@ -95,7 +96,9 @@ def frames(text: str, camera: str | None = None) -> Sequence[Job]:
 def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> list[Job]:
     """A shot, of the camera's own name, of each camera whose name fits a pattern of *, ? and [abc]; sorted.
 
-    Case counts on every system. spaces : whether the shots' names may have some; else each is an underscore there.
+    Case counts on every system.
+
+    spaces : true to keep spaces in the shots' names; else each becomes an underscore.
 
     Raises
     ------
@@ -169,7 +172,7 @@ def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Job]:
 def calibrated(job: Job, calibration: Calibration, pose: Pinhole | None = None) -> Job:
     """The job of a pinhole in the place of another job's, whose picture covers that of a calibrated camera.
 
-    pose : where it is, of a job whose camera is one of the file and whose values are wanted.
+    pose : the place of the other job's camera, where that is one of the file and the values are wanted.
     """
     cover = calibration.cover
     values: dict[str, Any] = {"calibration": calibration, "width": cover.width, "height": cover.height}

@@ -32,7 +32,9 @@ _DEVICES = {
 
 
 def check(place: str, name: str) -> None:
-    """Refuse a name that can't be one of files. place : what the sentence calls it.
+    """Refuse a name that can't be one of files.
+
+    place : the name's place, as the sentence calls it.
 
     Raises
     ------

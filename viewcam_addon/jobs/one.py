@@ -48,7 +48,8 @@ class Renderer(Protocol):
     def label(self, shot: Job, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
         """Write the labels of the shot that was just rendered beside where its picture would be; the names of their files.
 
-        kinds : of labels.KINDS. depth_steps : of their 16-bit depth, in a scene unit. The same shot gives the same bytes.
+        kinds : kinds of labels, of labels.KINDS.
+        depth_steps : the steps of their 16-bit depth in a scene unit. The same shot gives the same bytes.
         """
         ...
 
@@ -57,9 +58,10 @@ class Renderer(Protocol):
     ) -> dict[str, Any]:
         """Compare a job with the tracer: `passed` (bool), `verdict` (a sentence), and figures.
 
-        has_picture : whether it was just rendered, and camera and geometry of its picture are checked; else the job's engine
-        is, at the job's level, and `result` has all figures. written : files of the comparison. keep : a folder for scene and
-        pictures.
+        has_picture : true to check camera and geometry of the picture that was just rendered; false to check the job's engine
+            at the job's level, where `result` has all figures.
+        written : files of the comparison.
+        keep : a folder for scene and pictures.
         """
         ...
 
@@ -84,8 +86,9 @@ def in_turn(folder: Folder, renderer: Renderer, settings: Mapping[str, str], out
 def render_one(shot: Job, folder: Folder, renderer: Renderer, settings: str, outputs: Outputs) -> dict[str, Any]:
     """Render a shot into the folder; its sidecar, as it was written. `timing` is all in it that differs from run to run.
 
-    settings : the hash of what it is made from. outputs : what of it is wanted. A picture and labels that stand there
-    and were made from the same settings stay: labels may come to a picture that was rendered before, and a picture to labels.
+    settings : the hash of what the shot is made from.
+    outputs : the files that are wanted. A picture and labels that stand there and were made from the same settings stay: labels
+        may come to a picture that was rendered before, and a picture to labels.
 
     Raises
     ------

@@ -23,17 +23,19 @@ class Plan:
 
     Parameters
     ----------
-    out : the folder.
-    outputs : what is made of each job.
-    blend, trust : of the file, as of Job.
-    resume : whether what is there from the same settings is kept; resume_known the same, unless what it was made from can't
-        all be known; overwrite : nothing is kept. With none of them nothing may be there.
+    out : the folder for all files.
+    outputs : the files that are made of each job.
+    blend, trust : the file, see Job.
+    resume : true to keep what is there from the same settings. `resume_known` does so only where all that it was made from is
+        known.
+    overwrite : true to keep nothing. With none of these three, nothing may be there.
     shard : "I/N", every N-th job from the I-th on.
-    transforms : "png" or "exr", the pictures of a dataset that is written of all jobs. test : those that it holds out for
-        tests, as dataset.write has them.
-    time_limit : seconds that a job may take.
-    workers : in so many processes of this machine. scheduler : on a Dask cluster, "" for one of this machine.
-    command : the one that sentences are said of.
+    transforms : the pictures of a dataset that is written of all jobs, "png" or "exr".
+    test : the pictures that the dataset holds out for tests, see dataset.write.
+    time_limit : the seconds that a job may take.
+    workers : the number of processes of this machine to work in.
+    scheduler : the address of a Dask cluster, "" for one of this machine.
+    command : the command that sentences speak of.
     """
 
     out: Path
@@ -70,8 +72,8 @@ class Plan:
 def write(path: Path, jobs: Sequence[Job], plan: Plan | None = None, files: Mapping[str, str] | None = None) -> None:
     """Write what another process is to do.
 
-    plan : how the jobs are carried out. Without it there is one, which is checked, with these files (Written) beside its
-    result, for which `result_of` has the place.
+    plan : the plan of how the jobs are carried out. Without it there is one job, which is checked, with these files (Written)
+        beside its result, for which `result_of` has the place.
 
     Raises
     ------

@@ -33,9 +33,11 @@ ATTEMPTS = 3
 class ServedRenderer:
     """A scene held open by a Blender in another process, which is started when it is first needed. See BlenderRenderer.
 
-    blend : the file. trust : as of Job. program : that of this process, which is no Blender.
-    time_limit : seconds that a shot may take, rendered, labeled and checked, once the file is open. events : whoever is
-    told how far a check is.
+    blend : the file.
+    trust : see Job.
+    program : None, since this process is no Blender.
+    time_limit : the seconds that a shot may take, rendered, labeled and checked, once the file is open.
+    events : receives events that say how far a check is.
 
     Every method raises InputError, also if that Blender can't be started or ends again and again, and OSError where it could
     not write.

@@ -23,8 +23,8 @@ IDLE = 120.0
 def serve(handle: str, opened: Callable[..., Any]) -> None:
     """Answer the ServedRenderer that started this process, until it has gone.
 
-    handle : the last word of this process's command. opened : BlenderRenderer, or what takes its place; called with the file,
-    `trust` and whoever is told events.
+    handle : the last word of this process's command.
+    opened : BlenderRenderer, or what takes its place; called with the file, `trust` and whoever is told events.
     """
     with contextlib.ExitStack() as stack:
         child_process.serve(handle, _Served(stack, opened).answer, IDLE)
@@ -43,7 +43,10 @@ class _Served:
         self._events = _Asker()
 
     def answer(self, request: dict[str, Any], tell: child_process.Tell) -> Any:
-        """request : {what is asked for: its arguments}."""
+        """The answer to one request of the client.
+
+        request : {what is asked for: its arguments}.
+        """
         ((name, arguments),) = request.items()
         self._events.tell = tell
         return _ANSWERS[name](self, **arguments)

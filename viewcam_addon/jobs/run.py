@@ -34,9 +34,12 @@ def run(
 ) -> Summary:
     """Render the shots into the folder; at the end it has a summary and a contact sheet of all of them.
 
-    settings : the hash of what each is made from (folder.settings_hash), by name. work : renders them (one.in_turn, or a
-    cluster's). resume : keep what is there from the same settings; overwrite : keep nothing; with neither there may be none.
-    outputs : what a shot that is done has; by default its picture. interruption : when it is heard, no more shots are begun.
+    settings : the hash of what each is made from (folder.settings_hash), by name.
+    work : a function that renders them (one.in_turn, or a cluster's).
+    resume : true to keep what is there from the same settings.
+    overwrite : true to keep nothing; with neither of them nothing may be there.
+    outputs : the files that a finished shot has; by default its picture.
+    interruption : once it is heard, no more shots are begun.
 
     Tells batch_started(shots, kept, folder), then for each shot_started(shot) and shot_done(shot, seconds, image, passed), or
     shot_failed(shot, error), or shot_elsewhere(shot); batch_finished(done, kept, elsewhere, failed, left, seconds,

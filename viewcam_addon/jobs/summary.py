@@ -49,7 +49,11 @@ class Result:
 
 
 def results(folder: Folder, settings: Mapping[str, str], outputs: Outputs, errors: Mapping[str, str]) -> Iterator[Result]:
-    """Each shot of the list, in its order. settings : hashes, errors : sentences, by the shot's name."""
+    """Each shot of the list, in its order.
+
+    settings : the hash of what each shot is made from, by its name.
+    errors : a sentence for each shot that failed, by its name.
+    """
     for name, made_from in settings.items():
         record = folder.finished(name, made_from, outputs)
         yield Result(name, record, None if record else errors.get(name))
@@ -59,8 +63,12 @@ def results(folder: Folder, settings: Mapping[str, str], outputs: Outputs, error
 class Summary:
     """A batch at its end.
 
-    rendered : how many shots this run rendered; kept : were there already; elsewhere : another batch did meanwhile.
-    seconds : it took. signal : the number of the one that ended it. finished : the time of its end.
+    rendered : the number of shots that this run rendered.
+    kept : the number that were there already.
+    elsewhere : the number that another batch did meanwhile.
+    seconds : the seconds that it took.
+    signal : the number of the signal that ended it.
+    finished : the time of its end.
     """
 
     shots: tuple[Mapping[str, Any], ...]

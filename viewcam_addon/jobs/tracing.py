@@ -44,8 +44,11 @@ SIDES = {"test": "test.png", "reference": "reference.png", "everything": "everyt
 class Written:
     """The files of one comparison beside its result.
 
-    report : the folder of the HTML page. difference : a PNG of what differs. sides : a folder for PNGs of both sides.
-    reference : an EXR of the tracer's picture. command : what the page tells to repeat the comparison.
+    report : the folder of the HTML page.
+    difference : a PNG of what differs.
+    sides : a folder for PNGs of both sides.
+    reference : an EXR of the tracer's picture.
+    command : the command by which the page says that the comparison is repeated.
     """
 
     report: str | None = None
@@ -96,11 +99,12 @@ class Tracing(child_process.ServerOnDemand):
         job : level (none but the levels of film.py), samples, error, find, seed, threads.
         camera, clip, stated : the camera that is said to have taken the picture, what it sees and the four values that it was
             made from, in place of the scene's.
-        ledger : what is told of the scene.
+        ledger : the ledger of the scene.
         written : files beside.
         everything : Cycles' picture with all that is not modeled, where there is any.
-        may_be_empty : whether pictures that show no object are different, and no error.
-        is_first_round : of a job that finds a bias: else the samples are added to those of the calls before.
+        may_be_empty : true to call pictures that show no object different, rather than raise an error.
+        is_first_round : true in the first round of a job that finds a bias; else the samples are added to those of the calls
+            before.
 
         Returns `passed`, `answer`, `sentence` and `not_modeled` as comparison/answer.py has them; `lines` for a terminal;
         `seconds`, how long it was traced; `result`, all that --json has; and `figures`, the few of them that a sidecar keeps:
@@ -137,8 +141,11 @@ class Tracing(child_process.ServerOnDemand):
 
     @staticmethod
     def frame(scene: Path, camera: Pinhole, clip: tuple[float, float]) -> dict[str, Any]:
-        """The frame as the camera sees it. scene : a file; the same path is the same scene. camera, clip : whatever the file's
-        are."""
+        """The frame as the camera sees it.
+
+        scene : a scene file; the same path is the same scene.
+        camera, clip : the camera and the clip range to use, whatever the file's are.
+        """
         return {"scene": str(scene), "camera": dataclasses.asdict(camera), "clip": list(clip)}
 
     def label(
@@ -153,8 +160,9 @@ class Tracing(child_process.ServerOnDemand):
     ) -> list[str]:
         """Write the labels beside a picture (labels.files); the names of the files.
 
-        frames : "here", and of flow "previous" and "next" as well. lens : what bends the picture, whose own plane all cameras
-        have. annotations : as of `label` in labels/scene_labels.py.
+        frames : "here", and of flow "previous" and "next" as well.
+        lens : the lens that bends the picture, whose own view plane all cameras have.
+        annotations : see `label` in labels/scene_labels.py.
 
         Raises
         ------
@@ -193,7 +201,7 @@ def compare_files(
     tests : one, or several of different seeds.
     scene : the reference's scene file: explains silhouettes, brings the ledger.
     threads : all where None.
-    channels : what the tests hold where another program made them: pass → names of channels.
+    channels : the channels of tests that another program made: pass → names of channels.
     written : files beside.
 
     Returns as Tracing.compare does. Raises as api.compare does, and InputError if a file can't be written.
@@ -231,7 +239,11 @@ class _Server:
         self._rounds: Rounds | None = None
 
     def answer(self, request: dict[str, Any], tell: Callable[..., None]) -> Any:
-        """request : {what is asked for: its arguments}. tell : tells an event to whoever asks."""
+        """The answer to one request of the client.
+
+        request : {what is asked for: its arguments}.
+        tell : tells an event to whoever asks.
+        """
         ((name, arguments),) = request.items()
         if name == "label":
             return self._label(**arguments)

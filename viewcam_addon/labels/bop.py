@@ -51,9 +51,11 @@ def write(
 ) -> dict[str, int]:
     """Write a new folder of all pictures' labels, whole or not at all.
 
-    folder : of label files that have depth, masks and amodal masks, and pictures as PNG or JPEG beside them, if there are any.
-    output : must not be there yet, or be empty. progress : is told the share of the pictures that are written.
-    overwrite : whether `output` may be a scene that was written so.
+    folder : a folder of label files that have depth, masks and amodal masks, and pictures as PNG or JPEG beside them, if there
+        are any.
+    output : a folder that is not there yet, or is empty.
+    progress : called with the share of the pictures that are written.
+    overwrite : true if `output` may be a scene that was written so.
 
     Returns how many images, instances and objects there are, and how many of the images have a picture in rgb.
 
@@ -155,7 +157,12 @@ class _Objects:
 
 
 class _Object(NamedTuple):
-    """box : as the label has it. stretch : S. figures : of both, in two rows of nine."""
+    """An object by which instances are told to be of one model.
+
+    box : the bounding box of the label.
+    stretch : the stretch S of the object's matrix.
+    figures : a row of nine figures for the box, and one for the stretch.
+    """
 
     box: dict[str, Any]
     stretch: NDArray

@@ -17,9 +17,13 @@ Document = dict[str, Any]
 
 
 def instances(folder: Path, amodal: bool = False) -> Document:
-    """COCO's instances, as in instances_train2017.json. amodal : masks and boxes of whole objects, not of what is visible.
+    """COCO's instances, as in instances_train2017.json.
 
-    folder : of label files; `file_name` is the picture's that they belong to. Raises InputError as `read_pictures` does.
+    amodal : true for masks and boxes of whole objects, not of what is visible.
+
+    folder : a folder of label files; `file_name` is the name of the picture that they belong to.
+
+    Raises InputError as `read_pictures` does.
     """
     pictures, categories = read_pictures(folder)
     kind, names = "amodal" if amodal else "visible", keypoint_names(pictures)
@@ -60,8 +64,8 @@ def panoptic(folder: Path) -> Document:
         ]
         file_name = files.of_picture(Path(document["picture"]), "instances.png").name
         annotations.append({"image_id": number, "file_name": file_name, "segments_info": segments})
-    things = [{**each, "isthing": 1, "color": _color(each["id"])} for each in _categories(categories)]
-    return {"images": _images(pictures), "annotations": annotations, "categories": things}
+    listed = [{**each, "isthing": 1, "color": _color(each["id"])} for each in _categories(categories)]
+    return {"images": _images(pictures), "annotations": annotations, "categories": listed}
 
 
 def category(instance: Document) -> str:

@@ -33,9 +33,12 @@ PLY = "points3D.ply"
 def write(folder: Path, output: Path, points: int = POINTS, overwrite: bool = False) -> dict[str, int]:
     """Write a new folder of cameras.txt, images.txt, points3D.txt and points3D.ply, whole or not at all.
 
-    folder : of label files that have depth and masks. output : must not be there yet, be empty, or hold a model of cameras
-    alone, as a batch with --transforms writes it. points : how many are sampled in each picture, evenly over what it shows;
-    those that no other picture sees are left out. overwrite : whether `output` may hold a model with points, too.
+    folder : a folder of label files that have depth and masks.
+    output : a folder that is not there yet, is empty, or holds a model of cameras alone, as a batch with --transforms writes
+        it.
+    points : the number of points sampled in each picture, evenly over what it shows; those that no other picture sees are left
+        out.
+    overwrite : true if `output` may hold a model with points, too.
 
     Returns how many images, points and observations there are.
 
@@ -70,8 +73,12 @@ def tracks_of(
 ) -> colmap.Tracks:
     """Points of all pictures that two show at least, and where each shows them.
 
-    pictures : label files that have depth and masks. views : their cameras. points : as of `write`. longest : how many of the
-    pictures that see a point its track has at most, all if None. Raises InputError if one lacks something or can't be read.
+    pictures : label files that have depth and masks.
+    views : their cameras.
+    points : see `write`.
+    longest : the most pictures in a point's track, all that see it if None.
+
+    Raises InputError if one lacks something or can't be read.
     """
     states: dict[str, int] = {}
     pieces, visible = [], []

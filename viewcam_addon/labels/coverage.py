@@ -30,7 +30,9 @@ _MASK = 0xFFFFFFFF
 class Coverage:
     """The coverage of a picture's instances.
 
-    passes : its Cryptomatte layers. names, areas : of each instance, in the layers, and in pixels. header : their attributes.
+    passes : its Cryptomatte layers.
+    names, areas : the name of each instance in the layers, and its area in pixels.
+    header : the layers' attributes.
     """
 
     passes: dict[str, NDArray[np.float32]]
@@ -61,7 +63,10 @@ def coverage(surfaces: Surfaces) -> Coverage:
 
 
 def soft_mask(image: Image, name: str) -> NDArray[np.float32]:
-    """(height, width), rows as the image's: the share of each pixel that an instance covers. name : of its `coverage`."""
+    """(height, width), rows as the image's: the share of each pixel that an instance covers.
+
+    name : the instance's name in `coverage`.
+    """
     mark = _mark(name).view(np.uint32)
     result = np.zeros(image.size[::-1], np.float32)
     for layer in filter(image.passes.__contains__, COVERAGE_PASSES):

@@ -51,8 +51,9 @@ def of_picture(path: Path, ending: str) -> Path:
 def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[Path]:
     """Write the labels of a picture beside it.
 
-    path : the picture's. depth_steps : of the 16-bit PNG, in a scene unit; what is nearer than half a step or farther than
-    65535 of them is 0, as is a pixel that shows nothing.
+    path : the picture's path.
+    depth_steps : the steps of the 16-bit PNG in a scene unit; what is nearer than half a step or farther than 65535 of them is
+        0, as is a pixel that shows nothing.
 
     Returns the files, the JSON last.
 
@@ -83,7 +84,10 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
 
 
 def _content(ending: str, values: NDArray[np.float32], depth_steps: float) -> bytes:
-    """The bytes of one of `FILES`. values : of its pass, rows from the top."""
+    """The bytes of one of `FILES`.
+
+    values : the values of its pass, rows from the top.
+    """
     if ending == "depth.png":
         return encoded(depth_levels(values[..., 0], depth_steps))
     if ending == "instances.png":

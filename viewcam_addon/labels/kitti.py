@@ -38,8 +38,10 @@ _FLOW_STEPS, _NO_FLOW = 64.0, 2.0**15
 def write(folder: Path, output: Path, overwrite: bool = False, words: stereo.Words | None = None) -> dict[str, int]:
     """Write a new folder of what each picture's labels have of depth and forward flow, whole or not at all.
 
-    folder : of label files. output : must not be there yet, or be empty. overwrite : whether it may be what was written so.
-    words : where there are stereo pairs, as for `stereo.pairs`.
+    folder : a folder of label files.
+    output : a folder that is not there yet, or is empty.
+    overwrite : true if `output` may be a folder that was written so.
+    words : the words by which stereo pairs are told, see `stereo.pairs`.
 
     Returns how many pictures have which.
 

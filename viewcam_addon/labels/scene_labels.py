@@ -25,9 +25,10 @@ class Motion:
     """The motion of each pixel's point from one frame to another; nan where nothing is known. Rows from the bottom.
 
     flow : (height, width, 2), pixels to the right and **down**: where the point appears there, less the pixel's center here.
-    displacement : (height, width, 3), world space. hidden : (height, width), whether the other frame's camera does not see the
-    point: something is before it, or it lies beside the picture or beyond the clip. lost : names of objects that are not in the
-    other frame, or have another topology there.
+    displacement : (height, width, 3), world space.
+    hidden : (height, width), whether the other frame's camera does not see the point: something is before it, or it lies beside
+        the picture or beyond the clip.
+    lost : names of objects that are not in the other frame, or have another topology there.
     """
 
     flow: NDArray[np.float64]
@@ -112,9 +113,9 @@ class Labels:
 
     image : the passes that were asked for, rows from the bottom, with the camera; docs/labels.md says what each holds.
     instances : plain JSON values of each instance of which a pixel is shown or, with amodal masks, would be if it stood alone,
-    or with coverage is shown in part.
-    lost : of the other frames, "forward" and "backward": names of visible objects that have no counterpart there.
-    lens : what bends the picture.
+        or with coverage is shown in part.
+    lost : "forward" and "backward", the other frames → names of visible objects that have no counterpart there.
+    lens : the lens that bends the picture.
     """
 
     image: Image
@@ -133,11 +134,14 @@ def label(
     lens: Lens | None = None,
     annotations: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Labels:
-    """The labels of a scene's picture. keepers : of what other scenes share with it. The rest is as in api.label.
+    """The labels of a scene's picture.
 
-    lens : what bends the picture of all frames, whose cameras have its own plane. annotations : by the names of objects their
-    `category`, `keypoints`, which are (x, y, z) in the object's coordinates by their names, and `bones`: of a keypoint's name
-    that of the one which it hangs on.
+    The other parameters are those of api.label.
+
+    keepers : keep what other scenes share with this one.
+    lens : the lens that bends the picture of all frames, whose cameras have its own view plane.
+    annotations : an object's name → its `category`, its `keypoints`, which are (x, y, z) in the object's coordinates by their
+        names, and its `bones`: a keypoint's name → the name of the one that it hangs on.
     """
     if unknown := [kind for kind in kinds if kind not in KINDS]:
         raise InputError(f"there is no label {unknown[0]!r}: give some of {', '.join(KINDS)}")

@@ -51,9 +51,12 @@ _LEVEL = 0.01
 class Pair:
     """Two pictures of one moment, the left one first in each field.
 
-    paths : of the label files. photographs : of the PNG or JPEG of each, if there is one. cameras : with the same axes.
-    baseline : between the eyes, scene units, > 0. disparities : (height, width) each, float64, pixels, rows from the **top**;
-    nan where nothing is. seen_by_both : (height, width) each.
+    paths : the paths of the label files.
+    photographs : the paths of the PNG or JPEG of each, if there is one.
+    cameras : the cameras, which have the same axes.
+    baseline : the distance between the eyes, scene units, > 0.
+    disparities : (height, width) each, float64, pixels, rows from the **top**; nan where nothing is.
+    seen_by_both : (height, width) each, true for pixels whose point the other camera sees, too.
     """
 
     paths: tuple[Path, Path]
@@ -78,7 +81,7 @@ class Pair:
 def pairs(folder: Path, words: Words = WORDS) -> Iterator[Pair]:
     """The stereo pairs of a folder of label files that have depth, in the order of their names.
 
-    words : what a left picture's name has where the right one's has the other; upper and lower case are alike.
+    words : two words: a left picture's name has the first one where the right picture's has the second; case does not count.
 
     Raises
     ------
@@ -136,7 +139,10 @@ def _pair(*pictures: tuple[Path, dict[str, Any]]) -> Pair:
 
 
 def _agree(disparity: NDArray[np.float64], other: NDArray[np.float64], sign: int) -> NDArray[np.bool_]:
-    """True where the other picture's pixel nearest to a point has its disparity. sign : of the step to that picture."""
+    """True where the other picture's pixel nearest to a point has its disparity.
+
+    sign : the sign of the step to that picture.
+    """
     height, width = disparity.shape
     rows, columns = np.indices((height, width))
     with np.errstate(invalid="ignore"):
@@ -149,8 +155,10 @@ def _agree(disparity: NDArray[np.float64], other: NDArray[np.float64], sign: int
 def write(folder: Path, output: Path, overwrite: bool = False, words: Words = WORDS) -> dict[str, int]:
     """Write a new folder with Middlebury's folder of each pair, whole or not at all.
 
-    folder : of label files with depth. output : must not be there yet, or be empty. overwrite : whether it may be what was
-    written so. words : as for `pairs`.
+    folder : a folder of label files with depth.
+    output : a folder that is not there yet, or is empty.
+    overwrite : true if `output` may be a folder that was written so.
+    words : see `pairs`.
 
     Returns how many pairs there are.
 

@@ -40,7 +40,12 @@ EVENLY = 0.7548776662466927, 0.5698402909980532
 
 
 class Sampled(NamedTuple):
-    """Points, each array with as many rows. source : which picture they come from. depth : there. state : as of `planes`."""
+    """Points, each array with as many rows.
+
+    source : the picture that each point comes from.
+    depth : the point's depth in that picture.
+    state : see `planes`.
+    """
 
     positions: Array
     source: NDArray[np.intp]
@@ -54,8 +59,10 @@ def planes(
 ) -> tuple[Array, NDArray[np.int64], NDArray[np.float32]]:
     """(height, width) each, rows from the top: depth; which instance in which state, −1 where nothing is; its id.
 
-    states : of all pictures, numbered as they are met. state_of : the text of an instance's state. Raises InputError if the
-    picture has no depth or masks.
+    states : the states in all pictures, numbered as they are met.
+    state_of : the text of an instance's state.
+
+    Raises InputError if the picture has no depth or masks.
     """
     passes = files.passes(path, document, ("Depth", "Instance"))
     if len(passes) < 2:
@@ -70,7 +77,11 @@ def planes(
 
 
 def positions(view: cameras.Camera, rows: NDArray[np.intp], columns: NDArray[np.intp], depth: Array) -> Array:
-    """The points that pixels' centers show: (..., 3), world space. rows : from the top. depth : along the axis, nan for nan."""
+    """The points that pixels' centers show: (..., 3), world space.
+
+    rows : from the top.
+    depth : along the axis, nan for nan.
+    """
     camera = view.pinhole
     x, y = distortion.view_plane(camera, view.lens, columns + 0.5, camera.height - (rows + 0.5))
     u, v, w = camera.basis()
@@ -82,7 +93,9 @@ def sampled(
 ) -> Sampled:
     """Points of a picture, as many as are asked for if it shows so much, evenly over what it shows.
 
-    number : the picture's. depth, state : as of `planes`. colors : (height, width, 3), rows from the top.
+    number : the picture's number.
+    depth, state : see `planes`.
+    colors : (height, width, 3), rows from the top.
     """
     rows, columns = np.nonzero(state >= 0)
     rank = (columns * EVENLY[0] + rows * EVENLY[1]) % 1.0

@@ -37,8 +37,10 @@ _MOST_IDS = 2**24 - 1
 class Instance:
     """One object in one place.
 
-    key : (object's name, which one of those with this name): the same in every frame. id : a number for masks, 1 … 2²⁴ − 1.
-    placed : the object. matrix, inverse : (4, 4), object space to world space, and back.
+    key : (object's name, which one of those with this name): the same in every frame.
+    id : a number for masks, 1 … 2²⁴ − 1.
+    placed : the object.
+    matrix, inverse : (4, 4), object space to world space, and back.
     """
 
     key: tuple[str, int]
@@ -113,7 +115,10 @@ class Keeper:
 
 
 class Keepers:
-    """The keepers of the last few scenes. most : how many."""
+    """The keepers of the last few scenes.
+
+    most : the number of keepers.
+    """
 
     def __init__(self, most: int = 1, threads: int | None = None) -> None:
         self._most, self._threads = most, threads
@@ -129,12 +134,12 @@ class Keepers:
 class Surfaces:
     """A scene's surfaces at the pixels' centers, which are traced when they are asked for; rows from the bottom.
 
-    depth : (height, width) planar depth z = −w·(P − e), inf where nothing is. instance, primitive : (height, width), −1 there:
-    indices into `instances` and of the geometry's triangles or spheres. passes : those of level `geometry` that were named
-    when it was made, of the same points.
+    depth : (height, width) planar depth z = −w·(P − e), inf where nothing is.
+    instance, primitive : (height, width), −1 there: indices into `instances` and of the geometry's triangles or spheres.
+    passes : passes of level `geometry` at the same points, those that were named when it was made.
 
-    lens : what bends the picture, whose own plane the scene's camera then has; each of its pixels is one ray through the place
-    that the lens shows there.
+    lens : the lens that bends the picture, whose own view plane the scene's camera then has; each of its pixels is one ray
+        through the place that the lens shows there.
     """
 
     def __init__(
@@ -234,8 +239,8 @@ class Surfaces:
     def seen_first(self, points: Array, owners: NDArray[np.int64], primitives: NDArray[np.int64], slack: float) -> NDArray:
         """True where the camera sees points of its scene's surfaces: (n,) bool, False beside the picture and beyond the clip.
 
-        points : (n, 3), world space, each on the primitive of the instance that it is given with. slack : how much nearer than
-        a point, as a share of its depth, its own surface may be found.
+        points : (n, 3), world space, each on the primitive of the instance that it is given with.
+        slack : the distance by which its own surface may be found nearer than a point, as a share of its depth.
         """
         column, row, depth = self.project(points)
         with np.errstate(invalid="ignore"):

@@ -31,8 +31,9 @@ POINTS = 2048
 def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
     """Write the tracks of points that each picture shows, whole or not at all.
 
-    folder : of label files that have depth and masks, their pictures in the order of their names. output : an .npz. points :
-    how many there are, an equal share of each picture, evenly over what it shows; fewer where pictures show less.
+    folder : a folder of label files that have depth and masks, their pictures in the order of their names.
+    output : the .npz to write.
+    points : the number of points, an equal share of each picture, evenly over what it shows; fewer where pictures show less.
 
     Returns how many pictures and points there are, and how often a picture shows one.
 
@@ -73,7 +74,7 @@ def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
         placed = sampled._replace(positions=np.where(known[:, None], there, np.array(view.pinhole.eye)))
         column, row, depth_there = view.pinhole.project(placed.positions)
         places = np.concatenate([np.stack([column, view.pinhole.height - row], axis=-1), there], axis=-1)
-        # What float32 can't hold is nowhere, as what is behind the camera.
+        # A place that float32 can't hold is no place, like one behind the camera.
         valid = valids[number] = known & (depth_there > 0) & (np.abs(places) <= np.finfo(np.float32).max).all(axis=1)
         trajs_2d[number, valid], trajs_3d[number, valid] = places[valid, :2], places[valid, 2:]
         depth, state, _ = surface_points.planes(path, document, states, _state)

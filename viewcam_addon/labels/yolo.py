@@ -23,8 +23,9 @@ _NAMES = ("images", "labels", "data.yaml")
 def write(folder: Path, output: Path, overwrite: bool = False) -> dict[str, int]:
     """Write a new folder of pictures and what they show, whole or not at all.
 
-    folder : of label files with masks, and the PNG or JPEG of each. output : must not be there yet, or be empty. overwrite :
-    whether it may be what was written so.
+    folder : a folder of label files with masks, and the PNG or JPEG of each.
+    output : a folder that is not there yet, or is empty.
+    overwrite : true if `output` may be a folder that was written so.
 
     Returns how many there are.
 

@@ -388,7 +388,8 @@ class CoreScene:
         bottom.
 
         eye, axes : (3,) and (3, 3), where the camera's eye and its right, up and forward are in the scene's world, as they may
-        be in an object's space. window : the first column, the first row, columns and rows.
+            be in an object's space.
+        window : the first column, the first row, columns and rows.
         """
         covered = np.empty((window[3], window[2]), np.bool_)
         described = self._described_camera(camera, clip, eye, axes, window)
@@ -398,7 +399,7 @@ class CoreScene:
     def _described_camera(
         self, camera: Pinhole, clip: tuple[float, float], eye: NDArray, axes: NDArray, window: tuple[int, int, int, int]
     ) -> _Camera:
-        # What lies at the ends of the clip range is visible, and what lies at the ends of a ray is not.
+        # A point at an end of the clip range is visible, and one at an end of a ray is not.
         nearest, farthest = math.nextafter(clip[0], 0.0), math.nextafter(clip[1], math.inf)
         left, low, width, height = window
         described = _Camera(t_min=nearest, t_max=farthest, width=width, height=height, distance=camera.distance)
@@ -508,8 +509,8 @@ class CoreScene:
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """All surfaces at n places in the picture that lie up to `within` times the nearest one's depth beyond it.
 
-        passes : (m, channels) each, of the first place's surfaces, the nearest first, then the next one's. counts : (n,), how
-        many each has, of `surface_counts`.
+        passes : (m, channels) each, of the first place's surfaces, the nearest first, then the next one's.
+        counts : (n,), how many each has, of `surface_counts`.
 
         Returns (m,) objects, −1 where nothing is, and (2, m) how much UV and normal change there with each pixel.
         """
@@ -534,8 +535,8 @@ class CoreScene:
     def closest(self, rays: NDArray, kind: str = "camera", packets: bool = True) -> tuple[NDArray, NDArray, NDArray]:
         """The first hits of n rays: the distances in their directions' lengths, inf where nothing is, objects and primitives.
 
-        kind : of `RAYS`. Objects and primitives are (n,) int64, −1 where nothing is; an object that stands in n places counts
-        as n.
+        kind : the kind of ray, of `RAYS`. Objects and primitives are (n,) int64, −1 where nothing is; an object that stands in
+            n places counts as n.
         """
         rays = array(rays, np.float64, (None, 8))
         t, hits = np.empty(len(rays)), np.empty((2, len(rays)), np.uint32)
@@ -555,7 +556,8 @@ class CoreScene:
         """Rays to lights that leave what n rays meet, rendering space: points and normals (n, 3), t (n,) of the surface
         along rays, starts (n, 3) and lengths (n,) of those to the lights.
 
-        directions : (n, 3), unit. distances : of the lights, which face the rays. nan where nothing is met.
+        directions : the lights' directions, (n, 3), unit.
+        distances : the lights' distances; they face the rays. The results are nan where nothing is met.
         """
         rays = array(rays, np.float64, (None, 8))
         lights, rows = np.ones((len(rays), 5)), np.empty((len(rays), 11))
@@ -692,7 +694,10 @@ def _described_world(world: World, images: Mapping[str, int]) -> _World:
 
 
 def described_lamp(lamp: Lamp, links: _Links = _UNLINKED) -> _Lamp:
-    """A lamp as the core takes it. links : of all the scene's lamps, where this one has such."""
+    """A lamp as the core takes it.
+
+    links : the light links of all the scene's lamps, where this one has such.
+    """
     inputs = [_constant_input(name, value) for name, value in lamp.numbers.items()]
     kind = _Node(lamp.kind.encode(), (_Input * len(inputs))(*inputs), len(inputs))
     described = _Lamp(
@@ -708,7 +713,10 @@ def described_lamp(lamp: Lamp, links: _Links = _UNLINKED) -> _Lamp:
 
 
 def _constant_input(name: str, value: float | bool | str | tuple[float, ...]) -> _Input:
-    """value : of fewer than three numbers those that lack are 0."""
+    """A constant as the core takes an input.
+
+    value : the input's constant; of fewer than three numbers those that lack are 0.
+    """
     if isinstance(value, bool | str):
         return _Input(name.encode(), str(value).lower().encode(), _Color(image=-1, node=-1))
     numbers = value if isinstance(value, tuple) else (value,)

@@ -57,8 +57,10 @@ def barycentric(points: NDArray, corners: NDArray) -> NDArray[np.float64]:
 class Tracer:
     """A scene made ready for tracing from its camera.
 
-    scene : what to trace. threads : how many threads to trace with, all cores if it is None. kept : the tracer of another
-    scene, as a frame before this one, which is used up. Where the same things stand in the same places, hierarchies are kept.
+    scene : the scene to trace.
+    threads : the number of threads to trace with, all cores if it is None.
+    kept : the tracer of another scene, as a frame before this one, which is used up. Where the same things stand in the same
+        places, hierarchies are kept.
 
     No array of a scene may be changed while there is a tracer of it.
     """
@@ -103,7 +105,7 @@ class Tracer:
     ) -> Passes:
         """Render light, and the geometry at the pixel centers: Depth and Object Index.
 
-        error, steps : as in `render`; with an error there is the pass Sample Count, too.
+        error, steps : see `render`; with an error there is the pass Sample Count, too.
         """
         names = LIGHT_PASSES if error is None else (*LIGHT_PASSES, "Sample Count")
         passes = self._blank(lambda shape: _dark(shape, names) | unwritten(shape, CENTERS))
@@ -135,7 +137,7 @@ class Tracer:
         place, in order of the alphabet, with how often; the same one twice where they are faces of one. And those of objects
         that shadow rays see otherwise, and of lamps without shadows, with how often.
 
-        roundings : of float32, how far apart surfaces are in one place.
+        roundings : the number of roundings of float32 by which surfaces in one place may be apart.
         """
         passes = self._blank(lambda shape: _dark(shape, LIGHT_PASSES))
         light = CoreLight(self._core, self._scene, level, samples, seed, None, roundings)
@@ -181,7 +183,7 @@ class Tracer:
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], Passes]:
         """The hits at places in the picture or beside it, as `hits` has those of pixels, in the shape of `columns`.
 
-        columns, rows : of one shape, (height, width), from the picture's left and bottom edge.
+        columns, rows : places, from the picture's left and bottom edge, both (height, width).
         """
         columns, rows = (np.asarray(each, np.float64) for each in (columns, rows))
         depth, objects, primitives = np.empty(columns.shape), *np.empty((2, *columns.shape), np.int64)
@@ -227,7 +229,8 @@ class Tracer:
     def surface_at(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Passes:
         """The surfaces at sample points of pixels.
 
-        columns, rows : pixels from the left and from the bottom; px, py : the sample point in each pixel; broadcast to (n,).
+        columns, rows : pixels from the left and from the bottom.
+        px, py : the sample point in each pixel; broadcast to (n,).
 
         Returns pass name → (n, channels) float32.
         """
@@ -241,7 +244,8 @@ class Tracer:
     ) -> tuple[NDArray[np.int64], NDArray[np.object_], Passes]:
         """All surfaces that lie about where the nearest one does, at sample points of pixels.
 
-        columns, rows, px, py : as of `surface_at`. within : how far beyond the nearest one, in its depth.
+        columns, rows, px, py : see `surface_at`.
+        within : the distance up to which surfaces count, beyond the nearest one, as a share of its depth.
 
         Returns (m,) which of the n sample points each surface is of, ascending, its nearest first; (m,) the objects' names, ""
         where nothing is, which is one, too; and pass name → (m, channels) float32, with "UV Slope" and "Normal Slope" among
@@ -358,12 +362,14 @@ def render(
 ) -> Passes:
     """Trace the scene: pass name → (height, width, channels) float32, rows from the bottom.
 
-    level : one of film.LEVELS. samples : of each pixel, at the levels of light; the only one is at its center.
-    seed : another for other noise. error : the standard error that each pixel's Combined may have, scene-linear: the root of
-    the mean of its channels' variances. Then pixels get as few samples as that takes, `samples` at most; Sample Count tells.
-    keeper : of what this scene may share with others that it has traced, or will.
+    level : one of film.LEVELS.
+    samples : the number of samples of each pixel, at the levels of light; a single one is at its center.
+    seed : any whole number; another one gives other noise.
+    error : the standard error that each pixel's Combined may have, scene-linear: the root of the mean of its channels'
+        variances. Then pixels get as few samples as that takes, `samples` at most; Sample Count tells.
+    keeper : keeps what this scene may share with others that it has traced, or will.
     steps : the numbers of samples, ascending and the last of them `samples`, at which the watcher is shown the whole picture;
-    none to show each band of rows once. The picture has the same bits either way. Not with an error.
+        none to show each band of rows once. The picture has the same bits either way. Not with an error.
 
     Raises
     ------

@@ -37,7 +37,8 @@ class Watcher(Protocol):
 class Progress:
     """A watcher that tells `progress`, with the share of the rows that are done, at each whole percent.
 
-    tell : is told the event's name and fields. rows : how many the picture has.
+    tell : called with the event's name and fields.
+    rows : the number of the picture's rows.
     """
 
     def __init__(self, tell: Callable[..., None], rows: int) -> None:
@@ -60,8 +61,9 @@ def over_threads(
 ) -> Iterator[Tile]:
     """Call `work` with each tile, in some thread and this one's context; the tiles that are done.
 
-    ask : called every so often; what it raises ends the work. give_up : called before what `ask` or `work` raises is raised
-    here, so that those that are under way end soon; this is when they have ended, and the others are not begun.
+    ask : called every so often; what it raises ends the work.
+    give_up : called before what `ask` or `work` raises is raised here, so that those that are under way end soon; this is when
+        they have ended, and the others are not begun.
     """
     with ThreadPoolExecutor(threads) as pool:
         under_way: dict[Future, Tile] = {}

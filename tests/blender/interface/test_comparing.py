@@ -20,7 +20,7 @@ from viewcam_addon.errors import InputError
 
 pytestmark = pytest.mark.slow
 
-# What `viewcam check` tells and leaves behind, in place of it: a process that does so step by step, when it is told to.
+# A process in place of `viewcam check`, which tells and leaves behind the same, step by step, when it is told to.
 STAND_IN = """
 import json, pathlib, sys, time
 PICTURES = ["report/difference.png", "report/test.png", "report/reference.png"]

@@ -17,7 +17,7 @@ from viewcam_addon import cameras, cli
 from viewcam_addon.blender import versions
 from viewcam_addon.blender.jobs import persistent_data, pictures
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
-from viewcam_addon.blender.rendering import exr, graphics
+from viewcam_addon.blender.rendering import exr, rasters
 from viewcam_addon.blender.scenes import depsgraph, export
 from viewcam_addon.cameras import Camera, Options
 from viewcam_addon.errors import InputError
@@ -333,7 +333,7 @@ def test_an_orbit_begins_with_the_picture_that_the_camera_takes_of_a_cropped_bor
             own["rendered"][name] for name in ("width", "height")
         ]
         taken, camera = (Pinhole(**record["camera"]) for record in (asked, own))
-        # What float32 stores of either: 2⁻²⁴ of a hundred pixels and of ten units, a few times over.
+        # Float32's rounding of either: 2⁻²⁴ of a hundred pixels and of ten units, a few times over.
         assert taken.principal_point == pytest.approx(camera.principal_point, abs=1e-4)
         assert taken.distance == pytest.approx(camera.distance, rel=1e-6) and taken.eye == pytest.approx(camera.eye, abs=1e-5)
 
@@ -350,7 +350,7 @@ def test_an_orbit_keeps_what_its_camera_has_beside_the_four_values(stage, shoot,
         own = Pinhole(**shoot(renderer, Job("own", camera="First", width=64, height=36))[0]["camera"])
     assert own.mirrored == (name == "scale") and (own.principal_point == (32, 18)) == (name == "scale")
     for pinhole in taken:
-        # What float32 stores of either: 2⁻²⁴ of a hundred pixels, a few times over.
+        # Float32's rounding of either: 2⁻²⁴ of a hundred pixels, a few times over.
         assert pinhole.principal_point == pytest.approx(own.principal_point, abs=1e-4)
         assert pinhole.distance == pytest.approx(own.distance, rel=1e-6) and pinhole.mirrored == own.mirrored
     assert taken[0].eye == pytest.approx(own.eye, abs=1e-5) and taken[1].eye != pytest.approx(own.eye, abs=1e-2)
@@ -369,7 +369,7 @@ def test_an_orbit_keeps_what_its_camera_has_beside_the_four_values(stage, shoot,
     ],
 )
 def test_what_can_not_be_rendered_is_said_before(stage, monkeypatch, shot, words):
-    monkeypatch.setattr(graphics, "are_there", lambda: False)
+    monkeypatch.setattr(rasters, "can_draw", lambda: False)
     flat = bpy.data.cameras.new("Flat")
     flat.type = "ORTHO"
     stage.collection.objects.link(bpy.data.objects.new("Flat", flat))
@@ -430,7 +430,7 @@ def test_eevee_draws_the_same_whatever_it_drew_before_or_is_refused(stage, shoot
     there, away = replace(LEFT, engine="EEVEE", samples=2), replace(RIGHT, engine="EEVEE", samples=2, frame=9)
     with BlenderRenderer() as renderer:
         problems = renderer.problems([there])
-        if not graphics.are_there():
+        if not rasters.can_draw():
             assert len(problems) == 1
             return
         assert not problems

@@ -220,7 +220,7 @@ def test_the_balls_are_in_the_pictures_where_both_formats_say(stage, batch, tmp_
         hold(cameras, pictures)
 
 
-# What may be wrong with a camera's numbers or with the reading of the pictures: each must be seen.
+# Faults of a camera's numbers or of the reading of the pictures: each must be seen.
 FAULTS = {
     "half a pixel to the right": lambda camera: {"c": (camera.c[0] + 0.5, camera.c[1])},
     "half a pixel downwards": lambda camera: {"c": (camera.c[0], camera.c[1] + 0.5)},

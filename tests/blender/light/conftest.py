@@ -16,7 +16,11 @@ SCENES = 10
 
 @dataclass(frozen=True)
 class Sides:
-    """One scene from both sides. traced : passes. cycles : passes of each picture; all rows from the bottom."""
+    """One scene from both sides.
+
+    traced : passes.
+    cycles : passes of each picture; all rows from the bottom.
+    """
 
     exported: Scene
     traced: dict
@@ -52,8 +56,8 @@ def stage(fresh_blender, scene, camera, add, mesh_from, make_material, set_world
 def pictures(stage, read_passes, tmp_path):
     """pictures(arrange, samples=…, count=…, …) → Sides of ten scenes: `arrange(rng)` changes what the stage has set up.
 
-    samples : of each of Cycles' pictures; count : how many of them, the tracer having the samples of all. The rest is as in
-    Job.
+    samples : the samples of each of Cycles' pictures.
+    count : the number of Cycles' pictures, the tracer having the samples of all. The rest is as in Job.
     """
     from viewcam_addon.blender.jobs import renderer as jobs
     from viewcam_addon.jobs.job import Job
@@ -125,8 +129,10 @@ def strewn(camera, add):
     """strewn(materials, …) → objects, one a material, numbered from 1: a floor of square patches below the camera, strewn so
     that it sees every material at all angles.
 
-    cells : across the floor; width : of it, one unit below the camera. backwards : whether patch i is seen from behind. UV maps
-    are turned, mirrored and sheared, on each patch in its own way.
+    cells : across the floor.
+    width : the floor's width, one unit below the camera.
+    backwards : a function: true if patch i is seen from behind. UV maps are turned, mirrored and sheared, on each patch in its
+        own way.
     """
 
     def make(materials, cells=24, width=4.0, backwards=lambda i: False):

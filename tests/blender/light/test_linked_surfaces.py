@@ -69,7 +69,7 @@ def test_cycles_shows_the_same_of_linked_surfaces(pictures, panel, painted, link
     link(block, **links)
     for name in ("Monkey", "Floor") if mirrors else ():
         bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": 0.0})
-    # What is matte sees another point of the square than the tracer does: an angle of 0.02/50 off, at slopes up to a thousand.
+    # A matte surface sees another point of the square than in the tracer: an angle of 0.02/50 off, at slopes up to a thousand.
     most, p50, p99 = (1e-3, 1e-6, 2e-5) if mirrors else (1e-3, 0.02 / 50, 0.02)
     differs = 0
     for sides in pictures(scenes=3):

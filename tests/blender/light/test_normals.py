@@ -67,7 +67,9 @@ OBJECT = "ShaderNodeTexCoord", "Object"
 
 
 def bump(material, mapped, vector=OBJECT, filter_width=1.0, invert=False, first=None, texture=None, **inputs):
-    """first : of a normal map before. texture : (class, its properties), which makes the height instead of hills."""
+    """first : the normal of a normal map before.
+    texture : (class, its properties), which makes the height instead of hills.
+    """
     tree = material.node_tree
     source = tree.nodes.new(vector[0])
     if vector[0] == "ShaderNodeVertexColor":
@@ -94,7 +96,10 @@ def bump(material, mapped, vector=OBJECT, filter_width=1.0, invert=False, first=
 
 
 def displace(material, mapped, vector=OBJECT, kind="Displacement", space="WORLD", raw=False, height=0.0, **inputs):
-    """Raise hills out of the material, on something as high. raw : by a vector alone."""
+    """Raise hills out of the material, on something as high.
+
+    raw : true to bend by a vector alone.
+    """
     tree = material.node_tree
     source = tree.nodes.new(vector[0])
     higher = tree.nodes.new("ShaderNodeMath")

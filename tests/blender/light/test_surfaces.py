@@ -17,12 +17,12 @@ from viewcam_addon.tracer.scene import Object, Scene, Spheres
 from tests.tracer.core_probes import refracted  # isort: skip
 
 
-# Of the light that the brightest texture reflects. A cosine's rounding is 2e-7 at the 99th percentile (test_delta_lights.py); a
-# texture adds what its UV is off: 1e-5 of the picture's width at most, in textures of a few pixels.
+# Errors, as shares of the light that the brightest texture reflects. A cosine's rounding is 2e-7 at the 99th percentile
+# (test_delta_lights.py); a texture adds what its UV is off: 1e-5 of the picture's width at most, in textures of a few pixels.
 FLAT, TEXTURED = 4e-7, 1e-4
 # Cycles has points as float32, and looks up how much its default surface reflects in a table.
 POINTS = 1e-4
-# What 5.2 rounds the bytes of corners to, once decoded: it is off by as much as half floats are (they pass exactly before).
+# The rounding by 5.2 of the bytes of corners, once decoded: it is off by as much as half floats are (they pass exactly before).
 HALF = 2.0**-12
 
 

@@ -559,8 +559,9 @@ def test_generated_coordinates_of_a_point_cloud_are_named_since_they_do_not_come
 def pointed(scene, camera, add, mesh_from, make_material, set_world, read_passes, tmp_path):
     """pointed() → |tracer − Cycles|, (pixels, 3), of a head that shows how pointed it is, its islands and its edges.
 
-    Its edges are split, so that vertices stand in one place, and one vertex has edges without a face. by : what splits them, a
-    modifier or, until 5.0, Cycles itself where they are sharp.
+    Its edges are split, so that vertices stand in one place, and one vertex has edges without a face.
+
+    by : a modifier that splits them or, until 5.0, Cycles itself where they are sharp.
     """
 
     def show(by="a modifier"):

@@ -94,8 +94,11 @@ def no_traceback(capfd):
 class OddRow:
     """A row of docs/odd-blender.md, and the scene that holds it to its word.
 
-    sticks : whether the pose sticks right after `apply`, later, in the render; None where nothing is said of it.
-    sentences : what the panel says in the end. folder : for files. draw : draws the panels of what is active.
+    sticks : true for each of these moments at which the pose sticks: right after `apply`, later, in the render; None where
+        nothing is said of it.
+    sentences : the panel's sentences in the end.
+    folder : a folder for files.
+    draw : draws the panels of what is active.
     """
 
     sticks: tuple[bool | None, bool | None, bool | None]
@@ -107,7 +110,7 @@ class OddRow:
         """Apply the four values; let `then` happen, four frames pass; render; save and open again. Another file is open then.
 
         Fails unless at each stage the pose sticks or not as the row has it, and the panel says what the row says.
-        reopened : whether that holds of the saved file too.
+        reopened : true if that holds of the saved file too.
         """
         import bpy
 

@@ -21,13 +21,13 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import temporary_settings, versions
 from viewcam_addon.blender.jobs import renderer as jobs
-from viewcam_addon.blender.rendering import cycles, displayed, graphics
+from viewcam_addon.blender.rendering import cycles, displayed, rasters
 from viewcam_addon.blender.scenes import depsgraph
 from viewcam_addon.blender.temporary_settings import numbered_indices, overridden
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs.job import Job
 
-# What describes the settings, what follows from them, and brushes (reading some of them crashes 4.2).
+# Properties that describe the settings or follow from them, and brushes (reading some of them crashes 4.2).
 NO_SETTINGS = {"rna_type", "is_evaluated", "depsgraph", "tool_settings"}
 
 
@@ -455,7 +455,7 @@ sys.exit(main(["compare", traced, test, "--scene", scene]))
 def test_what_an_engine_draws_is_what_the_tracer_sees_or_it_is_refused(engine, ball, scene, tmp_path):
     """EEVEE compiles its shaders for ten seconds where there is no graphics card."""
     is_old = engine == "EEVEE" and bpy.app.version < (5, 0)
-    if is_old or not graphics.are_there():
+    if is_old or not rasters.can_draw():
         with pytest.raises(InputError, match="5.0 or newer" if is_old else "graphics driver"):
             jobs.both_sides(Job(engine=engine), [tmp_path / "test.exr"])
         return
@@ -464,7 +464,7 @@ def test_what_an_engine_draws_is_what_the_tracer_sees_or_it_is_refused(engine, b
 
 
 def test_without_a_driver_there_is_one_sentence_and_no_file(ball, scene, tmp_path, monkeypatch):
-    monkeypatch.setattr(graphics, "are_there", lambda: False)
+    monkeypatch.setattr(rasters, "can_draw", lambda: False)
     with pytest.raises(InputError, match="WORKBENCH needs a graphics driver, and there is none: install one"):
         jobs.both_sides(Job(engine="WORKBENCH"), [tmp_path / "test.exr"])
     assert not list(tmp_path.iterdir())

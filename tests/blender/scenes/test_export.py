@@ -416,7 +416,8 @@ def test_custom_normals_beside_flat_faces(monkey, both_sides):
 def folded(mesh_from, seed, kinds):
     """A crumpled grid with what stops Blender's corner normals in random places.
 
-    kinds : of "sharp edges", "flat faces", "flipped faces", "fins" (edges of three faces), "tips" (faces that share a vertex).
+    kinds : some of "sharp edges", "flat faces", "flipped faces", "fins" (edges of three faces), "tips" (faces that share a
+        vertex).
     """
     draw = np.random.default_rng(seed)
     mesh = mesh_from("grid", x_subdivisions=7, y_subdivisions=7, size=5)

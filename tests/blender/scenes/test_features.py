@@ -569,8 +569,8 @@ def facets(sheet, add, mesh_from):
     return mesh_from("ico_sphere", subdivisions=3, radius=0.05)
 
 
-# How far UV may not be off: of needles thinner than a pixel it changes by a whole map with each pixel, of which a ray's
-# rounding is some ten thousandths.
+# The largest change of UV that is compared: of needles thinner than a pixel it changes by a whole map with each pixel, of which
+# a ray's rounding is some ten thousandths.
 @pytest.mark.parametrize(("kind", "apart"), [(sprinkles, 1e-4), (leaves, 1e-4), (needles, 1e-3), (facets, 1e-4)])
 def test_things_of_a_pixel_are_the_same_picture(both_sides, sheet, add, mesh_from, kind, apart):
     mesh, random = kind(sheet, add, mesh_from), np.random.default_rng(5)

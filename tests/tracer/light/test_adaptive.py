@@ -27,7 +27,7 @@ def floor(make_mesh):
 @pytest.fixture(scope="session")
 def sunny(make_lit, floor, make_spheres):
     """sunny(**light) → Scene: spheres on a floor, under a sun of no size."""
-    things = (
+    bodies = (
         (floor(), sum_of(diffuse=Color((0.6, 0.7, 0.8)))),
         (
             make_spheres([(-1, 0, 0.8), (1, 0.5, 0.6)], [0.8, 0.6]),
@@ -36,7 +36,7 @@ def sunny(make_lit, floor, make_spheres):
     )
 
     def build(**light):
-        return make_lit(light.pop("camera", CAMERA), *things, **{"lamps": (SUN,), **light})
+        return make_lit(light.pop("camera", CAMERA), *bodies, **{"lamps": (SUN,), **light})
 
     return build
 
@@ -59,13 +59,13 @@ def mirrored(make_lit, floor, make_spheres, soft):
     camera = soft.camera
     matrix = np.eye(4)
     matrix[:3, 3] = (0.5, 0, 3)
-    things = (
+    bodies = (
         (floor(), sum_of(diffuse=Color((0.6, 0.7, 0.8)))),
         (make_spheres([(-1, 0, 0.8)], 0.8), sum_of(mirror=Color((0.9,) * 3))),
         (make_spheres([(1, 0.5, 0.6)], 0.6), sum_of(diffuse=Color((0.8, 0.3, 0.2)))),
     )
     lamp = Area("area", matrix=matrix, size=(0.5, 0.5), power=(100,) * 3)
-    return make_lit(camera, *things, lamps=(lamp,), bounces=Bounces(2, 2, 2, 2))
+    return make_lit(camera, *bodies, lamps=(lamp,), bounces=Bounces(2, 2, 2, 2))
 
 
 @pytest.fixture(scope="module")

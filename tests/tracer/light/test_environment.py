@@ -27,8 +27,8 @@ def room():
 
 def light_of(make_lit, make_mesh, surface, world, picture, level="direct", samples=64, camera=DOWN, threads=2):
     floor = make_mesh([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2), (0, 2, 3)])
-    things = [] if surface is None else [(floor, Material(surface=surface))]
-    scene = make_lit(camera, *things, world=world, images={"room": picture}, film=Film("BOX"))
+    bodies = [] if surface is None else [(floor, Material(surface=surface))]
+    scene = make_lit(camera, *bodies, world=world, images={"room": picture}, film=Film("BOX"))
     return render(scene, level, samples, threads=threads)
 
 
@@ -121,7 +121,7 @@ def test_an_encoded_image_of_bytes_is_sampled_as_one_whose_pixels_are_beside_byt
         light_of(make_lit, make_mesh, surface, world, Picture(((levels + off) / 255).astype(np.float32), srgb=True))
         for off in (0.0, 2.0**-9)
     )
-    # Of an encoded level k of 255 the light changes by 2.4/k of a level's change, and at most by 1/12.92 of it for dark ones.
+    # The light of an encoded level k of 255 changes by 2.4/k of a level's change, and at most by 1/12.92 of it for dark ones.
     np.testing.assert_allclose(of_bytes["Combined"], beside["Combined"], rtol=0.02)
     actual = of_bytes["Combined"][..., :3].reshape(-1, 3)
     assert (actual.std(axis=0) < 0.1 * actual.mean(axis=0)).all(), "the window is found"

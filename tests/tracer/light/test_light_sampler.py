@@ -31,8 +31,8 @@ def floor(make_mesh):
 def lit(make_lit, floor):
     """lit(lamp, …, samples=…) → the mean radiance of the floor and its standard error, by the first channel."""
 
-    def measure(*lamps, samples=16, things=(), **light):
-        scene = make_lit(CAMERA, (floor, WHITE), *things, lamps=lamps, film=Film(filter="BOX"), **light)
+    def measure(*lamps, samples=16, bodies=(), **light):
+        scene = make_lit(CAMERA, (floor, WHITE), *bodies, lamps=lamps, film=Film(filter="BOX"), **light)
         passes = {name: values.astype(float) for name, values in render(scene, "direct", samples, 3).items()}
         pixels = passes["Combined"][..., 0]
         return pixels.mean(), np.sqrt(passes["Variance"][..., 0].sum()) / pixels.size
@@ -86,15 +86,15 @@ def test_many_lamps_of_all_kinds_give_the_sum_of_what_each_gives(make_lit, floor
     shining, dark = (square, sum_of(emission=Color((2.0,) * 3))), (square, sum_of(diffuse=Color((0.0,) * 3)))
     lamps = [above(number, random_matrix) for number in range(60)]
 
-    def measure(*lamps, samples, thing=dark):
-        scene = make_lit(CAMERA, (floor, Material(surface=shader)), thing, lamps=lamps, film=Film(filter="BOX"))
+    def measure(*lamps, samples, body=dark):
+        scene = make_lit(CAMERA, (floor, Material(surface=shader)), body, lamps=lamps, film=Film(filter="BOX"))
         passes = {name: values.astype(float) for name, values in render(scene, "direct", samples, 3).items()}
         pixels = passes["Combined"][..., 0]
         return pixels.mean(), np.sqrt(passes["Variance"][..., 0].sum()) / pixels.size
 
-    alone = [measure(lamp, samples=4) for lamp in lamps] + [measure(samples=16, thing=shining)]
+    alone = [measure(lamp, samples=4) for lamp in lamps] + [measure(samples=16, body=shining)]
     expected, known = sum(mean for mean, _ in alone), np.sqrt(sum(error**2 for _, error in alone))
-    mean, error = measure(*lamps, samples=64, thing=shining)
+    mean, error = measure(*lamps, samples=64, body=shining)
     assert error < 0.02 * expected, "that would tell nothing"
     assert abs(mean - expected) <= 4 * np.hypot(error, known), f"{mean:.6g} for {expected:.6g} ± {np.hypot(error, known):.2g}"
 
@@ -159,8 +159,8 @@ def test_shining_surfaces_beside_lamps_are_found_as_often_as_it_takes(lit, make_
     square = make_mesh([(2, -1, 1), (2, 1, 1), (2, 1, 3), (2, -1, 3)], [(0, 2, 1), (0, 3, 2)])
     glow = ((square, sum_of(emission=Color((5.0,) * 3))),)
     lamp = Point("point", position=(-3, 0, 3), power=(50.0,) * 3)
-    (first, first_error), (second, two) = lit(lamp), lit(things=glow, samples=256)
-    mean, error = lit(lamp, things=glow, samples=64)
+    (first, first_error), (second, two) = lit(lamp), lit(bodies=glow, samples=256)
+    mean, error = lit(lamp, bodies=glow, samples=64)
     assert error < 0.02 * mean and abs(mean - first - second) <= 4 * np.sqrt(first_error**2 + two**2 + error**2)
 
 
@@ -179,9 +179,9 @@ def test_what_a_lamp_hides_from_it_does_not_light_and_is_not_seen_by(make_lit, f
     }
     for hidden in (frozenset(), frozenset({kind})):
         lamp = Area("area", matrix=matrix, size=(900, 900), power=(1e6,) * 3, hidden_from=hidden)
-        for ray, (camera, things) in views.items():
+        for ray, (camera, bodies) in views.items():
             seen_lamp = replace(lamp, hidden_from=hidden | {"camera"}) if ray == "transmission" else lamp
-            bright = render(make_lit(camera, *things, lamps=(seen_lamp,)), "path", 1)["Combined"][..., :3].any()
+            bright = render(make_lit(camera, *bodies, lamps=(seen_lamp,)), "path", 1)["Combined"][..., :3].any()
             assert bright == (ray not in hidden), (ray, hidden)
 
 
@@ -191,8 +191,8 @@ def test_a_lamp_without_a_shadow_shines_through_things(lit, make_mesh):
         [(0, 1, 4), (1, 5, 4), (1, 2, 5), (2, 6, 5), (2, 3, 6), (3, 7, 6), (3, 0, 7), (0, 4, 7)],
     )
     lamp = Sun("sun", towards=(1, 0, 0.2), irradiance=(2, 2, 2))
-    free, shut = lit(lamp)[0], lit(lamp, things=((roof, WHITE),))[0]
-    through = lit(replace(lamp, casts_shadow=False), things=((roof, WHITE),))[0]
+    free, shut = lit(lamp)[0], lit(lamp, bodies=((roof, WHITE),))[0]
+    through = lit(replace(lamp, casts_shadow=False), bodies=((roof, WHITE),))[0]
     assert free > 0 and shut == 0 and through == free
 
 

@@ -42,9 +42,9 @@ def halves(square, make_lit):
     """halves(floor, light, screen) → a floor in two halves, a shape that shines behind the eye, and what is between."""
 
     def make(floor=CHROME, light=None, screen=None, camera=DOWN, lit=3.0, **more):
-        things = [(square(-9, 0, -9, 9, 0), floor), (square(0, 9, -9, 9, 0), floor)]
-        things.append((square(-20, 20, -20, 20, 8) if light is None else light, glow(lit)))
-        return make_lit(camera, *things, *([(square(-99, 99, -99, 99, 5), screen)] if screen else ()), **more)
+        bodies = [(square(-9, 0, -9, 9, 0), floor), (square(0, 9, -9, 9, 0), floor)]
+        bodies.append((square(-20, 20, -20, 20, 8) if light is None else light, glow(lit)))
+        return make_lit(camera, *bodies, *([(square(-99, 99, -99, 99, 5), screen)] if screen else ()), **more)
 
     return make
 

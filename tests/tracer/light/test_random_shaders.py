@@ -59,7 +59,10 @@ def random_input(chance, default, depth, is_value):
 
 
 def random_node(chance, kind, depth) -> Node:
-    """A node of a type, each input of which is left out or drawn. depth : of nodes that may feed it."""
+    """A node of a type, each input of which is left out or drawn.
+
+    depth : the depth of the nodes that may feed it.
+    """
     inputs = {}
     for name, default in KINDS[kind].inputs.items():
         if isinstance(default, bool):
@@ -88,15 +91,15 @@ def random_squares(make_mesh, make_lit):
 
     def build(seed):
         chance, numbers = random.Random(seed), np.random.default_rng(seed)
-        things = []
+        bodies = []
         for height, half in ((0.0, 1.0), (0.4, 0.4), (1.2, 0.6)):
             corners = np.array([[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]])
             turn = np.linalg.qr(numbers.normal(size=(3, 3)))[0] if height else np.eye(3)
             uvs = numbers.random((2, 3, 2))
             mesh = make_mesh(corners @ turn + (0, 0, height), [[0, 1, 2], [0, 2, 3]], corner_uvs=uvs)
-            things.append((mesh, Material(random_node(chance, chance.choice(TREES), 3))))
+            bodies.append((mesh, Material(random_node(chance, chance.choice(TREES), 3))))
         world = World((chance.choice([0.0, 0.3]),) * 3)
-        return make_lit(CAMERA, *things, lamps=chance.choice(LAMPS), images=random_images(seed), world=world)
+        return make_lit(CAMERA, *bodies, lamps=chance.choice(LAMPS), images=random_images(seed), world=world)
 
     return build
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 pytestmark = pytest.mark.slow
 
 SEEDS = st.integers(0, 2**63)
-# Of the film, and of each scattering: where on a lamp, and which way.
+# The pairs of dimensions of the film, and of each scattering: where on a lamp, and which way.
 PAIRS = [0, *(FILM + SCATTERING * scattering + within for scattering in (0, 1, 7) for within in (1, 3))]
 ROUNDING = 2.0**-32
 

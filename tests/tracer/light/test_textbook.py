@@ -97,12 +97,12 @@ def traced(make_lit, make_mesh):
     """traced(bounces) → (height, width, 3): the core's means, and their variances."""
 
     def trace(bounces):
-        things = []
+        bodies = []
         for triangles, albedo, emission in THINGS:
             colors = {"diffuse": Color(albedo), **({"emission": Color(emission)} if any(emission) else {})}
-            things.append((make_mesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles))), sum_of(**colors)))
+            bodies.append((make_mesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles))), sum_of(**colors)))
         light = {"lamps": (SUN,), "world": SKY, "film": Film(filter="BOX"), "bounces": Bounces(bounces, bounces, 0, 0)}
-        passes = render(make_lit(CAMERA, *things, **light), "path", 1024, 1)
+        passes = render(make_lit(CAMERA, *bodies, **light), "path", 1024, 1)
         return passes["Combined"][..., :3].astype(float), passes["Variance"].astype(float)
 
     return trace
@@ -120,7 +120,7 @@ def off_by(actual, expected):
 def test_light_is_what_the_textbook_says(traced, bounces):
     each, whole = off_by(traced(bounces), textbook(bounces))
     assert abs(whole) < 4, f"the picture is off by {whole:+.1f} standard errors"
-    # Of 144 normal numbers one exceeds 5 once in 12,000 pictures.
+    # One of 144 normal numbers exceeds 5 once in 12,000 pictures.
     assert np.abs(each).max() < 5, f"a pixel is off by {np.abs(each).max():.1f} standard errors"
 
 

@@ -347,7 +347,7 @@ def test_the_filters_mean_is_the_center_and_its_variance_is_on_paper():
 def test_the_cubics_differ_from_the_filter_by_a_97_000_000th_of_its_mass():
     numbers = np.concatenate([np.arange(1 << 14) * 2.0**-31, np.arange(1 << 5, 1 << 22) * 2.0**-22])
     numbers = numbers[: np.searchsorted(numbers, 0.5, "right")]
-    # What is off in each piece, on both sides; half of it is what would have to be moved.
+    # The error of each piece, on both sides; half of it is what would have to be moved.
     apart = np.abs(np.diff(mass(places(numbers))) - np.diff(numbers)).sum()
     assert apart < 1.1e-8
 

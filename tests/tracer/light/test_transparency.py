@@ -31,8 +31,8 @@ def half(color=(1.0, 1.0, 1.0), share=0.5):
 @pytest.mark.parametrize("level", ["direct", "path"])
 @pytest.mark.parametrize("panes", [0, 1, 3])
 def test_panes_multiply_their_colors_on_the_way_to_the_eye_and_to_the_sun(make_mesh, make_lit, panes, level):
-    things = [(square(make_mesh, 0.5 + number / 4), surface("transparent", color=TINT)) for number in range(panes)]
-    scene = make_lit(DOWN, (square(make_mesh, 0.0), sum_of(diffuse=Color((0.5, 0.5, 0.5)))), *things, lamps=(SUN,))
+    bodies = [(square(make_mesh, 0.5 + number / 4), surface("transparent", color=TINT)) for number in range(panes)]
+    scene = make_lit(DOWN, (square(make_mesh, 0.0), sum_of(diffuse=Color((0.5, 0.5, 0.5)))), *bodies, lamps=(SUN,))
     expected = 0.5 * np.array(TINT) ** (2 * panes)
     rendered = render(scene, level, 2, threads=1)["Combined"][..., :3]
     assert np.abs(rendered - expected).max() <= ROUNDED, (rendered[0, 0], expected)
@@ -40,17 +40,17 @@ def test_panes_multiply_their_colors_on_the_way_to_the_eye_and_to_the_sun(make_m
 
 def test_a_shadow_is_black_where_shadow_rays_do_not_go_through(make_mesh, make_lit):
     pane = Material(surface=node("transparent", color=TINT), transparent_shadow=False)
-    things = (square(make_mesh, 0.0), sum_of(diffuse=Color((0.5, 0.5, 0.5)))), (square(make_mesh, 1.0), pane)
-    assert not render(make_lit(DOWN, *things, lamps=(SUN,)), "path", 2, threads=1)["Combined"][..., :3].any()
+    bodies = (square(make_mesh, 0.0), sum_of(diffuse=Color((0.5, 0.5, 0.5)))), (square(make_mesh, 1.0), pane)
+    assert not render(make_lit(DOWN, *bodies, lamps=(SUN,)), "path", 2, threads=1)["Combined"][..., :3].any()
 
 
 @pytest.mark.parametrize("cycles", [(4, 2), (5, 2)])
 def test_beyond_the_limit_all_is_dark(make_mesh, make_lit, cycles):
     """The last of three panes before a light must not be beyond the limit, as Cycles counts, or one more before 5.0."""
-    things = [(square(make_mesh, 0.5 + number / 4), surface("transparent")) for number in range(3)]
+    bodies = [(square(make_mesh, 0.5 + number / 4), surface("transparent")) for number in range(3)]
     for most in (1, 2, 3):
         glowing = (square(make_mesh, 0.0), sum_of(emission=Color((1, 1, 1))))
-        scene = make_lit(DOWN, glowing, *things, bounces=Bounces(transparent=most), cycles=cycles)
+        scene = make_lit(DOWN, glowing, *bodies, bounces=Bounces(transparent=most), cycles=cycles)
         is_seen = most + (cycles < (5, 0)) >= 3
         assert render(scene, "path", 1, threads=1)["Combined"][..., :3].mean() == is_seen, most
 
@@ -106,16 +106,16 @@ def seen(make_lit, make_mesh):
 
     def trace(surface, gap, first, blocks, slope):
         plane = make_mesh([(-4, -4, 0), (4, -4, 0), (4, 4, 0), (-4, 4, 0)], [(0, 1, 2), (0, 2, 3)])
-        things = [(plane, Material(surface=SURFACES[surface]))]
+        bodies = [(plane, Material(surface=SURFACES[surface]))]
         for number in range(blocks):
             block = cylinder(make_mesh, gap + number * (1.0 + gap), 1.0)
-            things.insert(0 if first == "glass" else len(things), (block, Material(surface=node("glass", ior=1.5))))
+            bodies.insert(0 if first == "glass" else len(bodies), (block, Material(surface=node("glass", ior=1.5))))
         turn = np.array([[1, 0, 0], [0, np.cos(slope), -np.sin(slope)], [0, np.sin(slope), np.cos(slope)]])
-        for thing, _ in things:
-            thing.vertices[:] = thing.vertices @ turn.T + (0.1 if slope else 0.0)
+        for body, _ in bodies:
+            body.vertices[:] = body.vertices @ turn.T + (0.1 if slope else 0.0)
         lamps = (Sun("sun", towards=(0.3, -0.2, 1.0), irradiance=(3.0, 3.0, 3.0), angle=0.5),)
         bounces = Bounces(total=12, diffuse=4, glossy=12, transmission=12)
-        scene = make_lit(CAMERA, *things, lamps=lamps, film=Film("BOX"), bounces=bounces)
+        scene = make_lit(CAMERA, *bodies, lamps=lamps, film=Film("BOX"), bounces=bounces)
         return render(scene, "path", 4, threads=2)["Combined"][..., :3].reshape(-1, 3)
 
     return trace

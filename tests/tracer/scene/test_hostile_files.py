@@ -136,8 +136,8 @@ def test_an_array_that_many_geometries_name_is_read_once(tmp_path, monkeypatch):
     """Else a file of some kilobytes takes gigabytes."""
     monkeypatch.setattr(machine, "most", lambda: 3 * 8 * MEBI)
     np.savez_compressed(tmp_path / "scene.npz", v=np.zeros((8 * MEBI // 24, 3)))
-    it = {"type": "mesh", "vertices": {"npz": "v"}, "triangles": []}
-    (tmp_path / "scene.json").write_text(json.dumps(document(geometries={str(number): it for number in range(100)})))
+    mesh = {"type": "mesh", "vertices": {"npz": "v"}, "triangles": []}
+    (tmp_path / "scene.json").write_text(json.dumps(document(geometries={str(number): mesh for number in range(100)})))
     geometries = scene_file.read(tmp_path / "scene.json").geometries
     assert len({id(geometry.vertices) for geometry in geometries.values()}) == 1
 

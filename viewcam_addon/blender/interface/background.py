@@ -19,9 +19,11 @@ from .operators import NamesCamera
 class Background:
     """One kind.
 
-    running : that on its way, with `poll` (what it came to, None while it runs), `wait` and `cancel`; or None. latest : what
-    the last one came to, or None. seconds : between two looks. looked : is called after each, with what it came to or None, and
-    when it is canceled. discard : is called with what the last one came to before that is forgotten.
+    running : the one on its way, with `poll` (what it came to, None while it runs), `wait` and `cancel`; or None.
+    latest : the last one's result, or None.
+    seconds : the seconds between two looks at it.
+    looked : called after each look, with the result or None, and when it is canceled.
+    discard : called with the last one's result before that is forgotten.
     """
 
     def __init__(self, seconds: float, looked: Callable[[Any], None], discard: Callable[[Any], None] = lambda _: None) -> None:
@@ -105,7 +107,10 @@ class Background:
 
 
 class StartsForCamera(NamesCamera):
-    """An operator that starts one for a camera. busy : what is said while one is on its way."""
+    """An operator that starts one for a camera.
+
+    busy : the sentence for who asks for one while another is on its way.
+    """
 
     background: Background
     busy: str

@@ -41,8 +41,10 @@ def shot(camera_object: bpy.types.Object, scene: bpy.types.Scene, name: str, fra
 class BackgroundBatch:
     """One on its way, from the moment it is made.
 
-    into : where a folder is made for it, named by file, `what` and time. shots : the list. files : what each shot that is done
-    has one of there. outputs : what is made of each shot.
+    into : the folder in which one is made for it, named by file, `what` and time.
+    shots : the list.
+    files : the pattern of names that one file of each finished shot has there.
+    outputs : the files that are made of each shot.
 
     Raises
     ------

@@ -42,8 +42,8 @@ _SHARE_OF_ROUNDING = 2.0
 class _Flight:
     """The flight of a camera.
 
-    live : how it stood at every time, and how far away its look-at point was.
-    at, keys, growth : for each keyframe its place on the curves, the numbers of each channel, and by how much the sensor grew.
+    live : the camera at every time, and the distance of its look-at point.
+    at, keys, growth : each keyframe's place on the curves, numbers of each channel, and growth of the sensor.
     """
 
     camera_object: bpy.types.Object
@@ -59,7 +59,7 @@ class BakedAgreement:
 
     at_keys, between : the largest displacement over corners, edges and center of the picture, at the look-at point's distance,
         in pixels: at the keyframes, and midway between two, at `frame` (nan for a single keyframe).
-    ok : whether what is off at the keyframes is no more than the rounding of both cameras.
+    ok : true if the keyframes are off by no more than the rounding of both cameras.
     """
 
     camera: str

@@ -130,7 +130,7 @@ def read(
 ) -> tuple[list[formats.Camera], list[str]]:
     """The cameras of a file or folder, and what was taken from the scene.
 
-    distance : of the view plane in pixels, where the file says none; 0 for that of the scene's camera.
+    distance : the view plane's distance in pixels, where the file says none; 0 for that of the scene's camera.
 
     Raises
     ------

@@ -52,7 +52,10 @@ class WorldOptions:
     scale: scale()
 
     def chosen(self, **more: Any) -> Options:
-        """The options that are chosen. more : of Options, what the scene says."""
+        """The options that are chosen.
+
+        more : further fields of Options, which the scene decides.
+        """
         return Options(axes=self.axes, scale=float(f"{self.scale:.7g}"), **more)
 
 

@@ -46,11 +46,18 @@ _COMPRESSED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 class Outcome:
     """The outcome of a comparison.
 
-    what : of what it was: camera, frame and level. camera : the camera's name. seen : the camera then, None if it was none.
-    answer : one of comparison/answer.py's, None where there is none. verdict : one sentence. headline : a few words of it.
-    rows : (label, text) of the figures. lacking : (object, sentence) of what is not modeled as it is.
-    folder : that of the report. colors : what those of the difference say. scale : their ends, as difference.write has them.
-    temporary : what `discard` removes.
+    what : a text that names camera, frame and level.
+    camera : the camera's name.
+    seen : the camera as it stood then, None if it was no pinhole.
+    answer : one of comparison/answer.py's, None where there is none.
+    verdict : one sentence.
+    headline : a few words of it.
+    rows : (label, text) of the figures.
+    lacking : (object, sentence) of what is not modeled as it is.
+    folder : the report's folder.
+    colors : the meaning of the difference's colors.
+    scale : the numbers at both ends of these colors, as difference.write has them.
+    temporary : the folder that `discard` removes.
     """
 
     what: str
@@ -98,9 +105,12 @@ class Outcome:
 class RunningComparison:
     """One comparison on its way, from the moment it is made.
 
-    scene : the one of the window. level : one of film.LEVELS, or "auto". find : for light, the bias that is to be found, as of
-    Job. clay : whether one matte material covers everything. keep_in : a folder that gets one for each report, named by file,
-    camera, frame and time; by default the report is gone with Blender.
+    scene : the one of the window.
+    level : one of film.LEVELS, or "auto".
+    find : the bias that is to be found, of a comparison of light; see Job.
+    clay : true to cover everything with one matte material.
+    keep_in : a folder that gets one for each report, named by file, camera, frame and time; by default the report is gone with
+        Blender.
 
     Raises
     ------
@@ -223,7 +233,10 @@ class RunningComparison:
 
 
 def _step(event: Mapping[str, Any], pictures: int) -> tuple[int, str]:
-    """The number of steps before one of them, and what it is called. pictures : of Cycles."""
+    """The number of steps before one of them, and what it is called.
+
+    pictures : the number of Cycles' pictures.
+    """
     if event["name"] == "rendering":
         number = event["number"]
         if number > pictures:
@@ -353,8 +366,8 @@ def start(
 ) -> child_process.ProcessGroup:
     """Start a process that carries out jobs on a copy, in this same Blender.
 
-    log : what it prints, its events among it; the folder of this file has all else that it needs for a while. plan, files : as
-    of plan.write.
+    log : the file for all that it prints, its events among it; all else that it needs for a while lies beside this file.
+    plan, files : see plan.write.
 
     Raises
     ------
@@ -373,7 +386,10 @@ def start(
 
 
 def command(copy: Path, scene: bpy.types.Scene, written: Path) -> list[str]:
-    """The command of that process. written : what it is to do."""
+    """The command of that process.
+
+    written : the file that says what it is to do.
+    """
     if not bpy.app.binary_path:
         return child_process.viewcam("serve", written)
     # The file's own scene is that of its first window. The add-on may be enabled for this session only.

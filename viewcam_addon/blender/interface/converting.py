@@ -55,7 +55,12 @@ def convert_keyframes(camera_object: bpy.types.Object, scene: bpy.types.Scene, f
 
 
 class _Seen:
-    """A camera at a frame. at : its place on the curves. distance : in pixels at 100 %. lens : mm."""
+    """A camera at a frame.
+
+    at : its place on the curves.
+    distance : in pixels at 100 %.
+    lens : mm.
+    """
 
     def __init__(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         self.pinhole = cameras.read(camera_object, scene)

@@ -52,8 +52,9 @@ def moved(pinhole: Pinhole, kind: str, amount: tuple[float, float]) -> Pinhole:
 class Drag:
     """A drag that goes on.
 
-    amount : as `moved` takes it. text : what was typed, which counts instead of the mouse where it is a number; degrees for
-    an orbit. findings : what `camera.apply` said last.
+    amount : the movement so far, as `moved` takes it.
+    text : the typed characters, which count instead of the mouse where they are a number; degrees for an orbit.
+    findings : the last findings of `camera.apply`.
 
     Raises
     ------

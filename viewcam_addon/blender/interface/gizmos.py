@@ -34,7 +34,7 @@ from .kept import state as _state
 _TWEAK = "GIZMOGROUP_OT_gizmo_tweak"
 _LOOKED_AT = 0.01  # seconds between two looks at whether a drag has ended
 _LABELS = {"eye": "Eye", "look_at": "Look-At", "up": "Up"}
-# Which handle the mouse takes where they cover each other: seen from above, up's tip is over the eye.
+# The order in which the mouse takes handles that cover each other: seen from above, up's tip is over the eye.
 _PRIORITY = {"eye": 2000, "look_at": 1000, "up": 0}
 _HALO_WIDTH = 4.0  # pixels
 _DRAWN = [(name, is_halo) for is_halo in (True, False) for name in _LABELS]  # in this order

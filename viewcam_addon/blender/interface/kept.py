@@ -4,11 +4,11 @@ import bpy
 
 from .. import datablocks, storage, versions
 
-# What moving a camera changes besides its values.
+# The properties that moving a camera changes besides its values.
 _CHANNELS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 _LENS = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height", "virtual_pinhole_sensor", "dof.focus_distance")
 
-# These are other looks at the values, and none of their own.
+# Other looks at the values, which are no values of their own.
 _LOOKS = (*datablocks.LOOKS, "field_of_view")
 
 

@@ -26,9 +26,11 @@ from .panel_rows import BelowProperties, BelowSidebar, CameraPanel, InProperties
 
 @dataclass(frozen=True)
 class Notice:
-    """A sentence of warning. remedy : (operator, its button's text) that mends it and nothing else, if there is one.
+    """A sentence of warning.
 
-    is_mended_by_applying : whether setting the camera by its values again brings them together.
+    remedy : (operator, its button's text) that mends it and nothing else, if there is one.
+
+    is_mended_by_applying : true if setting the camera by its values again mends it.
     """
 
     sentence: str

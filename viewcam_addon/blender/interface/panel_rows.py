@@ -71,7 +71,7 @@ def field(
     """A property by its name. Inside a choice, an object or a path there is no room for it, so that it stands above.
 
     The dots for keyframes, which Blender draws beside a column of values alone, stand beside a narrow panel's fields as well.
-    among : what has the names to choose from, and its collection of them.
+    among : the owner of the names to choose from, and the name of its collection of them.
     """
     described = owner.bl_rna.properties[name]
     text = described.name if text is None else text
@@ -102,7 +102,8 @@ def point(
 ) -> None:
     """A point's three numbers, and beside them below its name what it may follow; in a narrow panel one below the other.
 
-    is_free : whether the numbers can be edited. followers : (property, name, `among` of `field`) of each.
+    is_free : true if the numbers can be edited.
+    followers : (property, name, `among` as of `field`) of each thing that it may follow.
     """
     if not column.use_property_split:
         rows = column.column()
@@ -164,7 +165,7 @@ def described(
 ) -> bpy.types.UILayout:
     """A label and what it describes, never translated; the row of these, below the label where they don't fit beside it.
 
-    share : of the width, the label's.
+    share : the label's share of the width.
     """
     room = (1.0 - share) * (_width(context) - _BESIDE_TEXT) / max(len(texts), 1)
     if is_narrow(context) or (len(texts) > 1 and not all(readouts.fits(text, room) for text in texts)):

@@ -49,11 +49,19 @@ _drawn = None  # what the viewport shows of the match that goes on
 class Drawing:
     """The drawing on a picture.
 
-    like : the camera as it was, whose picture it is. kind : EDGES, RECTANGLE or POINTS. axes : of the rectangle's sides.
-    sides : their lengths. origin : of the rectangle, world space. places : of the points, world space.
-    ends : pixels, two an edge, or one a corner or point. along : the axis of each edge. axis : of the next. exact : the largest
-    error of what is drawn, pixels of the picture. is_lens_known : it stays as it was. is_principal_point_free : edges say where
-    it is. length : world units, of the first edge, which begins at the origin then; 0 where that is not known.
+    like : the camera as it was, whose picture it is.
+    kind : EDGES, RECTANGLE or POINTS.
+    axes : the axes along which the rectangle's sides run.
+    sides : the lengths of the rectangle's sides.
+    origin : the rectangle's first corner, world space.
+    places : the points' places in world space.
+    ends : pixels, two an edge, or one a corner or point.
+    along : the axis of each edge.
+    axis : the axis of the next edge.
+    exact : the largest error of what is drawn, pixels of the picture.
+    is_lens_known : true to keep the lens as it was.
+    is_principal_point_free : true to find it from edges.
+    length : world units, of the first edge, which begins at the origin then; 0 where that is not known.
     """
 
     like: Pinhole

@@ -45,8 +45,9 @@ _loaded: Outcome | None = None
 def composed(sides: Mapping[str, NDArray[np.float32]], view: str, swipe: float = 0.5) -> NDArray[np.float32]:
     """The picture of a view.
 
-    sides : "cycles", "tracer", "difference" and, where there is more, "everything", (height, width, 4) of one size. view : one
-    of VIEWS. swipe : where the line is, from 0 at the left to 1.
+    sides : "cycles", "tracer", "difference" and, where there is more, "everything", (height, width, 4) of one size.
+    view : one of VIEWS.
+    swipe : the place of the line, from 0 at the left to 1.
     """
     picture = _pictures_in(view, sides)
     if view == "SWIPE":
@@ -72,7 +73,10 @@ def labels(view: str, sides: Collection[str]) -> list[str]:
 
 
 def begins(number: int, count: int, width: int) -> float:
-    """The beginning of one of several pictures side by side, from 0 to 1. width : of all together, pixels."""
+    """The beginning of one of several pictures side by side, from 0 to 1.
+
+    width : the width of all together, pixels.
+    """
     return number * (width + _GAP) / (count * width)
 
 

@@ -13,7 +13,11 @@ _CHARACTER = 6.8  # pixels, in the mean of a panel's text
 
 
 class Readout(NamedTuple):
-    """A row. texts : one text, or three for the vectors. exact : what is copied, with all digits and without units."""
+    """A row.
+
+    texts : one text, or three for the vectors.
+    exact : the text that is copied, with all digits and without units.
+    """
 
     label: str
     texts: tuple[str, ...]
@@ -23,8 +27,9 @@ class Readout(NamedTuple):
 def readouts(camera: Pinhole, lens: float, distance: float, to_look_at: tuple[str, float] | None) -> list[Readout]:
     """The camera as Blender has it.
 
-    lens : mm. distance : pixels of the picture at 100 %. to_look_at : with its unit, and in world units; None where no look-at
-    point is stated.
+    lens : mm.
+    distance : pixels of the picture at 100 %.
+    to_look_at : with its unit, and in world units; None where no look-at point is stated.
     """
     rows = [
         Readout("Focal Length", (f"{lens:.6g} mm",), repr(lens)),

@@ -50,7 +50,8 @@ void main() {
 class _Swipe:
     """A swipe over one viewport.
 
-    at : the line, from 0 at the left to 1. is_held : whether it is dragged.
+    at : the line's place, from 0 at the left to 1.
+    is_held : true while it is dragged.
     """
 
     def __init__(self, area: bpy.types.Area, scene: bpy.types.Scene) -> None:
@@ -119,7 +120,7 @@ class _Swipe:
         import gpu
         from gpu_extras.batch import batch_for_shader
 
-        # What the viewport shows must not be seen through what the reference does not.
+        # The viewport's picture must not be seen where the reference shows nothing.
         gradients = bpy.context.preferences.themes[0].view_3d.space.gradients
         proof_image.fill(0, 0, line, height, (*gradients.high_gradient, 1.0))
         across = line / self.region.width

@@ -48,7 +48,8 @@ _AS_THE_SCENE_STANDS: dict[str, Any] = {"width": None, "height": None, "principa
 class Checker:
     """Checks jobs of one file after another; a context manager.
 
-    tracing : the process that traces and compares. events : whoever is told how far it is.
+    tracing : the process that traces and compares.
+    events : whoever is told how far it is.
 
     The file must stay as it is between two checks but for cameras and what jobs say.
     """
@@ -68,8 +69,9 @@ class Checker:
     ) -> dict[str, Any]:
         """Compare what Cycles renders through a camera, as the scene stands, with what `pinhole` sees.
 
-        pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from. Of the scene's
-        own camera Blender chooses once more which that is: a picture of another one is a difference.
+        pinhole : the camera of the picture, as its sidecar has it.
+        stated : the four values it was made from. Of the scene's own camera Blender chooses once more which that is: a picture
+            of another one is a difference.
 
         Returns `passed`, `answer`, `verdict`, `not_modeled` and `figures` as Tracing.compare has them, and in `ledger` what
         both sides leave out or replace, a sentence for each of the first few.
@@ -111,8 +113,9 @@ class Checker:
     ) -> dict[str, Any]:
         """Compare what the job's engine renders, as the scene stands, with what the tracer makes of the scene at a level.
 
-        notes : sentences of the file as a whole, for the ledger. written : files beside the result. keep : a folder for scene
-        and pictures: scene.json, cycles.exr or another engine's, of several with numbers.
+        notes : sentences of the file as a whole, for the ledger.
+        written : files beside the result.
+        keep : a folder for scene and pictures: scene.json, cycles.exr or another engine's, of several with numbers.
 
         Returns as `check_picture` does, and `result`, all that --json has, `lines` for a terminal, `level`,
         with `reason` where it was chosen, and the `seconds` of both sides.
@@ -179,7 +182,8 @@ class Checker:
     def both_sides(self, stage: Stage, job: Job, paths: Sequence[Path], everything: Path | None = None) -> Scene:
         """The scene for the tracer, and the engine's pictures at these paths, from one state of the file.
 
-        everything : as of Stage.render, written where there is any such thing. A recentered scene has none of it.
+        everything : a path for the picture with everything, see Stage.render; written where there is more to be seen. A
+            recentered scene has none of it.
         """
 
         exported = stage.export()
@@ -197,7 +201,11 @@ class Checker:
         stage.render(job, paths, lighting, rendering, keep=True, everything=everything if has_more else None)
 
     def _forecast(self, undecided: dict[str, Any], taken: int, latest: int, seconds: float) -> None:
-        """Tell how much longer a search for a bias takes. taken : samples so far. latest, seconds : of the last round."""
+        """Tell how much longer a search for a bias takes.
+
+        taken : the number of samples so far.
+        latest, seconds : the samples and the seconds of the last round.
+        """
         if self._events:
             left = seconds * (undecided["expected"] - taken) / latest
             following = undecided["following"]
@@ -213,7 +221,10 @@ class Checker:
 
 
 def _round(job: Job, number: int, samples: int) -> Job:
-    """A round of the search for a bias, of seeds of its own; of any other job itself. samples : of this round."""
+    """A round of the search for a bias, of seeds of its own; of any other job itself.
+
+    samples : the number of samples of this round.
+    """
     if job.find is None:
         return job
     return dataclasses.replace(job, samples=samples, seed=((job.seed or 0) + number * seeds(LEVELS[-1], samples)) % 2**31)

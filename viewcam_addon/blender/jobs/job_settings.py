@@ -40,9 +40,11 @@ def engine_name(engine: str) -> str:
 
 
 class JobSettings:
-    """A scene while a batch has it. warnings : a sentence for each thing that is another in a render by itself.
+    """A scene while a batch has it.
 
-    off : what is off because the file is not trusted (opening.py).
+    warnings : a sentence for each thing that is another in a render by itself.
+
+    off : sentences for what is off because the file is not trusted (opening.py).
     """
 
     def __init__(self, overrides: Overrides, scene: bpy.types.Scene, off: Iterable[str] = ()) -> None:
@@ -120,7 +122,10 @@ class JobSettings:
         return camera_object.name if camera_object else None
 
     def look_through(self, camera_object: bpy.types.Object, is_scenes: bool = False) -> None:
-        """Make it the camera that renders. is_scenes : whether it is the scene's own, so that markers have their say."""
+        """Make it the camera that renders.
+
+        is_scenes : true for the scene's own camera, which markers may change.
+        """
         self._bind_markers(is_scenes)
         if self._scene.camera != camera_object:
             self._scene.camera = camera_object
@@ -171,7 +176,7 @@ class JobSettings:
     def rendered(self, by_engine: bool = True) -> dict[str, object]:
         """The settings of the scene, as a sidecar says them; None where the engine has no such thing.
 
-        by_engine : whether there is a picture, of which the engine knows more.
+        by_engine : true if there is a picture, of which the engine knows more.
         """
         scene, engine = self._scene, self._scene.render.engine
         samples, seed = _samples(scene).get(engine), _seeds(scene).get(engine)

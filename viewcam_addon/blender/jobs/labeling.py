@@ -47,8 +47,9 @@ class ShotLabels:
     ) -> list[str]:
         """Write the labels of what a camera sees, as the scene stands, beside a picture; the names of the files.
 
-        pinhole : the camera that took the picture. kinds, depth_steps : as in Renderer.label. job : by which
-        the camera stands still, of four values, or not.
+        pinhole : the camera that took the picture.
+        kinds, depth_steps : see Renderer.label.
+        job : the job; a camera of four values stands still.
 
         Raises
         ------

@@ -13,7 +13,7 @@ from ...jobs.job import Job
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, versions
-from ..rendering import graphics
+from ..rendering import rasters
 from .job_settings import JobSettings, engine_name
 
 _DRAWN = (versions.EEVEE, "BLENDER_WORKBENCH")
@@ -26,14 +26,18 @@ def obstacles(
     own: Callable[[], bpy.types.Object],
     settings: JobSettings,
 ) -> Iterator[str]:
-    """One sentence for each obstacle. outputs : what is wanted of each shot. own : gives the camera for the four values."""
+    """One sentence for each obstacle.
+
+    outputs : the files that are wanted of each shot.
+    own : a function that gives the camera for the four values.
+    """
     if not any(layer.use for layer in scene.view_layers):
         yield f"scene {scene.name!r} renders nothing: all of its view layers are off, let one render"
     engines = sorted({settings.engine_of(shot) for shot in shots}) if outputs.picture else []
     if ("CYCLES" in engines or outputs.check) and not hasattr(scene, "cycles"):
         yield "Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences"
     for engine in engines:
-        if engine in _DRAWN and not graphics.are_there():
+        if engine in _DRAWN and not rasters.can_draw():
             needs = f"{engine_name(engine)} draws with a GPU, and Blender can't open one here"
             yield f"{needs}: choose CYCLES or VIEWCAM, or start a display"
     needs_tracer = outputs.check or outputs.labels or any(shot.calibration for shot in shots)

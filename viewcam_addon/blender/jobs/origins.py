@@ -33,7 +33,7 @@ _MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 _TILE = re.compile(r"<(UDIM|UVTILE)>")
 _LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 _NO_FILE = "missing"
-# What is hashed at most: four caches of 25,000 frames in a folder, and of all files what takes some minutes.
+# The most that is hashed: four caches of 25,000 frames in a folder, and of all files what takes some minutes.
 _MOST_FILES = 100_000
 _MOST_BYTES = 256 * 2**30
 
@@ -238,7 +238,8 @@ def _imports() -> Iterator[tuple[str, str]]:
 def _imports_in(tree: bpy.types.NodeTree, outer: Any) -> Iterator[tuple[bpy.types.Node, str | None]]:
     """Each node of the tree that reads a file, and its path, None where that can't be known.
 
-    outer : what gives the tree its inputs, a modifier, or (the group's node, what gives that one's tree its inputs).
+    outer : the giver of the tree's inputs: a modifier, or (the group's node, the giver of the inputs of the tree that this one
+        is in).
     """
     for node in tree.nodes:
         if node.bl_idname.startswith("GeometryNodeImport"):

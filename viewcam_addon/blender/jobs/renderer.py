@@ -48,8 +48,9 @@ _NAME = "viewcam batch"
 class BlenderRenderer:
     """Renders and checks jobs of one .blend (jobs.one.Renderer); a context manager.
 
-    blend : the file, or None for the one that is open. trust : whether what is in the file may run and write (opening.py); its
-    File Output nodes never write. events : whoever is told how far a check is.
+    blend : the file, or None for the one that is open.
+    trust : true if the file's scripts may run and write (opening.py); its File Output nodes never write.
+    events : receives events that say how far a check is.
 
     Raises
     ------
@@ -101,8 +102,8 @@ class BlenderRenderer:
     def pinhole(self, name: str | None, size: tuple[int, int] | None = None, frame: int | None = None) -> Pinhole:
         """A camera of the file as it stands at a frame, with a look-at point as people choose it.
 
-        name : the scene's own at the frame where None. size, frame : the file's where None. A border counts for nothing: the
-        pinhole is that of the whole picture.
+        name : the scene's own at the frame where None.
+        size, frame : the file's where None. A border counts for nothing: the pinhole is that of the whole picture.
 
         Raises
         ------
@@ -190,8 +191,9 @@ class BlenderRenderer:
     ) -> dict[str, Any]:
         """Compare a job with the tracer (checking.py).
 
-        has_picture : whether it was just rendered, and camera and geometry of its picture are checked; else the job's engine
-        is, at the job's level. written, keep : of the latter, as in Checker.check.
+        has_picture : true to check camera and geometry of the picture that was just rendered; false to check the job's engine
+            at the job's level.
+        written, keep : see Checker.check; for the latter only.
 
         Raises
         ------

@@ -23,7 +23,11 @@ _THINGS = [each.name for each in fields(Scene) if each.name not in ("camera", "s
 
 @dataclass(frozen=True, eq=False)
 class Export:
-    """state : of Blender, when the scene was exported. ledger : what it found, with the remedies for Cycles."""
+    """An exported scene, as long as Blender's state is the same.
+
+    state : Blender's state when the scene was exported.
+    ledger : the export's ledger, with the remedies for Cycles.
+    """
 
     state: tuple
     scene: Scene
@@ -31,7 +35,9 @@ class Export:
 
 
 class SceneFiles:
-    """Scenes of one file, the last few of them kept; a context manager. most : how many.
+    """Scenes of one file, the last few of them kept; a context manager.
+
+    most : the number of scenes to keep.
 
     The file must stay as it is between two exports but for cameras and what shots say.
     """

@@ -30,10 +30,10 @@ class Stage:
     Parameters
     ----------
     camera : the one that is seen through.
-    is_chosen : whether Blender is told so; else it chooses its own once more, and one that it is not is a difference.
-    level : what is modeled, never "auto".
-    ledger : of what is on this stage.
-    origin, names, file_ledger : of the file that a recentered stage stands for (recentering.py).
+    is_chosen : true to make it Blender's camera; else Blender chooses its own once more, and another one is a difference.
+    level : the level at which it is modeled, never "auto".
+    ledger : the ledger of what is on this stage.
+    origin, names, file_ledger : the file's origin, names and ledger, of a recentered stage (recentering.py).
     """
 
     scene: bpy.types.Scene
@@ -77,10 +77,12 @@ class Stage:
     ) -> None:
         """Write the pictures of the job's engine.
 
-        paths : of several, which share the samples; their seeds count from that of the job. light : as exported, of a stage
-        that is lit. rendering : is told of each, by its number from 1 on, before it is rendered. keep : as of cycles.render.
-        everything : for one more picture of Cycles, like the first but with all that has a stand-in, or is left out, in the
-        others.
+        paths : the files of the pictures. Several share the samples, and their seeds count from the job's.
+        light : the exported light, of a stage that is lit.
+        rendering : called with the number of each picture, from 1 on, before it is rendered.
+        keep : see cycles.render.
+        everything : a file for one more picture of Cycles, like the first but with all that has a stand-in, or is left out, in
+            the others.
         """
         camera = self.camera if self.is_chosen or self.file_ledger else None
         share = max((job.samples or SAMPLES) // len(paths), 1)
@@ -109,7 +111,8 @@ def staged(
 ) -> Iterator[Stage]:
     """Give the scene as a job's comparison wants it.
 
-    notes : sentences of the file as a whole, for the ledger. whole : whether a border that does not crop counts for nothing.
+    notes : sentences of the file as a whole, for the ledger.
+    whole : true to ignore a border that does not crop.
     """
     layer, ledger = rendered_layer(scene), Ledger()
     for sentence in notes:

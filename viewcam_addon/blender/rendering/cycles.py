@@ -60,7 +60,7 @@ _LIGHT = {
     "use_guiding": False,
     "film_transparent_glass": False,
 }
-# What the tracer has no choice about, and a picture with everything in it has as the scene does.
+# Settings that the tracer has no choice about; a picture with everything in it has the scene's.
 _LIGHT_OF_SURFACES = {"volume_bounces": 0, "caustics_reflective": True, "caustics_refractive": True}
 
 
@@ -89,10 +89,13 @@ def render(
 ) -> None:
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
 
-    camera_object : the one that Blender chooses itself, as markers bind it, where None. remedies : what to take out for the
-        time of the render (ledger.py). threads : all by default. light : for a picture of light in place of the passes of
-        geometry. keep : whether Cycles keeps what it has built, for the next render. everything : with hair, volumes and
-        whatever else the tracer does not model. lasting : of all renders that share what remedies make.
+    camera_object : the camera; where None, the one that Blender chooses itself, as markers bind it.
+    remedies : the changes that take out what is not modeled, for the time of the render (ledger.py).
+    threads : the number of threads, all by default.
+    light : the settings of a picture of light; None for the passes of geometry.
+    keep : true to let Cycles keep what it has built, for the next render.
+    everything : true to show hair, volumes and whatever else the tracer does not model.
+    lasting : the overrides of all renders that share what remedies make.
 
     Raises
     ------
@@ -139,7 +142,10 @@ def override_settings(
     light: LightSettings | None = None,
     everything: bool = False,
 ) -> None:
-    """All settings but the file's; benchmarks render without one. light, everything : as of `render`."""
+    """All settings but the file's; benchmarks render without one.
+
+    light, everything : see `render`.
+    """
     overrides.set(scene.render, "engine", "CYCLES")
     override_all(overrides, scene.cycles, _SAMPLING)
     passes = GEOMETRY_PASSES

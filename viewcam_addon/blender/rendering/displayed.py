@@ -16,7 +16,7 @@ from .cycles import override_whole
 def write_png(scene: bpy.types.Scene, path: Path) -> None:
     """Write a PNG beside an array of NumPy, of the same name, and remove the array.
 
-    path : of the array, (height, width, 3) float32, scene linear, rows from the bottom.
+    path : the array's file, (height, width, 3) float32, scene linear, rows from the bottom.
 
     Raises
     ------
@@ -28,7 +28,10 @@ def write_png(scene: bpy.types.Scene, path: Path) -> None:
 
 
 def displayed(scene: bpy.types.Scene, light: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Light as the scene displays it, (height, width, 4), in steps of 1/255. light : as of `write_png`."""
+    """Light as the scene displays it, (height, width, 4), in steps of 1/255.
+
+    light : an array like that of `write_png`.
+    """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "displayed.png")
         _write(scene, light, path)

@@ -89,7 +89,7 @@ def bands(
     can't ask for Escape before a band is finished.
 
     is_canceled : asked in the caller's thread. When it says so, or when the caller takes no more, tracing ends at once.
-    keeper, steps : as in tracer.render.render; with steps, all rows come again at each.
+    keeper, steps : see tracer.render.render; with steps, all rows come again at each.
 
     Raises
     ------

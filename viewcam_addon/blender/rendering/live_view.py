@@ -44,8 +44,10 @@ _SECONDS = 1 / 60  # between two looks whether there is another picture
 class LiveView:
     """The picture of one viewport.
 
-    picture : (height, width, 4) float32, scene linear, rows from the bottom; None until there is one. number : of the picture,
-    which counts them. samples : of light that it has, 0 where it shows surfaces. message : why there is none.
+    picture : (height, width, 4) float32, scene linear, rows from the bottom; None until there is one.
+    number : the picture's number, which grows with each.
+    samples : the number of samples of light that it has, 0 where it shows surfaces.
+    message : a sentence that says why there is none.
     """
 
     _all: ClassVar[WeakSet["LiveView"]] = WeakSet()
@@ -98,7 +100,10 @@ class LiveView:
         return self.message or (f"{self.samples} samples" if self.samples else "Surfaces")
 
     def show(self, scene: Scene, level: str, samples: int) -> None:
-        """Begin with another picture. samples : of light, at most."""
+        """Begin with another picture.
+
+        samples : the most samples of light.
+        """
         with self._asked:
             self._next, self._is_at_work = (scene, level, samples), True
             self._asked.notify()

@@ -52,8 +52,10 @@ def random_per_island(edges: NDArray[np.int32], count: int) -> NDArray[np.float3
 def pointiness(places: NDArray[np.float32], normals: NDArray[np.float32], edges: NDArray[np.int32]) -> NDArray[np.float32]:
     """(n,) of each vertex how pointed the surface is there: ½ where it is flat, more where it is convex.
 
-    The angle between the normal and the mean way along the edges that leave, in half turns; then its
-    mean with the neighbors'. Vertices in one place are one. places, normals : (n, 3). edges : (m, 2).
+    The angle between the normal and the mean way along the edges that leave, in half turns; then its mean with the neighbors'.
+    Vertices in one place are one.
+    places, normals : (n, 3).
+    edges : (m, 2).
     """
     count, same = len(places), _welded(places)
     ends = same[edges]

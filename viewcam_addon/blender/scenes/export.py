@@ -39,10 +39,13 @@ Matrix = NDArray[np.float64]
 class Surface:
     """A visible surface that stands in the world once or many times; two that are equal are one.
 
-    is_mesh : or a point cloud. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, one or
-    more; used : the indices of those that are seen. hidden_from : the kinds of rays that don't see it.
-    color : with its alpha; of instances that of what places them. receivers, blockers : of its light, as of Object, where it
-    shines.
+    is_mesh : true for a mesh, false for a point cloud.
+    key : a key that all surfaces have in common that share a geometry in Cycles.
+    slots : the materials, evaluated, one or more.
+    used : the indices of those that are seen.
+    hidden_from : the kinds of rays that don't see it.
+    color : the object's color with its alpha; for an instance, the color of what places it.
+    receivers, blockers : the receivers and blockers of its light where it shines, see Object.
     """
 
     name: str
@@ -91,8 +94,8 @@ def export_scene(
 ) -> Scene:
     """The scene as a render of this view layer through this camera sees it, at the scene's current frame.
 
-    ledger : notes what could not come; afterwards it holds the remedies for Cycles' side. lit : whether materials, lamps,
-    world, film and bounces come along, for the levels above geometry.
+    ledger : receives what could not come; afterwards it holds the remedies for Cycles' side.
+    lit : true to bring along materials, lamps, world, film and bounces, for the levels above geometry.
 
     Raises
     ------
@@ -141,7 +144,8 @@ def light_in(
 ) -> Lighting:
     """The light of a depsgraph, and how it becomes a picture.
 
-    images : receives the world's and the lamps'. render : as in world_of.
+    images : receives the images of world and lamps.
+    render : see world_of.
     """
     scene = depsgraph.scene
     bounces = film.bounces_of(scene, ledger)
@@ -156,12 +160,17 @@ def light_in(
 
 
 def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False) -> Scene:
-    """The scene in the depsgraph that a render engine is given. lit : as in `export_scene`."""
+    """The scene in the depsgraph that a render engine is given.
+
+    lit : see `export_scene`.
+    """
     return _scene(depsgraph, _view_in(depsgraph, camera_object), ledger, lit)
 
 
 def scene_through(depsgraph: bpy.types.Depsgraph, camera: Pinhole, clip: tuple[float, float], lit: bool = False) -> Scene:
-    """The scene in a depsgraph, through a camera that no object of it is, as a viewport's. lit : as in `export_scene`.
+    """The scene in a depsgraph, through a camera that no object of it is, as a viewport's.
+
+    lit : see `export_scene`.
 
     A viewport waits for it, and nothing is compared: doubles are not sought, which takes a quarter of the time.
     """
@@ -300,7 +309,8 @@ def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) ->
 class Placement(NamedTuple):
     """The placement of a surface: where it is drawn.
 
-    matrices : (n, 4, 4), to world space, one for each instance. random : (n,), or None where no material asks for it.
+    matrices : (n, 4, 4), to world space, one for each instance.
+    random : (n,), or None where no material asks for it.
     """
 
     source: Surface
@@ -316,8 +326,8 @@ def placements(
 ) -> list[Placement]:
     """Each surface that the camera may see.
 
-    shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface. read : is
-    called with each surface as it is met first, and the object or instance that shows it, which is gone afterwards.
+    shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface.
+    read : is called with each surface as it is met first, and the object or instance that shows it, which is gone afterwards.
     """
     matrices = export_geometry.read(depsgraph.object_instances, "matrix_world", np.float32, 16)
     rows: dict[Surface, list[int]] = {}

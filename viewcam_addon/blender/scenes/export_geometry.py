@@ -45,9 +45,9 @@ Array = NDArray[Any]
 def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colors: bool = False, attributes: Collection[str] = ()) -> Mesh:
     """The triangles of an evaluated mesh, object space; of one that `is_split`, once it has been.
 
-    slot_count : the object's material slots, which material indices are clamped to. has_colors : whether to bring along the
-    color attribute that is active for rendering, black where there is none. attributes : those to bring along by name, as in
-    `Mesh`; of those that the mesh has not, nothing comes.
+    slot_count : the number of the object's material slots, which material indices are clamped to.
+    has_colors : true to bring along the color attribute that is active for rendering, black where there is none.
+    attributes : the names of attributes to bring along, see `Mesh`; of those that the mesh has not, nothing comes.
     """
     mesh.calc_loop_triangles()
     vertices = read(mesh.vertices, "co", np.float32, 3).astype(np.float64)

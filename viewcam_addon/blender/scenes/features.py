@@ -53,8 +53,9 @@ def note_render(
 class Placed(NamedTuple):
     """An object in the depsgraph, each of the three evaluated.
 
-    evaluated : what is placed, and its data. real : the object in the file that it comes from. parent : what places it; for an
-    object that is no instance all three are the same.
+    evaluated : the placed object, and its data.
+    real : the object in the file that it comes from.
+    parent : the object that places it; for an object that is no instance all three are the same.
     """
 
     evaluated: bpy.types.Object
@@ -110,7 +111,11 @@ def note_object(
     ledger: Ledger,
     shading: Shading | None,
 ) -> None:
-    """Note what a visible surface is beyond its geometry. slots : its materials; used : the indices of those that are seen."""
+    """Note what a visible surface is beyond its geometry.
+
+    slots : its materials.
+    used : the indices of the materials that are seen.
+    """
     evaluated, real, parent = placed
     name = placed.name
     if parent.holdout_get(view_layer=depsgraph.view_layer_eval):

@@ -64,7 +64,10 @@ def is_multiplied(image: bpy.types.Image) -> bool:
 
 
 def picture_of(image: bpy.types.Image, alpha: bool = False) -> Picture:
-    """An image without an obstacle. alpha : whether it is to have its alpha, without an obstacle either."""
+    """An image without an obstacle.
+
+    alpha : true to read its alpha too, which has no obstacle either.
+    """
     srgb = image.colorspace_settings.name == "sRGB"
     if image.is_float and srgb:
         # Blender has decoded them. Cycles reads a file for itself; what Blender hands it stays as it is.
@@ -85,7 +88,7 @@ def picture_of(image: bpy.types.Image, alpha: bool = False) -> Picture:
 def image_of(picture: Picture, name: str, overrides: Overrides, packed: bool = True) -> bpy.types.Image:
     """An image with these pixels until the overrides end: bytes where they are encoded, floats where they are linear.
 
-    packed : whether it is to be saved with the file.
+    packed : true to save it with the file.
 
     All renders of `overrides.lasting` share one. A Cycles that keeps its data tells images by their address, and shows the
     pixels of one that is gone where another one lies at its address.

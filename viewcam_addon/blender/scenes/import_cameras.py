@@ -46,7 +46,12 @@ _OF_DATA = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height")
 
 @dataclass(frozen=True)
 class ImportedCameras:
-    """objects : the new cameras. pictures : how many have theirs as background. notes : sentences for a reader, each once."""
+    """The result of `import_cameras`.
+
+    objects : the new cameras.
+    pictures : the number of cameras that have their picture as background.
+    notes : sentences for a reader, each once.
+    """
 
     objects: tuple[bpy.types.Object, ...]
     pictures: int
@@ -63,9 +68,10 @@ def import_cameras(
 ) -> ImportedCameras:
     """Add cameras to a scene.
 
-    name : of the collection. folder : where the file stands, whose pictures become backgrounds; None for none.
-    set_size : whether the scene gets the size of the first one. as_flight : one camera with a keyframe for each, at its time,
-    or one a frame where the file says no times.
+    name : the collection's name.
+    folder : the file's folder, whose pictures become backgrounds; None for none.
+    set_size : true to give the scene the size of the first one.
+    as_flight : true to make one camera with a keyframe for each, at its time, or one a frame where the file says no times.
 
     Raises
     ------

@@ -35,8 +35,9 @@ _SHEAR = 1e-5
 class _Kind:
     """One of Blender's lights as a lamp of the tracer.
 
-    lamp : what it is there. settings : of its numbers → Blender's property. size : the property that is above 0 where it has a
-    size.
+    lamp : the tracer's lamp.
+    settings : name of one of its numbers → Blender's property.
+    size : the property that is above 0 where it has a size.
     """
 
     lamp: type[Lamp]
@@ -284,7 +285,7 @@ def _times(rgb: RGB, factor: float) -> RGB:
 
 
 _BLACK = (0.0, 0.0, 0.0)
-# What says something else of a light than of a surface, or nothing.
+# Nodes that say something else of a light than of a surface, or nothing.
 _OF_SURFACES = {
     *("ATTRIBUTE", "VERTEX_COLOR", "CAMERA", "TANGENT", "BUMP", "NORMAL_MAP", "OBJECT_INFO", "VECT_TRANSFORM", "WIREFRAME"),
 }
@@ -299,7 +300,8 @@ class _LampReader(shaders.Tree):
     A lamp of the tracer has no space of its own: what Blender's nodes say in a light's is computed from places and directions
     of the world, as Cycles has them (shader_setup_from_sample, and the files of intern/cycles/kernel/light).
 
-    matrix : (4, 4), the light's space to the world's. uv : makes what its UV is.
+    matrix : (4, 4), the light's space to the world's.
+    uv : a function that makes its UV.
     """
 
     def __init__(self, light: bpy.types.Light, matrix: np.ndarray, uv: UVMaker) -> None:

@@ -34,13 +34,19 @@ class Ledger:
         self._findings.setdefault(name, {})[reason] = status
 
     def set_for_cycles(self, owner: bpy.types.bpy_struct, attribute: str, value: object, stands_in: bool = True) -> None:
-        """The remedy is a property of an original datablock. stands_in : whether it changes what is in the picture."""
+        """The remedy is a property of an original datablock.
+
+        stands_in : true if it shows a stand-in, which a picture with everything goes without.
+        """
         self._remedy((owner.as_pointer(), attribute), lambda overrides: overrides.set(owner, attribute, value), stands_in)
 
     def call_for_cycles(
         self, owner: bpy.types.bpy_struct, remedy: Callable[..., None], *arguments: object, stands_in: bool = True
     ) -> None:
-        """The remedy is a function (overrides, owner, *arguments). stands_in : whether it changes what is in the picture."""
+        """The remedy is a function (overrides, owner, *arguments).
+
+        stands_in : true if it shows a stand-in, which a picture with everything goes without.
+        """
         key = owner.as_pointer(), remedy.__name__
         self._remedy(key, lambda overrides: remedy(overrides, owner, *arguments), stands_in)
 
@@ -83,5 +89,5 @@ class Ledger:
 
     def _status(self, name: str, statuses: set[str]) -> str:
         worst = max(statuses, key=_WORSE.index, default="exported")
-        # What is there in part is approximated.
+        # An object that is there in part is approximated.
         return "approximated" if worst == "skipped" and name in self._placed else worst

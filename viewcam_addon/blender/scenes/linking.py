@@ -43,7 +43,7 @@ class Links:
     def of(self, placed: Placed, ledger: Ledger, is_found: bool) -> tuple[_Names, _Names]:
         """The names of a light's receivers and of its blockers, whether or not they are surfaces; None is all.
 
-        is_found : whether scattered rays run into it.
+        is_found : true if scattered rays run into the light.
         """
         block = placed.real.original
         if not is_linked(block):

@@ -126,7 +126,7 @@ def circular_links(tree: bpy.types.NodeTree) -> list[bpy.types.NodeLink]:
 def leave_out_circles(tree: bpy.types.NodeTree | None, ledger: Ledger, name: str, whose: str) -> None:
     """Note for the object of this name that links of a tree go in a circle, and take them out of Cycles' render.
 
-    whose : how the clause begins that says so.
+    whose : the beginning of the clause that says so.
     """
     if versions.CIRCLES_ARE_BLACK and tree and circular_links(tree):
         ledger.note(name, "approximated", f"{whose} links that go in a circle, which are left out on both sides")
@@ -176,7 +176,11 @@ class Adder:
         self.values: dict[object, bpy.types.Node] = {}
 
     def add(self, kind: str, *linked: bpy.types.NodeSocket, **values: object) -> bpy.types.Node:
-        """A node of this class. linked : outputs for its first inputs. values : of its inputs, by name."""
+        """A node of this class.
+
+        linked : the outputs to link to its first inputs.
+        values : the values of its inputs, by name.
+        """
         node = self._tree.nodes.new(kind)
         self._added.append(node)
         for number, socket in enumerate(linked):

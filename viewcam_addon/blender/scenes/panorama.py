@@ -25,8 +25,9 @@ _SAME_SIZE = 0.02  # of a disc's angle: what a circle of so many pixels may tell
 def main(library: str, name: str, out: str, width: str, frame: str, subframe: str) -> None:
     """Render the world of this name in a .blend to an npz of what the camera sees and of what lights.
 
-    `seen`, `light` : (width / 2, width, 3) float32, rows from the bottom. `seen_suns`, `light_suns` : (n, 7) of each disc its
-    direction, its irradiance on what faces it, and its angle, radians; zeros where there is none.
+    `seen`, `light` : (width / 2, width, 3) float32, rows from the bottom.
+    `seen_suns`, `light_suns` : (n, 7) of each disc its direction, its irradiance on what faces it, and its angle, radians;
+        zeros where there is none.
     """
     scene = bpy.context.scene
     with bpy.data.libraries.load(library) as (_, wanted):

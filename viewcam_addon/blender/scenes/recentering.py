@@ -56,7 +56,7 @@ _PLACES = {("object_info", "location"), ("object_info", "random"), ("geometry", 
 
 _UNLINKED = "light linking is off on both sides"  # it does not come along
 
-# What of the render settings makes the picture's frame.
+# The render settings that make the picture's frame.
 _FRAME = (
     "resolution_x",
     "resolution_y",
@@ -76,7 +76,8 @@ _FRAME = (
 class Recentered:
     """A scene to render in place of the file's.
 
-    origin : the file's point that is the origin here: the eye. names : object here → the object in the file that it shows.
+    origin : the file's point that is the origin here: the eye.
+    names : object here → the object in the file that it shows.
     """
 
     scene: bpy.types.Scene
@@ -87,7 +88,11 @@ class Recentered:
 
 @dataclass(frozen=True, eq=False)
 class _Copy:
-    """A geometry of the file, moved. points : (n, 3) float32, as the file has them. anchor : (3,), what was taken off them."""
+    """A geometry of the file, moved.
+
+    points : (n, 3) float32, as the file has them.
+    anchor : (3,), what was taken off them.
+    """
 
     data: Geometry
     points: NDArray[np.float32]
@@ -96,7 +101,11 @@ class _Copy:
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Something in the file, once. data : what is shown. matrix : (4, 4), of `data` relative to the eye."""
+    """Something in the file, once.
+
+    data : the datablock that is shown.
+    matrix : (4, 4), of `data` relative to the eye.
+    """
 
     name: str
     data: bpy.types.ID
@@ -108,7 +117,11 @@ class _Placed:
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """The file's camera. actual : the pinhole to render; claimed : what it is said to be. Both in the file's world space."""
+    """The file's camera.
+
+    actual : the pinhole to render.
+    claimed : the pinhole that it is said to be. Both are in the file's world space.
+    """
 
     actual: Pinhole
     claimed: Pinhole
@@ -123,8 +136,8 @@ def recentered(
 ) -> Iterator[Recentered]:
     """Give what a render of this view layer shows, as a scene whose origin is the eye; it is gone at the end of the block.
 
-    ledger : notes what could not come, as `export.survey` does. lit : whether what only other rays than the camera's see comes
-        along, for the levels above geometry.
+    ledger : receives what could not come, see `export.survey`.
+    lit : true to bring along what only other rays than the camera's see, for the levels above geometry.
 
     Raises
     ------
@@ -151,7 +164,9 @@ def recentered(
 def as_in_file(objects: Iterable[Object], names: Mapping[str, str]) -> tuple[Object, ...]:
     """The objects of an exported `Recentered` as the file's own export has them: by their names there, instances as one object.
 
-    Here each place has an object of its own, and so a name of its own, that the exporter keeps apart. names : of `Recentered`.
+    Here each place has an object of its own, and so a name of its own, that the exporter keeps apart.
+
+    names : see `Recentered`.
     """
     result: dict[tuple, list[Object]] = {}
     for placed in (replace(each, name=names[each.name]) for each in objects):

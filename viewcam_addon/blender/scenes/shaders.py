@@ -29,7 +29,7 @@ from .nodes import Input, Output
 
 RGB = tuple[float, float, float]
 
-# What counts only where one of these is not 0, by their names.
+# Inputs that count only where one of these others is not 0.
 _GLOSS = ("Metallic", "Transmission Weight", "Specular IOR Level")
 _ONLY_WITH: dict[str, dict[str, tuple[str, ...]]] = {
     "glossy": dict.fromkeys(("Anisotropy", "Rotation", "Tangent"), ("Roughness",)),
@@ -45,14 +45,14 @@ _CLEAR_OR_MIRRORS = ("glossy", "glass", "refraction")  # without roughness, what
 _WHITE, _ZERO = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 _RAMP = 256  # Cycles looks ramps up in a table of one more
 _BESIDE = 1e-6  # of a pixel: where a step lies is the pixel's that it leads to
-# What Cycles makes of a mesh's edges, as attributes that can be asked for by name, too.
+# Values that Cycles computes of a mesh's edges; as attributes they can be asked for by name, too.
 _OF_EDGES = {
     ("NEW_GEOMETRY", "Pointiness"): cycles_attributes.POINTINESS,
     ("NEW_GEOMETRY", "Random Per Island"): cycles_attributes.RANDOM_PER_ISLAND,
 }
-# What Light Path says alike of rays that meet a light and of those that are sent to it.
+# Outputs of Light Path that are alike for rays that meet a light and for those that are sent to it.
 _SURE_OF_PATHS = ("Is Camera Ray", "Is Shadow Ray", "Ray Length")
-# What Cycles does not ask for a little beside a point, or in each version in another way.
+# Nodes that Cycles does not ask for a little beside a point, or in each version in another way.
 _FIXED = {
     *("CAMERA", "NORMAL_MAP", "BUMP", "TANGENT"),
     *(("TEX_COORD", output) for output in ("Normal", "Reflection", "Window")),
@@ -62,7 +62,7 @@ _FIXED = {
 _LUMINANCE = (0.2126390, 0.7151687, 0.0721923)
 
 
-# What Cycles takes for another shader on a surface, and for none.
+# Shaders that Cycles takes for another one on a surface, and for none.
 _AS = {"BACKGROUND": "EMISSION"}
 _VOLUMES = ("VOLUME_ABSORPTION", "VOLUME_SCATTER", "VOLUME_COEFFICIENTS", "PRINCIPLED_VOLUME")
 # Nodes that feed one another in a row. One of them may become two of the tracer's, which may be more (shader_nodes.MOST_DEEP).
@@ -74,8 +74,8 @@ class Reading:
     """A Blender material as the tracer has it.
 
     images : key in `Color.image` → the image.
-    texts : of IES files, where nodes are made that show them.
-    reasons : why it is approximated, one clause each, about the material.
+    texts : the texts of IES files, where nodes are made that show them.
+    reasons : clauses about the material that say why it is approximated.
     """
 
     material: Material = PLAIN
@@ -150,7 +150,8 @@ def _viewport_color(material: bpy.types.Material) -> Color:
 class Tree:
     """Follows the nodes to a tree of shader nodes, and gathers what they ask for.
 
-    viewport : what stands in for a color that is not modeled. shines : whether it gives off light.
+    viewport : the color that stands in for one that is not modeled.
+    shines : true if the material gives off light.
     """
 
     def __init__(self, viewport: Color, shines: bool = False) -> None:
@@ -669,7 +670,7 @@ def _constant(of: Input) -> object:
     if isinstance(source, Output) and images.shows_nothing(source.node):
         return images.MISSING[3] if source.socket.name == "Alpha" else images.MISSING[:3]
     if isinstance(source, Output) and source.node.type == "LIGHT_FALLOFF" and source.socket.name == "Quadratic":
-        # As light falls off of itself.
+        # Light that falls off as it does of itself.
         return _constant(source.input("Strength")) if _constant(source.input("Smooth")) == 0 else None
     if isinstance(source, Output) and source.node.type not in ("RGB", "VALUE"):
         return None

@@ -14,7 +14,10 @@ _DEFAULT = "Cycles' default surface"
 
 
 def add_pictures(reading: shaders.Reading, alphas: set[str], to: dict[str, Picture]) -> None:
-    """Read the images of a material, or a light, that are not there yet. alphas : of which the alpha is asked for."""
+    """Read the images of a material, or a light, that are not there yet.
+
+    alphas : the keys of the images whose alpha is asked for.
+    """
     to |= reading.tables
     for key, image in reading.images.items():
         if key not in to or (key in alphas and to[key].shape[2] < 4):

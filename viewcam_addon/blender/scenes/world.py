@@ -31,8 +31,9 @@ def world_of(
 ) -> tuple[World, tuple[Sun, ...]]:
     """The tracer's world, and suns that are part of it. What it approximates, Cycles is shown likewise.
 
-    scene : evaluated. pictures : receives its images. render : whether it may take the seconds in which another Blender renders
-    what is not modeled; without, what is returned stands for that.
+    scene : the evaluated scene.
+    pictures : receives its images.
+    render : true to let another Blender render what is not modeled, which takes seconds; else what is returned stands for that.
     """
     if world is None:
         return World(), ()

@@ -21,8 +21,8 @@ struct Camera {
         Vec3 at = to_camera(point);
         return {(at.x / at.z * distance.x + principal_point.x) / width, (at.y / at.z * distance.y + principal_point.y) / height};
     }
-    // What each length of a ray in a direction adds to the width of its pixel: how far the unit directions of the next pixels, to the
-    // right and above, are from its own, as Cycles has it (kernel/camera/camera.h).
+    // The growth of a pixel's width with each length of a ray in a direction: how far the unit directions of the next pixels,
+    // to the right and above, are from its own, as Cycles has it (kernel/camera/camera.h).
     double spread(Vec3 direction) const {
         Vec3 ahead{dot(direction, right), dot(direction, up), dot(direction, forward)};
         ahead = ahead / ahead.z;

@@ -1,4 +1,5 @@
-// What the C interface refuses, a sentence each: whatever would be read or written outside of an array, or never come to an end.
+// The arguments that the C interface refuses, with a sentence for each: whatever would be read or written outside of an array,
+// or never come to an end.
 //
 // native.py gives none of it, so that who sees these sentences has found a fault in it. What a scene means is Python's to check.
 #pragma once

@@ -22,8 +22,8 @@ struct Lamp {
     RayKind shadow_rays = SHADOW;  // of its own blockers, where it has such
 };
 
-// How often light is scattered before it must reach a light: in all, and by each kind of surface; and how often it may go straight
-// through a surface. Cycles' own counting.
+// The most scatterings of light before it must reach a lamp: in all, and by each kind of surface; and how often it may go
+// straight through a surface. Cycles' own counting.
 struct Bounces {
     int total = 0, diffuse = 0, glossy = 0, transmission = 0, transparent = 0;
 };

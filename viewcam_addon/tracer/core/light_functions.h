@@ -1,4 +1,4 @@
-// What stands behind the part of the C interface that is about light.
+// The functions behind the part of the C interface that is about light.
 #pragma once
 #include "capi.h"
 #include "integrators/adaptive.h"
@@ -196,8 +196,8 @@ inline void bsdf(const ViewcamClosure& closure, int version, size_t count, const
         std::copy(row, row + 12, out);
     }
 }
-// What the last of some nodes makes on a floor, z up, whose UV is (u, v): given: (count, 6), the unit way that a path came along, u,
-// v, and whether the floor is met from behind. out: (count, 4), a color or vector, and the number that it is.
+// The value of the last of some nodes on a floor, z up, whose UV is (u, v). given: (count, 6), the unit way that a path came
+// along, u, v, and whether the floor is met from behind. out: (count, 4), a color or vector, and the number that it is.
 inline void nodes(const Scene& scene, size_t count, const double* given, double* out) {
     const Illumination& light = scene.illumination;
     if (light.nodes.all.empty()) throw std::invalid_argument("there is no node");

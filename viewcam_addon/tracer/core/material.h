@@ -1,4 +1,4 @@
-// What surfaces are made of: closures, each with a weight, that become the lobes of a BSDF where a path meets them.
+// Materials: closures, each with a weight, that become the lobes of a BSDF where a path meets them.
 #pragma once
 #include <algorithm>
 #include <variant>
@@ -16,14 +16,14 @@ struct MixFactor {
 struct WeightedClosure {
     Closure closure;
     std::vector<MixFactor> factors;
-    bool varies = false, on_tangents = false;  // whether its inputs are not the same everywhere, and ask for the tangents of a UV map
+    bool varies = false, on_tangents = false;  // true if its inputs vary; true if they ask for the tangents of a UV map
 };
 
 struct Material {
     std::vector<WeightedClosure> closures;
-    bool transparent_shadow = true;  // whether shadow rays, too, go through what is transparent
+    bool transparent_shadow = true;  // true if shadow rays, too, go through what is transparent
     Color normal;                    // what it has in place of the smooth one, on which those of its closures stand; black: none
-    bool normal_on_tangents = false; // whether that asks for the tangents of a UV map
+    bool normal_on_tangents = false; // true if that asks for the tangents of a UV map
 
     // The kinds of rays that its lobes scatter.
     uint32_t kinds() const { return kinds_; }
@@ -71,7 +71,7 @@ struct Material {
 
     template <class At> BSDFAt<At> bsdf(const At& at) const {
         BSDFAt<At> bsdf;
-        // What is no plain diffuse surface has its smooth normals bent, too (specular_normal).
+        // Any surface that is not plainly diffuse has its smooth normals bent, too (specular_normal).
         Mask<NumberOf<At>> bent = VIEWCAM_ISA::is_black(at.point.shading - at.point.normal) == Mask<NumberOf<At>>{};
         if (bumped_) bent = bent == bent;  // everywhere
         if (bumped_ || (kinds_ != DIFFUSE && any(bent))) bsdf.bump(bent, {at.point.shading, at.version >= CYCLES_4_3, at.version >= CYCLES_5_0});

@@ -19,10 +19,10 @@ constexpr uint64_t EVERYTHING = ~0ull;  // the receivers of a light that has non
 // Above it there is a bit for the shadow rays of each set of blockers that lights have.
 enum RayKind : uint32_t { NO_RAY = 0, CAMERA = 1, DIFFUSE = 2, GLOSSY = 4, TRANSMISSION = 8, SHADOW = 16, SHADOW_LINKED = 32 };
 
-// What a material may ask of the ray that has come to it. kind: of its last scattering; diffuse, singular: what scattered it;
-// depth: scatterings so far; scattered: those that were diffuse, glossy and transmission; passed: surfaces that it has gone straight
-// through; length: how far it has come, width: how wide its pixel was where it started, and spread: what each length adds to that,
-// of rays that are not from the eye.
+// The state of a ray, which materials may ask for. kind: of its last scattering; diffuse, singular: what scattered it; depth:
+// scatterings so far; scattered: those that were diffuse, glossy and transmission; passed: surfaces that it has gone straight
+// through; length: how far it has come, width: how wide its pixel was where it started, and spread: what each length adds to
+// that, of rays that are not from the eye.
 struct RayState {
     RayKind kind = CAMERA;
     bool diffuse = false, singular = false;
@@ -40,8 +40,8 @@ struct Ray {
 
 constexpr int PACKET = 64;
 
-// As many rays, by coordinate. What is computed of four at once reads and writes the last four whole:
-// where fewer are left, `fill` has made the rest like the last.
+// A packet of rays, by coordinate. What is computed of four at once reads and writes the last four whole: where fewer are left,
+// `fill` has made the rest like the last.
 struct alignas(64) Rays {
     double origin[3][PACKET], direction[3][PACKET], t_min[PACKET], t_max[PACKET];
 
@@ -72,8 +72,8 @@ struct LocalRay : Ray {
     double origin_error = 0;
 };
 
-// What a ray meets first. object: the scene's number of the placed object, NONE where there is nothing. primitive: of the
-// object's geometry, a triangle or a sphere.
+// The first thing that a ray meets. object: the scene's number of the placed object, NONE where there is nothing. primitive: of
+// the object's geometry, a triangle or a sphere.
 struct Hit {
     double t = INFINITE;
     uint32_t object = NONE, primitive = NONE;
@@ -143,7 +143,7 @@ struct Interaction : SurfacePoint<double> {
     uint32_t object = NONE, primitive = NONE;
     double t = INFINITE;   // along the ray that came, of its direction's length
     double cosine = 0;     // between that ray and the true surface, which an ellipsoid's `normal` is not at a right angle to
-    bool has_uv = false;   // whether the mesh has a UV map
+    bool has_uv = false;   // true if the mesh has a UV map
     bool backside = false; // met from behind: from where the corners run clockwise in the object's own space, as in Cycles
 };
 

@@ -61,7 +61,7 @@ class Scene {
         for (uint32_t& leaf : instances_.leaves) leaf = placed[leaf];
     }
 
-    // What a ray meets first among the objects that its kind sees, but one.
+    // The first hit of a ray among the objects that its kind sees, but one.
     Hit closest(const Ray& ray, RayKind kind, uint32_t but = NONE) const {
         Nearest nearest{ray.t_max, 0, but};
         for (const Merged& some : merged_)
@@ -76,7 +76,7 @@ class Scene {
             if (some.visible & kind && some.triangles.intersect<true>(ray, NONE, nearest)) return true;
         return intersect_instances<true>(ray, kind, nearest);
     }
-    // What a ray meets first, and all that it meets up to `within` times as far beyond, the nearest first; of equal distances as
+    // The first hit of a ray, and all others up to `within` times as far beyond, the nearest first; of equal distances as
     // `Nearest` has it.
     void surfaces(const Ray& ray, RayKind kind, double within, std::vector<Hit>& hits) const {
         NearestOnes nearest{ray.t_max, within, std::move(hits)};
@@ -147,7 +147,7 @@ class Scene {
         return found;
     }
 
-    // What a material is told of a point that a path reaches.
+    // The point that a path reaches, as a material is told of it.
     ShadingPoint shading(const Interaction& point, Vec3 incoming, RayState ray) const {
         return {point, incoming, illumination.textures, illumination.version, &illumination.nodes, &objects[point.object], origin, this, ray};
     }
@@ -167,8 +167,8 @@ class Scene {
         }
     }
 
-    // What lights need. triangle_count: 0 of spheres. material: of a triangle, an index into illumination.materials. corners: in
-    // rendering space.
+    // The surfaces that shine, as lights need them. triangle_count: 0 of spheres. material: a triangle's, an index into
+    // illumination.materials. corners: in rendering space.
     uint32_t triangle_count(uint32_t object) const {
         auto mesh = std::get_if<TriangleMesh>(&geometries[objects[object].geometry]);
         return mesh ? uint32_t(mesh->count) : 0;

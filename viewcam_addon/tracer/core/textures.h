@@ -1,4 +1,4 @@
-// What colors surfaces have: constants, images and the mesh's own colors.
+// Colors of surfaces: constants, images and the mesh's own colors.
 //
 // As in Cycles (measured with 4.2, 5.0 and 5.2): of n pixels, that of number i has its center at (i + ½)/n of UV; where images repeat,
 // pixels at their border are blended with those on the other side; sRGB is decoded after blending, which makes blends of
@@ -28,15 +28,16 @@ inline Vec2 mirror_ball(Vec3 direction) {
     return size > 0 ? Vec2{(half.x / size + 1) / 2, (half.z / size + 1) / 2} : Vec2{0.5, 0.5};
 }
 
-// How an image is looked up. straight: whether colors are divided by the alpha that they were multiplied by.
+// The way an image is looked up. straight: whether colors are divided by the alpha that they were multiplied by.
 struct Lookup {
     enum Interpolation { LINEAR, CLOSEST, CUBIC } interpolation = LINEAR;
     enum Extension { REPEAT, EXTEND, CLIP, MIRROR } extension = REPEAT;
     bool straight = false;
 };
 
-// What a pixel's numbers are: floats, half floats, or whole numbers that are shares of the largest of their kind, rounded as Blender
-// and Cycles round them. RGBE: a byte for each color and one for their exponent (Ward, Real Pixels, Graphics Gems II, 1991).
+// The type of a pixel's numbers: floats, half floats, or whole numbers that are shares of the largest of their kind, rounded as
+// Blender and Cycles round them. RGBE: a byte for each color and one for their exponent (Ward, Real Pixels, Graphics Gems II,
+// 1991).
 enum class Texel { FLOAT, HALF, BYTE, SHORT, RGBE };
 
 // The number of a finite half float.
@@ -92,7 +93,7 @@ struct Texture {
     // Where a pixel's numbers begin.
     size_t place(int column, int row) const { return stride() * (size_t(row) * size_t(width) + size_t(column)); }
     size_t stride() const { return texel == Texel::RGBE ? 4 : size_t(channels); }
-    // What is made of a function that reads the number of an index.
+    // Calls `use` with a function that reads the number of an index, and returns its result.
     template <class Value, class Use> Value read(Use&& use) const {
         auto bytes = static_cast<const uint8_t*>(pixels);
         auto shorts = static_cast<const uint16_t*>(pixels);

@@ -94,17 +94,17 @@ class Spheres:
 class Object:
     """One geometry, placed in the world, once or as many instances.
 
-    geometry : key in `Scene.geometries`.
+    geometry : the key in `Scene.geometries`.
     matrix : (4, 4) float64, object space to world space, affine; negative and non-uniform scale are welcome. Or (n, 4, 4), for
         n instances that differ by nothing else.
-    object_index : what the Object Index pass shows.
-    material_indices : what the Material Index pass shows, for each material of the geometry; at least one.
+    object_index : the number that the Object Index pass shows.
+    material_indices : the numbers that the Material Index pass shows, for each material of the geometry; at least one.
     materials : keys in `Scene.materials`, for each material of the geometry; "", and all that are missing, are `PLAIN`.
-    hidden_from : which rays don't see it (lights.RAYS).
-    receivers, blockers : where it shines, names of the objects that it lights, and of those that can stand in that light; None
-        is all objects. The eye sees it whatever it lights.
-    color : red, green, blue and alpha, that materials may ask for. random : (n,) float32, 0 to 1, of each instance likewise, or
-        None, which is 0.
+    hidden_from : the kinds of rays that don't see it (lights.RAYS).
+    receivers, blockers : the names of the objects that it lights where it shines, and of those that can stand in that light;
+        None is all objects. The eye sees it whatever it lights.
+    color : red, green, blue and alpha, that materials may ask for.
+    random : (n,) float32, 0 to 1, of each instance likewise, or None, which is 0.
     """
 
     name: str
@@ -188,7 +188,7 @@ class Scene:
     clip : nearest and farthest planar depth z = −w·(P − e) that is visible.
     origin : the point of the world from which all coordinates of the scene are counted: (0, 0, 0), or that of a recentered
         export.
-    images : what `Color.image` names.
+    images : the images by the names that `Color.image` has.
     cycles : the version of Blender whose Cycles' materials are meant.
     """
 

@@ -57,7 +57,7 @@ class Picture:
         ends = _ends(pixels)
         if not np.isfinite(ends).all():
             raise InputError("an image holds a number that is not finite: check it")
-        # What is encoded as sRGB is raised to the power of 2.4.
+        # Numbers that are encoded as sRGB are raised to the power of 2.4.
         most = LARGEST_RADIANCE ** (1 / 2.4) if self.srgb else LARGEST_RADIANCE
         largest = max(map(abs, ends))
         if largest > most:
@@ -67,7 +67,10 @@ class Picture:
 
     @classmethod
     def compact(cls, values: NDArray[np.float32], srgb: bool = False) -> "Picture":
-        """The picture of some float32 values, in as few bytes as hold each of them to the bit. values : as `pixels`."""
+        """The picture of some float32 values, in as few bytes as hold each of them to the bit.
+
+        values : an array like `pixels`.
+        """
         exact = (_exactly(values, dtype) for dtype in _SMALLEST_FIRST)
         return cls(next(pixels for pixels in exact if pixels is not None), srgb)
 
@@ -133,8 +136,10 @@ def _ends(pixels: NDArray) -> tuple[float, float]:
 class Color:
     """A color, the same everywhere or times what an image or the mesh's own colors say.
 
-    rgb : factors, not negative. image : key in `Scene.images`, looked up at the mesh's UV, or None. closest : the nearest pixel
-    of the image instead of a linear interpolation between four. vertex : times the mesh's `corner_colors`.
+    rgb : factors, not negative.
+    image : key in `Scene.images`, looked up at the mesh's UV, or None.
+    closest : the nearest pixel of the image instead of a linear interpolation between four.
+    vertex : times the mesh's `corner_colors`.
     """
 
     rgb: tuple[float, float, float]

@@ -253,7 +253,10 @@ PLACE_KEYS = ("matrix", "location", "rotation", "scale")
 
 def matrix(field: Field, keys: dict[str, Field]) -> NDArray[np.float64]:
     """(4, 4), to world space: that of `keys`, or of a location, a rotation (degrees about x, then y, then z) and a scale (one
-    number, or one for each axis). field : what is placed."""
+    number, or one for each axis).
+
+    field : the placed object's field.
+    """
     if "matrix" not in keys:
         return _placed(keys)
     if any(key in keys for key in PLACE_KEYS[1:]):

@@ -57,10 +57,13 @@ def _bounces(name: str, value: object) -> object:
 
 @dataclass(frozen=True)
 class Film:
-    """filter : over which pixels spread their samples. filter_width : pixels, as Cycles counts
-    them; BOX is one pixel wide.
+    """The film: how light becomes pixels.
 
-    transparent : whether the world behind the scene leaves pixels see-through. exposure : factor on all light.
+    filter : the filter over which pixels spread their samples.
+    filter_width : pixels, as Cycles counts them; BOX is one pixel wide.
+
+    transparent : true to leave pixels see-through where the world is behind the scene.
+    exposure : the factor of all light.
     """
 
     filter: str = values.value("BLACKMAN_HARRIS", _filter, "text")
@@ -75,7 +78,10 @@ class Film:
 @dataclass(frozen=True)
 class Bounces:
     """The most scatterings of light before it must reach a lamp: in all, and by each kind of surface; 0 is light that comes
-    straight from a lamp. transparent : how often it may go straight through a surface. Cycles' own counting and defaults."""
+    straight from a lamp.
+
+    transparent : the most surfaces that it may go straight through. Counting and defaults are Cycles'.
+    """
 
     total: int = values.value(12, _bounces, "whole", 0)
     diffuse: int = values.value(4, _bounces, "whole", 0)

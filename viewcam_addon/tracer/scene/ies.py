@@ -22,7 +22,11 @@ _MOST = 1 << 20  # angles
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Light by directions. across : about the axis z, up : from −z upwards, degrees, ascending. watts : (across, up)."""
+    """Light by directions.
+
+    across : about the axis z, up : from −z upwards, degrees, ascending.
+    watts : (across, up).
+    """
 
     across: NDArray[np.float64]
     up: NDArray[np.float64]
@@ -35,7 +39,9 @@ class Table:
 
 
 def read(name: str, text: object) -> Table:
-    """The table that a text is. name : what an error's sentence calls it.
+    """The table that a text is.
+
+    name : its name in an error's sentence.
 
     Raises
     ------
@@ -104,7 +110,10 @@ def _whole(words: Iterator[str]) -> int:
 
 
 def _mirrored(angles: NDArray, values: NDArray, about: float) -> tuple[NDArray, NDArray]:
-    """Angles that end where they are mirrored, and what lies beyond. values : by rows."""
+    """Angles that end where they are mirrored, and what lies beyond.
+
+    values : a row for each angle.
+    """
     return np.concatenate([angles, 2 * about - angles[-2::-1]]), np.concatenate([values, values[-2::-1]])
 
 

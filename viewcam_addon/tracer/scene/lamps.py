@@ -5,8 +5,8 @@ of red, green and blue the irradiance of a sun on what faces it, and the power P
 radiance P/(π A), to one side if it is flat, and a sphere's area is 4π R²; one of no size has the irradiance P/(4π r²). Scaling
 the object scales an area lamp, shapes the cone of a spot, and does not change a radius.
 
-hidden_from : which rays don't see the lamp itself, of "camera", "diffuse", "glossy", "transmission"; what a lamp hides from, it
-    does not light.
+hidden_from : the kinds of rays that don't see the lamp itself, of "camera", "diffuse", "glossy", "transmission"; what a lamp
+    hides from, it does not light.
 """
 
 import math
@@ -98,12 +98,14 @@ class Lamp:
     """The base of all lamps. A kind declares where it is, how strong, and then the numbers that the core's lamp of its name
     has.
 
-    casts_shadow : whether objects can stand in its light. multiple_importance : whether rays run into it, so that the eye,
-    mirrors and glass see it, where it has a size; else it only lights what is rough, as much as before. receivers : names of
-    the objects that it lights; blockers : of those that can stand in its light; None is all objects. The eye sees a lamp
-    whatever it lights.
+    casts_shadow : true if objects can stand in its light.
+    multiple_importance : true if rays run into it where it has a size, so that the eye, mirrors and glass see it; else it only
+        lights what is rough, as much as before.
+    receivers : the names of the objects that it lights.
+    blockers : the names of the objects that can stand in its light; None is all objects. The eye sees a lamp whatever it
+        lights.
     emission : a node that makes what its light is multiplied by, at each place of the lamp and in each direction, or None; it
-    is told the place there, in the world, the normal, the way that light goes, and how far that is.
+        is told the place there, in the world, the normal, the way that light goes, and how far that is.
     """
 
     kind: ClassVar[str]
@@ -148,8 +150,9 @@ class Lamp:
 class Sun(Lamp):
     """Light from one direction, or from a disc of directions.
 
-    towards : unit vector to the sun, world space. irradiance : (3,) on a surface that faces it. angle : diameter of the disc,
-    radians, 0 to π.
+    towards : unit vector to the sun, world space.
+    irradiance : (3,) on a surface that faces it.
+    angle : diameter of the disc, radians, 0 to π.
     """
 
     kind: ClassVar[str] = "sun"
@@ -168,8 +171,11 @@ class Sun(Lamp):
 class Point(Lamp):
     """A point, or a sphere that shines evenly.
 
-    position : world space. power : (3,). radius : world units. soft_falloff : instead of a sphere, a disc that turns towards
-    whatever it lights, as Blender's setting of that name makes it: close by, it lights less.
+    position : world space.
+    power : (3,).
+    radius : world units.
+    soft_falloff : instead of a sphere, a disc that turns towards whatever it lights, as Blender's setting of that name makes
+        it: close by, it lights less.
     """
 
     kind: ClassVar[str] = "point"
@@ -189,9 +195,12 @@ class Point(Lamp):
 class Spot(Lamp):
     """A point or sphere that shines into a cone about its local −z axis.
 
-    matrix : (4, 4) float64, the lamp's space to world space; angles are measured in the lamp's space. power : (3,), of a point
-    that would shine everywhere as in the middle of the cone. radius : world units. angle : of the whole cone, radians, 0 to π.
-    blend : 0 to 1, the part of the cone over which the light falls off. soft_falloff : as of points.
+    matrix : (4, 4) float64, the lamp's space to world space; angles are measured in the lamp's space.
+    power : the power of a point that would shine everywhere as in the middle of the cone, (3,).
+    radius : world units.
+    angle : the angle of the whole cone, radians, 0 to π.
+    blend : 0 to 1, the part of the cone over which the light falls off.
+    soft_falloff : see `Point`.
     """
 
     kind: ClassVar[str] = "spot"
@@ -211,9 +220,11 @@ class Spot(Lamp):
 class Area(Lamp):
     """A rectangle or an ellipse that shines evenly to one side, towards its local −z axis; one without an area is dark.
 
-    matrix : (4, 4) float64, the lamp's space to world space. power : (3,). size : along its local x and y axes, before the
-    matrix. ellipse : instead of a rectangle. spread : the angle of the cone into which it shines as through a grid, radians; π
-    is without one, and the power is the same.
+    matrix : (4, 4) float64, the lamp's space to world space.
+    power : (3,).
+    size : along its local x and y axes, before the matrix.
+    ellipse : instead of a rectangle.
+    spread : the angle of the cone into which it shines as through a grid, radians; π is without one, and the power is the same.
     """
 
     kind: ClassVar[str] = "area"
@@ -239,13 +250,17 @@ KINDS: dict[str, type[Lamp]] = {kind.kind: kind for kind in (Sun, Point, Spot, A
 
 @dataclass(frozen=True)
 class World:
-    """Light from everywhere beyond the scene. radiance : (3,). hidden_from : as for lamps.
+    """Light from everywhere beyond the scene.
+
+    radiance : (3,).
+    hidden_from : see above.
 
     image : key in `Scene.images` of what the radiance is multiplied by, equirectangular: its rows go from straight down to
-    straight up, its middle shows what lies along x, and its left half what lies along y; or None. closest : the nearest pixel
-    instead of a linear interpolation between four. rotation : of directions before they are looked up there, radians about x,
-    then y, then z, as in Blender's Mapping node. backdrop : what the camera sees instead, hidden as this one
-    is, or None.
+        straight up, its middle shows what lies along x, and its left half what lies along y; or None.
+    closest : true to take the nearest pixel instead of a linear interpolation between four.
+    rotation : the rotation of directions before they are looked up there, radians about x, then y, then z, as in Blender's
+        Mapping node.
+    backdrop : the world that the camera sees instead, hidden as this one is, or None.
     """
 
     radiance: tuple[float, float, float] = values.light(0.0)

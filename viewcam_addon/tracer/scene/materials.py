@@ -23,7 +23,7 @@ class Material:
     """The light of a surface.
 
     surface : its shader, None where it gives no light at all.
-    transparent_shadow : whether shadow rays go through it where it is transparent.
+    transparent_shadow : true if shadow rays go through it where it is transparent.
     displacement : a node that makes a height, world units, whose slope turns the normals; nothing moves.
     """
 
@@ -87,10 +87,13 @@ def sum_of(
 ) -> Material:
     """The material whose light is the sum of components; without any it is black.
 
-    ior : of glass and refraction, inside over outside.
-    components : of `COMPONENTS`. diffuse : albedo of a Lambert surface, both of its sides. emission : radiance, of both sides.
-        mirror : reflectance of a perfect mirror. glass : color of what is reflected and refracted by a clear dielectric, shared
-        out by Fresnel's equations. refraction : color of what is refracted, nothing being reflected.
+    ior : the index of refraction of glass and refraction, inside over outside.
+    components : their colors, by the names in `COMPONENTS`.
+    diffuse : albedo of a Lambert surface, both of its sides.
+    emission : radiance, of both sides.
+    mirror : reflectance of a perfect mirror.
+    glass : color of what is reflected and refracted by a clear dielectric, shared out by Fresnel's equations.
+    refraction : color of what is refracted, nothing being reflected.
     """
     ior = checks.number("ior of a material", ior, LEAST_IOR, MOST_IOR)
     surface: Node | None = None

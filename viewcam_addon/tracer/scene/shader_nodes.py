@@ -17,7 +17,7 @@ from .colors import LARGEST_RADIANCE, WHITE, Color
 RGB = tuple[float, float, float]
 
 GRAY = (0.8, 0.8, 0.8)
-# How facets are stretched along a tangent.
+# The inputs that stretch facets along a tangent.
 ANISOTROPY: dict[str, value_nodes.Default | None] = {"anisotropy": 0.0, "rotation": 0.0, "tangent": value_nodes.TANGENT}
 DISTRIBUTIONS = ("multiscatter_ggx", "ggx", "beckmann")
 
@@ -29,9 +29,9 @@ class Kind:
     inputs : name → its default; a number, a color, words to choose from (the first is the default), or None for a shader; of a
         node that makes values also what value_nodes.py says.
     scatters : the kinds of bounces (film.Bounces) that its light is counted as.
-    is_value : whether it makes a value, and is no shader.
+    is_value : true if it makes a value, and is no shader.
     node : the type of Blender's shader node, where it is not BSDF_ and our name.
-    names : of inputs that Blender calls otherwise → what, or their number.
+    names : our name of an input → Blender's, or its number, where they differ.
     neutral : Blender's name of an input that is not modeled → the value without which the shader is only approximated.
     """
 
@@ -123,7 +123,10 @@ KINDS: dict[str, Kind] = {
 class Shader:
     """A type of shader node as Blender has it.
 
-    kind : the node's type. inputs : ours → theirs. words : ours → the property that has the word. neutral : as of `Kind`.
+    kind : the node's type.
+    inputs : ours → theirs.
+    words : ours → the property that has the word.
+    neutral : see `Kind`.
     """
 
     kind: str
@@ -168,9 +171,10 @@ MOST_DEEP = 250
 class Node:
     """A node, and through its inputs all that feed it.
 
-    type : one of `KINDS`. inputs : (name, value) of those that are not what they are by default. Of a shader a `Color`, a
-    word, or a `Node`: a shader where one belongs, else one that makes values. Of that also whether something holds, and in
-    place of constant colors three numbers, which may be negative.
+    type : one of `KINDS`.
+    inputs : (name, value) of those that are not what they are by default. Of a shader a `Color`, a word, or a `Node`: a shader
+        where one belongs, else one that makes values. Of that also whether something holds, and in place of constant colors
+        three numbers, which may be negative.
     """
 
     type: str

@@ -71,14 +71,15 @@ LIGHT_PATH = (
 class BlenderNode:
     """A node of Blender's that makes a value.
 
-    kind : its type; name : its class, without "ShaderNode".
-    outputs : the identifier of theirs → our word for it, None where we have one output.
-    inputs : ours → the identifier of theirs; where a row leaves one out it is our name as a title.
-    words, flags, names, numbers : ours → the property.
-    spelled : the words that are others than ours in capitals → what they are.
-    fixed : property → what it must be.
-    before : of inputs that older versions lack, what these compute with.
-    unnamed : what an empty name stands for.
+    kind : its type.
+    name : its class, without "ShaderNode".
+    outputs : the identifier of Blender's output → our word for it, None where we have one output.
+    inputs : our name of an input → the identifier of Blender's; where a row leaves one out it is our name as a title.
+    words, flags, names, numbers : our name of an input → the property.
+    spelled : the words that are not ours in capitals → Blender's.
+    fixed : property → the value that it must have.
+    before : the values that older versions compute with, of inputs that they lack.
+    unnamed : the name that an empty one stands for.
     """
 
     kind: str
@@ -582,7 +583,11 @@ KINDS: dict[str, ValueNode] = {
 
 
 def attributes_of(kind: str, value_of: Callable[[str], Any]) -> Iterator[str]:
-    """The names of the attributes that a node asks meshes for. kind : its type. value_of : input → its value."""
+    """The names of the attributes that a node asks meshes for.
+
+    kind : its type.
+    value_of : input → its value.
+    """
     if kind == "attribute":
         yield value_of("name")
     if kind == "normal_map" and value_of("space") == "tangent" and value_of("uv"):

@@ -17,8 +17,11 @@ LARGEST = 1e18
 
 
 def value(default: Any, check: Callable[[str, Any], Any] | None, *read: Any) -> Any:
-    """Any value. check : its name and what is given → what it is, or InputError. read : how `scene_file` reads it, a method
-    of `Field` and its arguments, or another word."""
+    """Any value.
+
+    check : a function: its name and a value → the value to store, or InputError.
+    read : a method of `Field` and its arguments by which `scene_file` reads it, or another word.
+    """
     return field(default=default, metadata={"check": check, "read": read})
 
 
@@ -46,7 +49,10 @@ def light(default: float = 1.0) -> Any:
 
 
 def check(owner: Any, of: str = "") -> None:
-    """Let all declared values of a frozen dataclass be what they may be. of : whose they are, as a sentence says it."""
+    """Let all declared values of a frozen dataclass be what they may be.
+
+    of : the owner of the values, as a sentence names it.
+    """
     for each in fields(owner):
         if check := each.metadata.get("check"):
             name = f"{each.name} of {of}" if of else each.name

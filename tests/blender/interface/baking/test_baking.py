@@ -74,7 +74,7 @@ def test_more_keys_a_frame_follow_the_flight_more_closely(over_the_target, scene
     over_the_target.virtual_pinhole.enabled = True
     (four,) = baking.bake([over_the_target], scene, 1, 9, keys_per_frame=4)
     assert len(curves(over_the_target)["location", 0].keyframe_points) == 33
-    # What a straight line is off goes with the square of its length; a corner of the keyed values goes with the length.
+    # The error of a straight line goes with the square of its length; a corner of the keyed values goes with the length.
     assert four.between < flight.between / 3.5, f"{flight.sentence()}; {four.sentence()}"
 
 

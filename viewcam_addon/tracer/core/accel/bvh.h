@@ -2,7 +2,7 @@
 // number of threads.
 //
 // Boxes are float32 in units of the hierarchy's own size, about its own center, rounded outward: neither a scene's scale nor its
-// place costs a digit. What a ray does not hit is left out without a doubt, since box_ray.h rounds to the other side as well.
+// place costs a digit. What a ray does not hit is left out without a doubt, since traverse.h rounds to the other side as well.
 //
 // Rejected: quantized boxes (half the memory of the nodes, which are a quarter of all, for a tenth of the speed), spatial splits
 // (a third faster on long thin triangles, twice the memory), and a refit where things move (nothing moves here but the camera).
@@ -33,7 +33,7 @@ struct Bounds {
     }
 };
 
-// What a node's child is: another node, or a leaf by its number.
+// A node's child is another node, or a leaf by its number.
 constexpr uint32_t LEAF = 0x80000000u, NOTHING = 0xffffffffu;
 
 struct Bvh {

@@ -28,7 +28,7 @@ struct Shear {
 };
 
 // Four triangles and a ray, or four rays and a triangle; corners relative to the rays' origins, in the order of a shear's axes.
-// Which are hit, on either side, however far along; t · determinant, and the determinant.
+// The triangles that are hit, on either side, however far along; t · determinant, and the determinant.
 [[gnu::always_inline]] inline long4 intersect_triangle(double4 ax, double4 ay, double4 az, double4 bx, double4 by, double4 bz, double4 cx, double4 cy, double4 cz,
                                 double4 by_x, double4 by_y, double4 by_z, double4& t, double4& determinant) {
     ax -= by_x * az, ay -= by_y * az, bx -= by_x * bz, by -= by_y * bz, cx -= by_x * cz, cy -= by_y * cz;
@@ -39,7 +39,7 @@ struct Shear {
     return inside & long4(determinant != zero);
 }
 
-// N rays, or sets of rays, as box_ray.h explains them, but for the origin, which is no product yet.
+// N rays, or sets of rays, as traverse.h explains them, but for the origin, which is no product yet.
 template <int N> struct alignas(64) BoxRays {
     float near_origin[3][N], far_origin[3][N], near_reciprocal[3][N], far_reciprocal[3][N], far[N];
 };
@@ -86,7 +86,7 @@ struct alignas(64) Packet : BoxRays<PACKET> {
         source[i] = other.source[ray];
     }
 
-    // What the rays have in common, and the last eight filled up with rays that meet nothing.
+    // Computes what the rays have in common, and fills up the last eight with rays that meet nothing.
     void close() {
         shear.z = key[0] >> 3;
         shear.x = (shear.z + 1) % 3;
@@ -189,7 +189,7 @@ template <bool ANY, class Visit> inline void traverse_packet(const Bvh& bvh, Pac
     }
     reduce(packet.far, true, each.far, all.far);
     for (int g = groups; g < 8; g++) each.far[g] = -1;
-    // Which of eight rays, from i on, meet which planes, eight of them or one eight times; `first`: how far along.
+    // True where eight rays, from i on, meet planes, eight of them or one eight times; `first`: how far along.
     auto meets = [&](const auto& plane, const auto& rays, int i, float8& first) {
         auto enters = [&](int a) { return (plane(near[a]) - load<float8>(rays.near_origin[a] + i)) * load<float8>(rays.near_reciprocal[a] + i); };
         auto leaves = [&](int a) { return (plane(far[a]) - load<float8>(rays.far_origin[a] + i)) * load<float8>(rays.far_reciprocal[a] + i); };

@@ -1,4 +1,4 @@
-// How much light rough surfaces scatter: looked up in tables, and what it means for light that is scattered more than once.
+// The share of light that rough surfaces scatter, looked up in tables, and from it the light that is scattered more than once.
 //
 // A single scattering loses the light that facets catch from each other. Kulla and Conty (Revisiting Physically Based Shading at
 // Imageworks, 2017) and Turquin (Practical Multiple Scattering Compensation for Microfacet Models, 2019) give it back: what a lobe
@@ -45,7 +45,7 @@ template <class T> T at(const float* table, const PlaceOf<T>& z, const PlaceOf<T
 template <class T> inline T index_place(T ior) { return sqrt(abs((ior - 1.0) / (ior + 1.0))); }
 }  // namespace detail
 
-// What facets scatter without Fresnel's losses: seen under a cosine, and the mean over all.
+// The albedo of facets without Fresnel's losses: seen under a cosine, and the mean over all.
 template <class T> struct AlbedoOf {
     T seen, mean;
 };
@@ -71,8 +71,8 @@ inline double schlick_seen(double roughness, double cosine) {
     return at(albedo_tables::SCHLICK, PlaceOf<double>(cosine, 16), PlaceOf<double>(roughness, 16), 16);
 }
 
-// What more than one scattering makes of a lobe whose mean Fresnel term is given: its albedo is multiplied by `albedo`, and the
-// lobe itself by `lobe` on top of that.
+// The gain of a lobe by further scatterings, from its mean Fresnel term: its albedo is multiplied by `albedo`, and the lobe
+// itself by `lobe` on top of that.
 template <class T> struct MultipleScatteringOf {
     Vec3Of<T> albedo = gray(splat<T>(1));
     T lobe = splat<T>(1);

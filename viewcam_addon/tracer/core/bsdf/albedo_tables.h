@@ -1,4 +1,4 @@
-// How much light rough surfaces scatter, as make_albedo_tables.cpp computes it: not written by hand.
+// The share of light that rough surfaces scatter, as make_albedo_tables.cpp computes it: not written by hand.
 #pragma once
 
 namespace viewcam::VIEWCAM_ISA::albedo_tables {

@@ -1,4 +1,4 @@
-// What closures become at a point of a surface: the BSDF, a sum of lobes, what it gives off and what it lets straight through.
+// The BSDF that closures become at a point of a surface: a sum of lobes, what it gives off and what it lets straight through.
 //
 // A path takes one lobe only, chosen in proportion to the lobes' colors, and its weight is divided by that share: where there
 // is one lobe, it is taken and nothing is random. Glass is two lobes, shared out by Fresnel's equations.
@@ -9,15 +9,37 @@
 #include <optional>
 #include <variant>
 
-#include "dielectric.h"
-#include "lambert.h"
+#include "diffuse.h"
 #include "microfacet.h"
-#include "oren_nayar.h"
-#include "shadow_terminator.h"
 #include "sheen.h"
 #include "specular.h"
 
 namespace viewcam::VIEWCAM_ISA {
+
+// The end of light on a bumped surface: what bumps turn towards the light may lie where the surface itself looks away.
+//
+// As in Cycles: since 4.3 bumps shadow diffuse light as microfacets would (Conty Estevez et al., A Microfacet-Based Shadowing Function
+// to Solve the Bump Terminator Problem, Ray Tracing Gems, 2019), before that it is faded by a cubic (Chiang et al., Taming the Shadow
+// Terminator, 2019).
+template <class T> struct ShadowTerminatorOf {
+    Vec3Of<T> smooth;  // the normal without bumps
+    bool by_facets, of_all;  // since 4.3; since 5.0, of light that is not diffuse, too
+
+    // The share that is left of light from a direction, scattered by a lobe with a bumped normal.
+    T left(Vec3Of<T> bumped, bool is_diffuse, Vec3Of<T> to_light) const {
+        T flat = dot(smooth, to_light), tilt = dot(smooth, bumped), light = dot(bumped, to_light), none{}, all = splat<T>(1);
+        if (!is_diffuse) return select(Mask<T>((of_all ? flat * tilt * light : flat * light) < 0.0), none, all);
+        if (!by_facets) {
+            T g = select(Mask<T>(light * tilt != 0.0), flat / (light * tilt), none);
+            return select(Mask<T>(g >= 1.0), all, select(Mask<T>(g < 0.0), none, ((1.0 - g) * g + 1.0) * g));
+        }
+        T up = abs(flat), cosine = abs(tilt), squared = min(0.125 * (1.0 / (cosine * cosine) - 1.0), all);
+        T left = 2.0 / (1.0 + sqrt(1.0 + squared * (1.0 / (up * up) - 1.0)));
+        left = select(Mask<T>(up < 1e-6), none, left);
+        left = select(Mask<T>(up >= 1.0) | Mask<T>(cosine >= 1.0), all, left);
+        return select(Mask<T>(flat * tilt * light < 0.0), none, left);
+    }
+};
 
 // One line a kind of lobe. Each has a color (the most that it sends on), KIND (by which objects and lights hide and by which
 // bounces are counted), DELTA (whether its direction is no matter of chance), IS_DIFFUSE (whether passes count it so), eval, pdf
@@ -92,8 +114,8 @@ template <class T> class BSDFOf {
         return sum;
     }
 
-    // What of light from a unit direction is sent on to where the path came from, cosine included, by lobes of some kinds.
-    // weight(kind, pdf): what of it counts, by the density with which `sample` chooses that lobe and this direction.
+    // The share of light from a unit direction that lobes of some kinds send on to where the path came from, cosine included.
+    // weight(kind, pdf): the part of it that counts, by the density with which `sample` chooses that lobe and this direction.
     template <class Weight> ScatteredLightOf<T> eval(Vec3Of<T> to_light, Flags<T> kinds, Weight&& weight) const {
         ScatteredLightOf<T> sum;
         for (int i = 0; i < count_; i++)

@@ -8,7 +8,7 @@
 #include <variant>
 
 #include "../math/vec.h"
-#include "dielectric.h"
+#include "specular.h"
 
 namespace viewcam::VIEWCAM_ISA {
 

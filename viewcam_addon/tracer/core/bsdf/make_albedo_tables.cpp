@@ -7,9 +7,9 @@
 // that is in proportion to cos² b sin g. Along g the integrand has edges, where a reflection meets the horizon and where all is
 // reflected: each row is cut there.
 //
-// What is tabulated, and where its nodes are, is Cycles' own, so that what lies between them is interpolated alike: roughness and
-// cosine i/(n − 1), at least 1e-4, the index of refraction by the fourth root z of its reflectance, at most 0.99. In the tables
-// of glass, refractions count even where a facet sends them up; in those of Fresnel curves nothing is hidden.
+// The tables' contents and nodes are Cycles' own, so that what lies between them is interpolated alike: roughness and cosine
+// i/(n − 1), at least 1e-4, the index of refraction by the fourth root z of its reflectance, at most 0.99. In the tables of
+// glass, refractions count even where a facet sends them up; in those of Fresnel curves nothing is hidden.
 #define VIEWCAM_ISA tables
 #include <algorithm>
 #include <cstdio>
@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "fresnel.h"
-#include "microfacets.h"
+#include "microfacet.h"
 
 using namespace viewcam::tables;
 
@@ -97,7 +97,7 @@ double mean(const Quadrature& points, double roughness, double cosine, double cr
     return sum * 2 / (PI * share);
 }
 
-// What of a facet's light is not hidden on its way out. rise: of that way above or below the surface.
+// The share of a facet's light that is not hidden on its way out. rise: the sine of that way above or below the surface.
 double seen(const Viewer& viewer, double rise) {
     double squared = viewer.facets.alpha_x * viewer.facets.alpha_x * std::max(1 / (rise * rise) - 1, 0.0);
     double in = viewer.facets.lambda(viewer.wi), out = 0.5 * (std::sqrt(1 + squared) - 1);
@@ -166,7 +166,7 @@ int main(int given, char** words) {
         for (size_t i = 0; i < along.x.size(); i++) sum += 2 * along.weight[i] * along.x[i] * of(along.x[i]);
         return sum;
     };
-    std::printf("// How much light rough surfaces scatter, as make_albedo_tables.cpp computes it: not written by hand.\n#pragma once\n\n"
+    std::printf("// The share of light that rough surfaces scatter, as make_albedo_tables.cpp computes it: not written by hand.\n#pragma once\n\n"
                 "namespace viewcam::VIEWCAM_ISA::albedo_tables {\n\n");
     write("GGX", "32 cosines × 32 roughnesses", 1024, [&](int i) { return mean(points, node(i % 32, 32), node(i / 32, 32), 0, mirror); });
     write("GGX_MEAN", "32 roughnesses", 32, [&](int i) {

@@ -1,9 +1,22 @@
-// Directions that are spread over spheres and cones as some density says.
+// The sample of a BSDF, or of one lobe of it; and directions that are spread over spheres and cones as some density says.
 #pragma once
 #include "../math/trig.h"
 #include "../math/vec.h"
+#include "../ray.h"
 
 namespace viewcam::VIEWCAM_ISA {
+
+// direction: unit. weight: the BSDF times the cosine over the density. pdf: the density by solid angle, INFINITE of mirrors.
+template <class T> struct LobeSampleOf {
+    Vec3Of<T> direction, weight;
+    T pdf{};
+};
+using LobeSample = LobeSampleOf<double>;
+// kind: of the ray that goes on, a RayKind.
+template <class T> struct BSDFSampleOf : LobeSampleOf<T> {
+    Flags<T> kind{};
+    Mask<T> is_diffuse{};
+};
 
 // A direction as often as the cosine of its angle to the unit normal is large; `cosine` receives that. It points from where a
 // unit sphere touches the surface to a point that lies evenly all over the sphere, twice the cosine away: no frame is needed.

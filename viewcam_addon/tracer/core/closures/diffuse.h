@@ -1,6 +1,6 @@
 // Diffuse reflection, rough or Lambert's, and what is let through as evenly.
 #pragma once
-#include "../bsdf/oren_nayar.h"
+#include "../bsdf/diffuse.h"
 #include "shading_point.h"
 
 namespace viewcam::VIEWCAM_ISA {

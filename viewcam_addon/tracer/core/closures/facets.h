@@ -16,7 +16,7 @@ template <class T> inline FacetsOf<T> facets_of(T roughness, bool beckmann = fal
     return {{alpha, alpha, beckmann}, {}};
 }
 
-// How facets are stretched: by how much, and along what, which is turned about the normal.
+// The stretch of facets: by how much, and along what, which is turned about the normal.
 struct Anisotropy {
     Color amount, rotation, tangent;
 
@@ -46,7 +46,7 @@ struct Anisotropy {
     }
 };
 
-// What the facets of rough closures are like, and whether light that they scatter more than once counts.
+// The distribution of the facets of rough closures, and whether light that they scatter more than once counts.
 struct Distribution {
     bool beckmann, multiple;
 
@@ -70,7 +70,7 @@ inline void add_reflection(BSDFOf<T>& bsdf, const At& at, Vec3Of<T> color, Vec3O
         if (!is_black(facets.tangent)) frame = frame_along(normal, facets.tangent);
     bsdf.add(MicrofacetReflectionOf<T>{{color, frame, frame.to_local(-at.incoming), facets, fresnel}});
 }
-// What `fresnel` lets through. ratio: as of `refracted`.
+// Adds the refraction of what `fresnel` lets through. ratio: see `refracted`.
 inline void add_refraction(BSDF& bsdf, const ShadingPoint& at, Vec3 color, Vec3 normal, const Facets& facets, const Fresnel& fresnel,
                            double ratio) {
     constexpr double UNBENT = 1e-4;
@@ -83,7 +83,7 @@ inline void add_refraction(BSDF& bsdf, const ShadingPoint& at, Vec3 color, Vec3 
     bsdf.add(MicrofacetTransmission{{color, frame, frame.to_local(-at.incoming), facets, fresnel}, ratio});
 }
 
-// What facets that reflect by a Fresnel term of this mean make of light that they scatter more than once.
+// The gain by light that facets scatter more than once, which reflect by a Fresnel term of this mean.
 template <class At, class T>
 inline MultipleScatteringOf<T> multiple_reflection(const At& at, Vec3Of<T> normal, const MicrofacetsOf<T>& facets, Vec3Of<T> mean) {
     return MultipleScatteringOf<T>::of(ggx_albedo<T>(roughness_of(facets), -dot(normal, at.incoming)), mean);

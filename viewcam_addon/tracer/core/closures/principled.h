@@ -90,7 +90,7 @@ struct PrincipledClosure {
     static constexpr double NEGLIGIBLE = 1e-5, LEAST_IOR = 1e-5, MOST_TINT = 1e40;
 
     bool emits_nothing() const { return emission_color.is_black() || emission_strength.is_black(); }
-    // What scattering more than once multiplies an albedo and a lobe by.
+    // The factors of an albedo and of a lobe by scattering more than once.
     template <class T> struct Scattering {
         Vec3Of<T> albedo = gray(splat<T>(1)), lobe = gray(splat<T>(1));
 
@@ -133,7 +133,7 @@ struct PrincipledClosure {
         return left * Vec3{absorbed(tint.x), absorbed(tint.y), absorbed(tint.z)};
     }
 
-    // What a layer leaves of a weight, for all channels alike.
+    // The weight that a layer leaves to what is below it, the same share of all channels.
     template <class T> static Vec3Of<T> below(Vec3Of<T> weight, Vec3Of<T> albedo) {
         auto part = [](T taken, T of) { return select(Mask<T>(of != 0.0), taken / of, T{}); };
         T most = max(part(albedo.x, weight.x), max(part(albedo.y, weight.y), part(albedo.z, weight.z)));

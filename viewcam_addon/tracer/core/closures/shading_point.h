@@ -1,4 +1,5 @@
-// What closures are told: the point that a path has come to, and how they read the inputs that a scene file gives them.
+// The point that closures are told of: the one that a path has come to, and how they read the inputs that a scene file gives
+// them.
 #pragma once
 #include <algorithm>
 #include <stdexcept>
@@ -15,7 +16,7 @@ namespace viewcam::VIEWCAM_ISA {
 // The versions of Blender whose Cycles computes materials in ways of its own: what is meant is the newest that is not newer.
 enum CyclesVersion { CYCLES_4_2 = 402, CYCLES_4_3 = 403, CYCLES_5_0 = 500, CYCLES_5_1 = 501, CYCLES_5_2 = 502 };
 
-// What values are: as a number, a color counts by its luminance and a vector by its mean.
+// The types of values: as a number, a color counts by its luminance and a vector by its mean.
 enum class Gives { NUMBER, COLOR, VECTOR };
 
 // Luminance by Rec. 709's primaries.
@@ -45,7 +46,7 @@ struct ShadingPoint {
     const Scene* scene = nullptr;
     RayState ray;
 
-    // What an input is given here; as light, and of a color the luminance.
+    // An input's value here; as light; and of a color the luminance.
     Vec3 value(const Color& color) const { return color.node == NONE ? color.at(textures, point) : value_of_node(color.node); }
     Vec3 color(const Color& color) const {
         if (color.node == NONE) return color.at(textures, point);
@@ -69,15 +70,15 @@ struct ShadingPoint {
     Vec3 specular_normal(const Color& given) const { return specular(normal(given)); }
     bool is_smooth(const Microfacets& facets) const { return is_mirror(facets, version); }
 
-    // What the mesh has here under a name, up to four numbers; {0, 0, 0, 1} where it has nothing. Defined in scene.h.
+    // The mesh's attribute of a name here, up to four numbers; {0, 0, 0, 1} where it has nothing. Defined in scene.h.
     struct Values {
         Vec3 first;
         double fourth = 1;
         int width = 0;
     };
     Values attribute(const std::string& name) const;
-    // What a normal map stands on, in the object's space, interpolated and not of unit length. side: of the map, 0 where the mesh
-    // has no UV map of that name. Defined in scene.h.
+    // The frame that a normal map stands on, in the object's space, interpolated and not of unit length. side: the map's side,
+    // 0 where the mesh has no UV map of that name. Defined in scene.h.
     struct TangentFrame {
         Vec3 normal, tangent;
         double side = 0;
@@ -87,13 +88,13 @@ struct ShadingPoint {
     // the u of a UV map grows, 0 where the mesh has none of that name. Defined in scene.h.
     Vec3 tangent_round(int axis) const;
     Vec3 tangent_along(const std::string& uv) const;
-    // That which an input asks for: round z where it asks for none.
+    // The tangent that an input asks for: round z where it asks for none.
     Vec3 tangent(const Color& given) const { return given.node == NONE ? tangent_round(2) : value_of_node(given.node); }
     // A normal of the object's space, of any length.
     Vec3 to_world_normal(Vec3 normal) const;
     // Where this is in the box round the mesh's vertices, from 0 to 1; ½ along what has no extent.
     Vec3 generated() const;
-    // As Camera has it: to the right, up and ahead; and in the picture, from 0 to 1.
+    // The point in the node Camera's space: to the right, up and ahead; and in the picture, from 0 to 1.
     Vec3 in_camera() const;
     Vec3 in_window() const;
     // Where the camera is, in the world, and directions along its axes: those of the world where there is none.
@@ -102,13 +103,15 @@ struct ShadingPoint {
     Vec3 from_camera(Vec3 direction) const;
     // The index of the surface's material, which passes show. Defined in scene.h.
     double material_index() const;
-    // How long the ray is that has come along: from where it left a surface, or from the camera's clip start.
+    // The length of the ray that has come along: from where it left a surface, or from the camera's clip start.
     double ray_length() const;
-    // How wide the pixel is here that the path belongs to, world units.
+    // The width here of the pixel that the path belongs to, world units.
     double footprint() const;
-    // How far the nearest line along an edge of the triangle is, world units; infinite where there is none. Defined in scene.h.
+    // The distance of the nearest line along an edge of the triangle, world units; infinite where there is none. Defined in
+    // scene.h.
     double edge_distance() const;
-    // What a number would be a little beside, in the surface's own plane. away: in rendering space. Defined in scene.h.
+    // A number's value a little beside, in the surface's own plane. away: the step there, in rendering space. Defined in
+    // scene.h.
     double height_beside(const Color& height, Vec3 away) const;
 
    private:

@@ -1,4 +1,4 @@
-// What paths bring to the eye, sorted by the pass that shows it, and the passes that become of all samples of a pixel.
+// Light that paths bring to the eye, sorted by the pass that shows it, and the passes that become of all samples of a pixel.
 //
 // A pixel's samples are added one after the other, in order, so that a sum is the same, bit for bit, whatever the tile. Colors
 // are summed as differences from the pixel's first sample: where all are equal the variance is 0, and not a rounding.
@@ -23,7 +23,7 @@ namespace viewcam::VIEWCAM_ISA {
 // scattering; after more, the first of them diffuse; and what mirrors and glass show. All light is the picture.
 enum Category : uint8_t { COLOR, EMISSION, ENVIRONMENT, DIRECT, INDIRECT, OTHER, CATEGORIES };
 
-// What one path brings. covered: how much of the world behind all it hides from the eye.
+// The light that one path brings. covered: how much of the world behind all it hides from the eye.
 struct PathLight {
     double4 of[CATEGORIES];  // the channels, and 0
     double covered;
@@ -37,9 +37,9 @@ struct PathLight {
     void add(Category category, Vec3 rgb) { add(category, double4{rgb.x, rgb.y, rgb.z, 0}); }
 };
 
-// How samples become pixels.
+// The settings by which samples become pixels.
 struct FilmSettings {
-    bool transparent = false;  // whether the world behind the scene leaves pixels see-through
+    bool transparent = false;  // true if the world behind the scene leaves pixels see-through
     double exposure = 1;
 };
 

@@ -82,7 +82,7 @@ class TileSampler {
         double columns[PathIntegrator::MOST], rows[PathIntegrator::MOST];  // on the film
         PathLight light[PathIntegrator::MOST];
     };
-    // What a pixel's samples tell of its mean: s²/N and D²/4, the mean of the channels.
+    // The variance of a pixel's mean as its samples tell it: s²/N and D²/4, the mean of the channels.
     struct Spread {
         double sample = 0, own = 0, apart = 0;
     };

@@ -36,8 +36,8 @@ struct GeometryHits {
     uint32_t *object, *primitive;
 };
 
-// What up to 64 rays met, written as Cycles writes it, also where that is nothing. ray_of(i), hit_of(i): each. pixels: where in
-// the planes.
+// Writes what up to 64 rays met as Cycles writes it, also where that is nothing. ray_of(i), hit_of(i): each. pixels: their
+// places in the planes.
 template <class RayOf, class HitOf>
 inline void write_geometry(const Scene& scene, const RayOf& ray_of, const HitOf& hit_of, int count, const GeometryPasses& passes, const size_t* pixels) {
     using enum GeometryPasses::Pass;
@@ -72,9 +72,9 @@ inline void write_geometry(const Scene& scene, const RayOf& ray_of, const HitOf&
     passes.write(MAGNITUDE, at, some, [&](int i) { return max(max_component(abs(scene.origin + met_by[i]->origin)), magnitudes[i]); });
 }
 
-// How much the UV and the normal of what the eye's ray through a place in the picture meets change with each pixel: of its own plane,
-// triangle or sphere, whatever lies beside it. The root of the sum of both axes' squares, which no direction exceeds. Of a flat triangle
-// the rounding of its corners turns the normal, too, by what a shift of the picture is of its height in pixels.
+// The change with each pixel of the UV and the normal of what the eye's ray through a place in the picture meets: of its own
+// plane, triangle or sphere, whatever lies beside it. The root of the sum of both axes' squares, which no direction exceeds. Of
+// a flat triangle the rounding of its corners turns the normal, too, by what a shift of the picture is of its height in pixels.
 inline void slopes_at(const Scene& scene, double column, double row, const Hit& hit, double& uv, double& normal) {
     constexpr double STEP = 0x1p-16, FLAT = 1e-6;  // no triangle that shows is so small, and float64 has 20 digits to spare
     const Ray rays[] = {scene.camera.ray(column, row), scene.camera.ray(column - STEP, row), scene.camera.ray(column + STEP, row),

@@ -19,12 +19,12 @@
 // no last ray, without either one ray a sample. What a path brings depends on its own numbers alone, and is added up in an order
 // of its own: whichever paths go along with it, and whether rays are traced in packets, changes no bit.
 //
-// Which of several surfaces in one place a ray of a float32 renderer meets, and which of them shadows the other, is its rounding's
-// choice. What light depends on that can be asked for: then that alone counts which comes by such a place, as much of it as all
-// surfaces there would scatter, none of which shadows another. No choice of a renderer's brings more, and any brings at least nothing.
-// So it is with light that shadow rays find and scattered rays do not, or the reverse (an object that only some kinds of rays see, a
-// material that asks which kind has come, a lamp without shadows): how much of it a picture has is its renderer's own weights of multiple
-// importance sampling, which elsewhere make no difference.
+// Several surfaces in one place are a matter of rounding: which of them a ray of a float32 renderer meets, and which shadows
+// the other. The light that depends on that choice can be asked for: then that alone counts which comes by such a place, as
+// much of it as all surfaces there would scatter, none of which shadows another. No choice of a renderer's brings more, and any
+// brings at least nothing. So it is with light that shadow rays find and scattered rays do not, or the reverse (an object that
+// only some kinds of rays see, a material that asks which kind has come, a lamp without shadows): how much of it a picture has
+// is its renderer's own weights of multiple importance sampling, which elsewhere make no difference.
 //
 // Where paths come to surfaces of meshes whose materials are wide (Material::is_wide), four of one material go on at a time, at every
 // depth: surface, light, lobes and the next ray are computed in vectors, whatever the other paths of the block have met (WidePaths).
@@ -43,8 +43,8 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-// How far a ray from a point goes to a light: it ends before it by what rounding can move the light's own surface along the ray, so
-// that what the light touches does not hide it.
+// The length of a ray from a point to a light: it ends before it by what rounding can move the light's own surface along the
+// ray, so that what the light touches does not hide it.
 template <class T> inline T shadow_ray_end(const SurfacePoint<T>& point, Vec3Of<T> origin, const LightSampleOf<T>& sample) {
     constexpr double ROUNDINGS = 32 * 0x1p-53, FLATTEST = 1e-6;
     T largest = max_component(abs(origin)) + sample.distance;
@@ -142,22 +142,22 @@ class PathIntegrator {
         int sample, from;
         Category category = COLOR;
         RayKind kind = CAMERA;
-        bool coincident = false;             // whether it has met surfaces in one place
+        bool coincident = false;             // true if it has met surfaces in one place
         bool last = false, through = false;  // through: whether light from behind counts where it leaves
         bool diffuse = false;                // what its ray was scattered by
         int passed = 0;                      // surfaces that it has gone straight through
         double width = 0, spread = 0;        // of its pixel, as RayState has it, where materials ask for that
         std::array<uint16_t, 3> scattered = {};  // diffuse, glossy, transmission
         uint32_t inside = NONE;                   // the object that it has been let into last, until it is let out
-        bool may_touch = false, touches = false;  // whether its ray may meet, or has met, a surface right where it starts
+        bool may_touch = false, touches = false;  // true if its ray may meet, or has met, a surface right where it starts
         Vec3 weight{1, 1, 1};
         Ray ray;
         double pdf = INFINITE;
     };
-    // What a light brings to paths if nothing hides it.
+    // Light that paths receive if nothing hides it.
     struct Lit {
         int count;
-        bool plain;  // whether each has a shadow ray, and such a one as most lights have
+        bool plain;  // true if each has a shadow ray, and such a one as most lights have
         double4 light[MOST], other[MOST];  // other: of what is not diffuse where the eye sees it
         uint64_t others;                   // a bit for each that has it
         int sample[MOST];
@@ -200,7 +200,7 @@ class PathIntegrator {
         Interaction tables[2][2 * MOST], *points = tables[0], *next_points = tables[1];  // those of wide materials behind the others
         Lit lit[LightSampler::ASKED];  // by the light that was asked
         Hits hits;
-        // What the rays of some paths meet.
+        // The hits of the rays of some paths.
         Ray met_rays[MOST];
         Hit met[MOST];
         const Ray* met_by[MOST];
@@ -214,7 +214,7 @@ class PathIntegrator {
         return depth == 2 && category == DIRECT ? INDIRECT : category;
     }
 
-    // What a path's light is added to.
+    // The sum that a path's light is added to.
     PathLight& light_of(const Path& path, Block& block) const {
         return coincident_ > 0 && !path.coincident ? block.ignored : block.light[path.sample];
     }
@@ -227,12 +227,13 @@ class PathIntegrator {
         }
         return light_of(path, block);
     }
-    // What shadow rays, and scattered rays, leave of a light.
+    // The shares that shadow rays, and scattered rays, leave of a light.
     struct LeftByKinds {
         Vec3 shadow{1, 1, 1}, scattered{1, 1, 1};
         bool differ() const { return !VIEWCAM_ISA::is_black(shadow - scattered); }
     };
-    // What is left along a ray; notes what makes the difference. lamp: null where a surface or the sky shines. state: of the scattered ray.
+    // The shares that are left along a ray; notes what makes the difference. lamp: null where a surface or the sky shines.
+    // state: of the scattered ray.
     [[gnu::noinline]] LeftByKinds left_by_kinds(const Ray& ray, const Light* lamp, const RayState& state) const {
         static thread_local std::vector<Hit> hits;
         scene_.surfaces(ray, RayKind(state.kind | SHADOW), INFINITE, hits);
@@ -253,7 +254,7 @@ class PathIntegrator {
         return left;
     }
     uint32_t name_of(const Light& lamp) const { return uint32_t(scene_.objects.size()) + lamp.number; }
-    // What a surface leaves of light that comes along a ray through it.
+    // The share that a surface leaves of light that comes along a ray through it.
     Vec3 left_behind(const Ray& ray, const Hit& hit, RayState state) const {
         if (!(scene_.objects[hit.object].visible & state.kind)) return {1, 1, 1};
         Interaction point = scene_.interaction(ray, hit);
@@ -292,8 +293,9 @@ class PathIntegrator {
         point.offset = max(point.offset, 2 * reach * max(point.cosine, 0.0));
         path.weight = min(path.weight * double(hits.size()), MOST_WEIGHT);
     }
-    // How far before its light a shadow ray must end, so that nothing in the light's place counts; 0 where nothing is there. Notes
-    // the surface that a lamp lies in, as in that of a ceiling; the places of surfaces that shine are met by paths, too.
+    // The distance before its light at which a shadow ray must end, so that nothing in the light's place counts; 0 where
+    // nothing is there. Notes the surface that a lamp lies in, as in that of a ceiling; the places of surfaces that shine are
+    // met by paths, too.
     [[gnu::noinline]] double coincident_end(const Interaction& point, const LightSample& sample, const Light& light) const {
         static thread_local std::vector<Hit> hits;
         if (!(sample.distance < INFINITE && light.casts_shadow)) return 0;
@@ -331,8 +333,8 @@ class PathIntegrator {
         point = {{mesh, &object, nullptr, hit.primitive}, material};
         return true;
     }
-    // What a path brings of the light of a surface where its ray arrives, less what samples of that light find. distance: from
-    // where it was scattered.
+    // Light of a surface where a path's ray arrives, less what samples of that light find. distance: from where it was
+    // scattered.
     Vec3 emission(const Path& path, const ShadingPoint& at, double distance, const Block& block) const {
         double share = 1;
         if (path.kind != CAMERA) {
@@ -443,7 +445,8 @@ class PathIntegrator {
             light.add(path.category, path.weight * lights_.environment_le(ray.direction, path.kind, block.points[path.from], path.pdf, depth == 1, path.through));
         }
     }
-    // What of light comes along a shadow ray that meets something: none but where all that stands in its way lets some through.
+    // The share of light that comes along a shadow ray that meets something: none but where all that stands in its way lets
+    // some through.
     Vec3 transmittance(Ray ray, RayKind kind, RayState state) const {
         Vec3 left{1, 1, 1};
         while (!is_black(left)) {
@@ -460,13 +463,13 @@ class PathIntegrator {
         return left;
     }
 
-    // What of light comes along a shadow ray.
+    // The share of light that comes along a shadow ray.
     Vec3 unoccluded(const Ray& ray, RayKind kind, const RayState& state) const {
         if (!scene_.occluded(ray, kind)) return {1, 1, 1};
         return transparent_ ? transmittance(ray, kind, state) : Vec3{};
     }
 
-    // What the eye's rays come to, and the light that is of this alone.
+    // Follows the eye's rays to what they meet, and adds the light that is of this alone.
     void start(int count, Block& block) const {
         int met = 0;
         bool meets_lamps = lights_.meets_lamps(CAMERA);
@@ -844,7 +847,7 @@ class PathIntegrator {
     static double nearly(const Interaction& point, Vec3 direction) {
         return 8 * point.offset / max(std::fabs(dot(point.normal, direction)), 1e-6);
     }
-    // What another thing has from before where a path's ray starts, which comes out of one or goes back to what it came from.
+    // The hit on another thing right where a path's ray starts, which comes out of one or goes back to what it came from.
     Hit touched(Path& path, const Interaction& point) const {
         double range = nearly(point, path.ray.direction);
         Ray ray{point.position - path.ray.direction * range, path.ray.direction, 0, 2 * range};
@@ -916,11 +919,11 @@ class PathIntegrator {
     SobolSampler sampler_;
     int most_, most_of_[TRANSMISSION + 1] = {};
     bool meets_[TRANSMISSION + 1] = {}, only_sky_[TRANSMISSION + 1] = {};
-    bool lit_, transparent_ = false, mixed_ = false;  // whether materials let anything straight through, and beside that scatter
-    bool dark_;                                       // whether nothing shines but lamps and the sky, and nothing lets light through
-    bool shadow_linked_ = false;                      // whether the light of surfaces has blockers of its own
-    bool sees_otherwise_ = false;                     // whether shadow rays may find a light where scattered rays don't, or the reverse
-    bool has_pixels_ = false;                         // whether materials ask how wide pixels are
+    bool lit_, transparent_ = false, mixed_ = false;  // true if materials let anything straight through, and beside that scatter
+    bool dark_;                                       // true if nothing shines but lamps and the sky, and nothing lets light through
+    bool shadow_linked_ = false;                      // true if the light of surfaces has blockers of its own
+    bool sees_otherwise_ = false;                     // true if shadow rays may find a light where scattered rays don't, or the reverse
+    bool has_pixels_ = false;                         // true if materials ask how wide pixels are
     int most_passed_, ended_after_;                   // surfaces that shadow rays, and paths, go straight through
     uint32_t kinds_ = 0, spread_ = 0;  // of rays that any material scatters, and all over
     double coincident_;                // roundings

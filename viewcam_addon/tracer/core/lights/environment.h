@@ -1,7 +1,7 @@
 // The world: light from everywhere beyond the scene, the same everywhere or as an image that is wrapped around it.
 //
-// What is the same everywhere is found best by rays that are scattered: none are aimed at it. An image is sampled as a light, too:
-// a cell of a table of at most 2048 × 1024 is picked by the light that it gives, and a direction of it evenly.
+// A world that is the same everywhere is found best by rays that are scattered: none are aimed at it. An image is sampled as a
+// light, too: a cell of a table of at most 2048 × 1024 is picked by the light that it gives, and a direction of it evenly.
 //
 // As in Cycles (measured with 4.2, 4.5, 5.0 and 5.2): of an equirectangular image u is ½ − atan2(y, x)/2π and v is 1 − acos(z)/π,
 // and blends wrap around it both ways, at the poles, too.
@@ -86,7 +86,7 @@ class Environment {
 
     static double mix(double a, double b, double t) { return a + (b - a) * t; }
     static Vec2 place(Vec3 direction) { return equirectangular(direction); }
-    // What the cells of a row give in the mean over their pixels, all of them together; reached: receives their light, summed up.
+    // The sum of the cells of a row, each the mean over its pixels; reached: receives their light, summed up.
     Vec3 cells(int row, double* reached) const {
         Vec3 sum;
         double light = 0;

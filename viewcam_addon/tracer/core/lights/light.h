@@ -21,7 +21,7 @@ class Light {
 
     uint32_t hidden_from;
     bool casts_shadow;
-    bool multiple_importance = true;  // whether rays run into it, where it has a size
+    bool multiple_importance = true;  // true if rays run into it, where it has a size
     uint64_t receivers;
     RayKind shadow_rays;
     uint32_t number = NONE;  // of lamps, in the scene
@@ -55,8 +55,8 @@ class Light {
             },
             kind_);
     }
-    // What a ray sees of a lamp that it runs into; surfaces are met as all others are.
-    // distance: receives how far away that is, where it is not at infinity.
+    // The radiance of a lamp that a ray runs into; surfaces that shine are met as all others are. distance: receives how far
+    // away that is, where it is not at infinity.
     Vec3 le(const LightRay& ray, double& distance) const {
         Vec3 radiance = std::visit(
             [&](const auto& light) {
@@ -119,8 +119,8 @@ class Light {
     void shine_by(const Color& emission, Vec3 middle, const Scene* scene) { emission_ = emission, middle_ = middle, scene_ = scene; }
 
    private:
-    // What nodes make of a lamp's light at a place that is seen from another, along a unit direction. A sun's place is the way that its
-    // light goes, as in Cycles. start: from where on the way counts.
+    // The factor that nodes make of a lamp's light at a place that is seen from another, along a unit direction. A sun's place
+    // is the way that its light goes, as in Cycles. start: from where on the way counts.
     Vec3 emission(Vec3 from, Vec3 ahead, double distance, double start = 0) const {
         Interaction point;
         point.position = distance < INFINITE ? from + ahead * distance : -ahead - scene_->origin;
@@ -140,8 +140,8 @@ class Light {
     const Scene* scene_ = nullptr;
 };
 
-// What each kind of light has. What rays run into has the density of being sampled there, or nothing would weigh the two against
-// each other; what lies at infinity has an irradiance everywhere, and all else bounds.
+// The members of each kind of light. One that rays run into has the density of being sampled there, or nothing would weigh the
+// two against each other; one that lies at infinity has an irradiance everywhere, and any other has bounds.
 template <class Kind>
 concept IsLight = requires(const Kind& light, const Interaction& from, Vec3 v) {
     { light.estimate(v, v) } -> std::same_as<double>;

@@ -34,7 +34,7 @@ struct LightBounds {
         double facing = cosine_of_rest(risen, cos_box, sin_box);
         return min(intensity / squared, MOST) * max(off_normal, 0.0) * max(facing, 0.0);
     }
-    // How much a split costs that leaves these lights together: what they give, over the directions and from the places they may.
+    // The cost of a split that leaves these lights together: what they give, over the directions and from the places they may.
     double cost() const {
         Vec3 size = box.high - box.low;
         double normals = acos(cos_normals), reached = min(normals + acos(cos_emission), PI), sin_normals = sine(cos_normals);

@@ -1,4 +1,4 @@
-// What all lights are asked and answer.
+// The questions to all lights, and their answers.
 //
 // Each kind of light is a class with
 //

@@ -31,7 +31,7 @@ class LightSampler {
         int slot = 0;
     };
 
-    // What some of four points choose; a lane that has no choice goes along with one that has.
+    // The choices of four points, or some of them; a lane that has no choice goes along with one that has.
     struct Choices {
         const Light* light[4];
         double4 chance, rest;
@@ -99,7 +99,7 @@ class LightSampler {
     }
 
     const Environment& environment() const { return *environment_; }
-    // What a ray sees of the world that a surface has scattered with a density. seen, through: as in `choose`.
+    // The radiance of the world along a ray that a surface has scattered with a density. seen, through: see `choose`.
     Vec3 environment_le(Vec3 direction, RayKind kind, const Interaction& from, double pdf, bool seen, bool through) const {
         Vec3 radiance = environment_->le(direction, kind);
         if (sky_ == NONE || pdf == INFINITE || is_black(radiance)) return radiance;
@@ -123,7 +123,7 @@ class LightSampler {
 
     bool is_linked() const { return linked_; }
 
-    // How many lights surfaces can be lit by, and whether what they get depends on chance.
+    // The number of lights that surfaces can be lit by, and whether what they get depends on chance.
     int count() const { return count_; }
     bool has_sky() const { return sky_ != NONE; }  // among them
     bool has_meshes() const { return size_t(count_) > lamps_; }
@@ -211,7 +211,8 @@ class LightSampler {
         }
     }
 
-    // What the sky may bring over what the brightest lamp does, as `choose` tells, and how often it is worth a ray beside that.
+    // The light that the sky may bring, over the brightest lamp's, as `choose` tells, and how often it is worth a ray beside
+    // that.
     double sky_share(double brightest, RayKind kind) const {
         return environment_->lights(kind) ? PI * mean(environment_->mean_radiance()) / brightest : 0;
     }
@@ -233,7 +234,7 @@ class LightSampler {
     // True if lamps and the sky are asked one by one where the eye sees points.
     bool asks_each() const { return count_ <= ASKED && !has_meshes() && (count_ > 1 || !is_black(environment_->radiance)); }
 
-    // What a light may bring to a point.
+    // The most that a light may bring to a point.
     double estimate(uint32_t light, const Interaction& point, bool through) const {
         if (!reaches(lights_[light], point)) return 0;
         double before = estimate(light, point, point.shading, point.normal);
@@ -313,8 +314,8 @@ class LightSampler {
     }
 
     const std::vector<Object>* objects_;
-    bool shadow_linked_ = false;  // whether rays run into a lamp that has blockers of its own
-    bool linked_ = false;        // whether any light has receivers of its own
+    bool shadow_linked_ = false;  // true if rays run into a lamp that has blockers of its own
+    bool linked_ = false;        // true if any light has receivers of its own
     std::vector<Light> lights_;  // lamps that light diffuse surfaces, meshes, lamps that don't
     size_t lamps_;
     int count_;

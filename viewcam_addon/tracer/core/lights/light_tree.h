@@ -54,7 +54,7 @@ class LightTree {
         choice.light = nodes_[node].light;
         return choice;
     }
-    // That `choose` has for a light.
+    // The probability with which `choose` has a light.
     double chance(const Interaction& point, bool through, uint32_t light) const {
         double product = 1;
         for (uint32_t node = node_of_[light]; node != 0;) {

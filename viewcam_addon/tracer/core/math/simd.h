@@ -104,7 +104,7 @@ inline double4 sqrt(double4 a) {
 #endif
 }
 
-// As a number, exactly: words become signed by their highest bit, which is added again.
+// Words as numbers, exactly: they become signed by their highest bit, which is added again.
 inline double4 number_of(uint4 words) { return __builtin_convertvector((int4)(words ^ 0x80000000u), double4) + splat4(0x1p31); }
 inline double number_of(uint32_t word) { return word; }
 
@@ -158,7 +158,7 @@ template <class T> inline T splat(double x) {
         return x;
 }
 template <class T> inline Vec3Of<T> splat(Vec3 v) { return {splat<T>(v.x), splat<T>(v.y), splat<T>(v.z)}; }
-// What a comparison of these gives.
+// The type of a comparison of these.
 inline Vec3 select(bool mask, Vec3 a, Vec3 b) { return mask ? a : b; }
 template <class T> using Mask = std::conditional_t<std::is_same_v<T, double4>, long4, bool>;
 // A set of flags for a number, or for each of four; those of `flags` where a mask holds.
@@ -166,7 +166,7 @@ template <class T> using Flags = std::conditional_t<std::is_same_v<T, double4>, 
 inline uint32_t where(bool mask, uint32_t flags) { return mask ? flags : 0; }
 inline uint4 where(long4 mask, uint32_t flags) { return (uint4)__builtin_convertvector(mask, int4) & flags; }
 inline bool has(uint32_t flags, uint32_t flag) { return flags & flag; }
-// Which of four have a flag, as bits.
+// The lanes of four that have a flag, as bits.
 inline unsigned lanes_with(uint4 flags, uint32_t flag) { return ~bits(int4((flags & flag) == 0u)) & 15; }
 inline long4 has(uint4 flags, uint32_t flag) { return __builtin_convertvector((int4)((flags & flag) != 0u), long4); }
 

@@ -68,7 +68,7 @@ template <class T> inline T asin_of_small(T x) {
 }
 }  // namespace detail
 
-// What is rounded to beyond ±1 counts as ±1.
+// An argument that was rounded to beyond ±1 counts as ±1.
 template <class T> inline T asin(T x) {
     T size = abs(x);
     Mask<T> is_small(size <= 0.5);

@@ -1,4 +1,4 @@
-// How much light a lamp sends where, as its maker has measured it.
+// The light that a lamp sends in each direction, as its maker has measured it.
 #pragma once
 #include <cstdlib>
 
@@ -41,7 +41,7 @@ struct IESNode {
         size_t column, row;
         double along_column, along_row;
         if (!between(up, rise, column, along_column) || !between(across, turn, row, along_row)) return {};
-        bool goes_on = at.version >= CYCLES_5_0;  // whether what lies at an end counts beyond, or 0
+        bool goes_on = at.version >= CYCLES_5_0;  // true if what lies at an end counts beyond; else that is 0
         auto in_row = [&](size_t i) {
             const double* value = &values[i * up.size()];
             double b = value[column], c = value[column + 1];

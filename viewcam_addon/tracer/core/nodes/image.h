@@ -9,7 +9,8 @@ inline Lookup::Interpolation interpolation_of(const std::string& name) {
     return name == "closest" ? Lookup::CLOSEST : name == "cubic" ? Lookup::CUBIC : Lookup::LINEAR;
 }
 
-// How an image lies on what has it: flat, rolled round, or thrown on it along the object's three axes, from where it looks most.
+// The ways an image lies on its object: flat, rolled round, or thrown on it along the object's three axes, from where it looks
+// most.
 struct ImageNode {
     static constexpr const char* NAME = "image";
     static constexpr Gives GIVES = Gives::COLOR;
@@ -51,8 +52,8 @@ struct ImageNode {
         if (!(size > 0)) return {};
         return {place.x != 0 || place.y != 0 ? 0.5 - round : 0, 1 - acos(place.z / size) / PI};
     }
-    // What is seen from the three axes, mixed by how the surface is turned: one in the corners of the triangle of all turns, two at its
-    // sides, three in its middle.
+    // The colors that are seen from the three axes, mixed by how the surface is turned: one in the corners of the triangle of
+    // all turns, two at its sides, three in its middle.
     template <class LookUp> Vec3 from_sides(const ShadingPoint& at, Vec3 place, LookUp&& color) const {
         Vec3 normal = at.object ? at.object->to_world.transposed(at.point.shading) : at.point.shading, n = abs(normal);
         n = n / (n.x + n.y + n.z);

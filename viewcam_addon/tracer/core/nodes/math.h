@@ -217,7 +217,7 @@ struct ClampNode {
     static constexpr const char* NAME = "clamp";
     static constexpr Gives GIVES = Gives::NUMBER;
     Color given, least, most;
-    bool either_way;  // whether the two ends may be swapped
+    bool either_way;  // true if the two ends may be swapped
 
     explicit ClampNode(const Inputs& in) : given(in["value"]), least(in["min"]), most(in["max"]), either_way(in.choice("kind") == "range") {}
     Vec3 eval(const ShadingPoint& at) const {

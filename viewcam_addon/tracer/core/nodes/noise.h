@@ -95,7 +95,7 @@ template <size_t N> inline double signed_noise(Place<N> p) {
     return SCALES[N - 1] * sum;
 }
 
-// How noise is summed over octaves, each of which is `lacunarity` times as fine.
+// The sums of noise over octaves, each of which is `lacunarity` times as fine.
 struct Octaves {
     enum Sum { FBM, MULTIFRACTAL, HYBRID_MULTIFRACTAL, RIDGED_MULTIFRACTAL, HETERO_TERRAIN } sum = FBM;
     double detail = 0, roughness = 0.5, lacunarity = 2, offset = 0, gain = 1;

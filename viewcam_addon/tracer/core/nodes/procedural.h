@@ -6,7 +6,7 @@ namespace viewcam::VIEWCAM_ISA {
 
 // So that whole coordinates do not lie on the border of two cells.
 inline Vec3 off_the_border(Vec3 p) { return (p + gray(0.000001)) * 0.999999; }
-// As a whole number; 0 where it is too large for one.
+// A number as a whole one; 0 where it is too large for one.
 inline int32_t whole_number(double x) { return std::fabs(x) < 2e9 ? int32_t(std::floor(x)) : 0; }
 
 // A place as two or three of its axes and w, by the dimensions that are asked for.

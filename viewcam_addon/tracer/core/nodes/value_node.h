@@ -1,5 +1,5 @@
-// What closures' inputs are computed from where they are neither constants nor a plain image: nodes, each of which makes a number,
-// a color or a vector of what other nodes make. A scene has one list of them; a node names only nodes before it.
+// Nodes, from which closures' inputs are computed where they are neither constants nor a plain image. Each makes a number, a
+// color or a vector of what other nodes make. A scene has one list of them; a node names only nodes before it.
 //
 // Evaluated at each hit, from the input back: what no input needs is never computed. A node whose inputs are all constant becomes
 // its value when it is made, so that constants cost nothing. Rejected: a stack machine (Cycles' SVM), whose order must be compiled.
@@ -12,10 +12,8 @@
 #include "geometry.h"
 #include "ies.h"
 #include "image.h"
-#include "light_path.h"
 #include "normals.h"
 #include "procedural.h"
-#include "spectrum.h"
 #include "voronoi.h"
 
 namespace viewcam::VIEWCAM_ISA {
@@ -35,8 +33,8 @@ struct Joined<std::variant<First...>, std::variant<Second...>, Others...> : Join
 // Each file of several nodes lists them at its end, those of one stand here. A node has a NAME, by which a scene asks for it, what it
 // GIVES, by which it becomes a number, and `eval`; VARIES or `varies` where it depends on more than its inputs; `gives` where the node
 // itself knows what it gives.
-using ValueNode = Joined<std::variant<ConstantNode, BumpNode, IESNode, LightPathNode, NormalMapNode, VoronoiNode>, ImageNodes, GeometryNodes,
-                         MathNodes, ColorNodes, CurveNodes, SpectrumNodes, ProceduralNodes>::Variant;
+using ValueNode = Joined<std::variant<ConstantNode, BumpNode, IESNode, NormalMapNode, VoronoiNode>, ImageNodes, GeometryNodes,
+                         MathNodes, ColorNodes, CurveNodes, ProceduralNodes>::Variant;
 template <class Kind>
 concept IsValueNode = requires(const Kind& node, const ShadingPoint& at) {
     { Kind::NAME } -> std::convertible_to<std::string_view>;

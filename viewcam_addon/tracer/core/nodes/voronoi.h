@@ -35,7 +35,7 @@ template <size_t N> struct VoronoiPoints {
     std::array<int32_t, N> cell = {};
     Place<N> local = {};  // of the place, in its cell
 
-    // What is told of the point that counts. position: from the place's cell on.
+    // The figures of the point that counts. position: from the place's cell on.
     struct Found {
         double distance = 0;
         Vec3 color;

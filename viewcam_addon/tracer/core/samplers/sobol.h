@@ -34,7 +34,7 @@ namespace viewcam::VIEWCAM_ISA {
 
 class SobolSampler {
    public:
-    // How many dimensions the film has, and each scattering, and which of a scattering's are for what.
+    // The numbers of dimensions of the film and of each scattering, and what each of a scattering's is for.
     static constexpr int FILM = 2, SCATTERING = 8, ROWS = FILM + SCATTERING;
     enum Purpose { LIGHT = 0, LIGHT_POINT = 1, DIRECTION = 3, LOBE = 5, ROULETTE = 6, THROUGH = 7 };
     // The dimension of a purpose at the depth-th scattering, from 1.
@@ -112,7 +112,8 @@ class SobolSampler {
         return (uint4)__builtin_shufflevector(bytes, bytes, 3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12);
     }
 
-    // Which of Sobol's points a sample has at a scattering: Owen's permutation, each bit flipped, or not, by those above it.
+    // The number of Sobol's point that a sample has at a scattering: Owen's permutation, each bit flipped, or not, by those
+    // above it.
     uint32_t order(int depth, uint32_t sample) const {
         if (depth == 0) return sample;
         uint32_t order = sample;

@@ -15,9 +15,9 @@ struct Object {
     float index = 0;            // what the Object Index pass shows
     const float* info = nullptr;  // its color, alpha and random number, where a material may ask for them
     RayKind shadow_rays = SHADOW;  // the kind of those that are sent to it
-    bool shared = false;        // whether other objects place the same geometry
-    bool flat = false;          // whether the matrix has no inverse to speak of
-    bool mirrored = false;      // whether corners that run counter-clockwise in object space run clockwise in the world
+    bool shared = false;        // true if other objects place the same geometry
+    bool flat = false;          // true if the matrix has no inverse to speak of
+    bool mirrored = false;      // true if corners that run counter-clockwise in object space run clockwise in the world
     double condition = 1;       // of the matrix: by how much its inverse may enlarge a rounding
     Affine to_world;            // object space to rendering space
     double inverse[3][3] = {};  // of its linear part

@@ -151,7 +151,8 @@ inline Interaction sphere_interaction(const Spheres& spheres, const Object& obje
     return found;
 }
 
-// As of triangles, of the sphere's extent; a sphere is as slender as an equilateral triangle: not at all.
+// The length to which rounding applies, as of triangles, with the sphere's extent; a sphere is as slender as an equilateral
+// triangle: not at all.
 inline double sphere_magnitude(const Spheres& spheres, const Object& object, const Ray& ray, size_t i, Vec3 origin) {
     Vec3 middle = object.to_world.point(spheres.center(i)), world = abs(middle + origin);
     double largest = max_component(abs(object.to_world.translation() + origin)), radius = spheres.radii[i];

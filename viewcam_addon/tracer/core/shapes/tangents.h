@@ -37,7 +37,7 @@ class TangentsOfMesh {
     static size_t next(size_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
     static size_t previous(size_t corner) { return corner % 3 == 0 ? corner + 2 : corner - 1; }
     Vec3 place(size_t corner) const { return mesh_.corner(corner / 3, int(corner % 3)); }
-    // As float32 has them, so that equal faces have equal ones.
+    // Rounded to float32, so that equal faces have equal ones.
     std::array<float, 3> normal(size_t corner) const {
         if (mesh_.corner_normals) {
             const float* n = mesh_.corner_normals + 3 * corner;
@@ -104,7 +104,7 @@ class TangentsOfMesh {
             for (size_t k = i + 1; !taken[i] && k < edges.size() && edges[k].low == edges[i].low && edges[k].high == edges[i].high; k++)
                 if (!taken[k] && vertex_[edges[k].corner] != vertex_[edges[i].corner])  // they run against each other
                     taken[i] = taken[k] = true, shared.push_back({edges[i].corner, edges[k].corner});
-        // What has no side of its own is on that of a neighbor.
+        // A triangle that has no side of its own is on that of a neighbor.
         for (auto [a, b] : shared)
             for (auto [from, to] : {std::pair{a / 3, b / 3}, std::pair{b / 3, a / 3}})
                 if (!turns_[to]) turns_[to] = turns_[from];

@@ -17,7 +17,7 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-// What the corners of a mesh's triangles have under a name. values: (count, 3, width).
+// An attribute of the corners of a mesh's triangles. values: (count, 3, width).
 struct Attribute {
     std::string name;
     int width;
@@ -259,10 +259,10 @@ class TriangleSurfaces {
         }
     }
 
-    // What a renderer's relative rounding applies to: the largest coordinate in world space, or of the object's place, plus the
-    // distance of the farthest corner from the ray's origin times the triangle's slenderness. Barycentric coordinates that are
-    // computed from the eye are off by a rounding of that distance over the height, and move the hit along the longest side.
-    // origin: of rendering space.
+    // The length to which a renderer's relative rounding applies: the largest coordinate in world space, or of the object's
+    // place, plus the distance of the farthest corner from the ray's origin times the triangle's slenderness. Barycentric
+    // coordinates that are computed from the eye are off by a rounding of that distance over the height, and move the hit along
+    // the longest side. origin: of rendering space.
     double4 magnitude(Vec3 origin) const {
         double4 largest = max_component(abs(translation_ + splat4(origin))), farthest = splat4(0.0);
         for (const Vec3x4& corner : corner_) {
@@ -287,18 +287,19 @@ class TriangleSurfaces {
         return a * (1 - b1_[i] - b2_[i]) + b * b1_[i] + c * b2_[i];
     }
 
-    // What is no surface, but was found to be hit, looks at the ray, and all else, too: −1 where the normal is turned for that.
+    // The side from which each is hit: −1 where the normal is turned to look at the ray. A triangle that is no surface, but was
+    // found to be hit, is not turned.
     long4 is_solid() const { return long4(size_ > splat4(0.0)) & long4(size_ < splat4(INFINITE)); }
     double4 side() const { return select(long4(dot(normal_, direction_) > splat4(0.0)) & is_solid(), splat4(-1.0), splat4(1.0)); }
 
     // The longest side over the height on it; slimmer triangles than float32 can tell from a line are no surface.
     double4 slenderness() const { return min(longest_squared_ / size_, splat4(MOST_SLENDER)); }
 
-    // How far off the surface rays that leave it must start, with u = 2⁻⁵³, M the largest coordinate of corners and object in
-    // rendering space and L the longest side. The point is rounded along the normal by √3 u (M + 6 L) where it is interpolated.
-    // Seen from the start, corners are rounded by √3 u L; each of the three products u, v, w of the test is rounded by
-    // 2 u L² and their sum is the normal's projection, so that the plane seems to lie off by 6 u L σ, σ = L²/|N|. An instance's
-    // ray is rounded by as much again as its matrix's condition enlarges it.
+    // The distance from the surface at which rays that leave it must start, with u = 2⁻⁵³, M the largest coordinate of corners
+    // and object in rendering space and L the longest side. The point is rounded along the normal by √3 u (M + 6 L) where it is
+    // interpolated. Seen from the start, corners are rounded by √3 u L; each of the three products u, v, w of the test is
+    // rounded by 2 u L² and their sum is the normal's projection, so that the plane seems to lie off by 6 u L σ, σ = L²/|N|. An
+    // instance's ray is rounded by as much again as its matrix's condition enlarges it.
     [[gnu::always_inline]] double4 offset() const {
         double4 reach = max(max_component(abs(corner_[0])), max(max_component(abs(corner_[1])), max_component(abs(corner_[2]))));
         reach = max(reach, max_component(abs(translation_)));

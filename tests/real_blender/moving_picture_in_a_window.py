@@ -1,8 +1,9 @@
 """Runs inside a real Blender with a window: photographs handles and fields that the mouse drags, and the camera that follows.
 
-blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python moving_picture.py -- FOLDER
+blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python moving_picture_in_a_window.py -- FOLDER
 
-FOLDER : where the pictures go, frame-000.png and so on; test_tour.py makes the README's moving picture of them.
+FOLDER : a folder for the pictures, frame-000.png and so on; test_window.py makes the README's moving picture of them.
+
 Leaves with status 0, or 5 and a traceback.
 """
 

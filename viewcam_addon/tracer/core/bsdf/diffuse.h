@@ -1,10 +1,44 @@
-// Rough diffuse reflection: Oren and Nayar's, by Fujii's formulas, with what is reflected more than once (Portsmouth et al., EON: A
-// Practical Energy-Preserving Rough Diffuse BRDF, JCGT 14, 2025).
+// Diffuse reflection, Lambert's and rough; and light that is let through and spread as evenly on the other side.
+//
+// Rough surfaces are Oren and Nayar's, by Fujii's formulas, with what is reflected more than once (Portsmouth et al., EON: A Practical
+// Energy-Preserving Rough Diffuse BRDF, JCGT 14, 2025).
 #pragma once
+#include "../textures.h"
 #include "fresnel.h"
-#include "lambert.h"
+#include "sampling.h"
 
 namespace viewcam::VIEWCAM_ISA {
+
+template <class T> struct LambertOf {
+    static constexpr RayKind KIND = DIFFUSE;
+    static constexpr bool DELTA = false, IS_DIFFUSE = true;
+    Vec3Of<T> color, normal;
+
+    // The share of light from a unit direction that is sent on, cosine included.
+    Vec3Of<T> eval(Vec3Of<T> to_light) const { return color * pdf(to_light); }
+    T pdf(Vec3Of<T> to_light) const { return max(dot(normal, to_light), T{}) / PI; }
+    LobeSampleOf<T> sample(Vec2Of<T> u) const {
+        T cosine;
+        Vec3Of<T> direction = cosine_direction(normal, u, cosine);
+        return {direction, color, cosine / PI};
+    }
+};
+using Lambert = LambertOf<double>;
+
+struct Translucent {
+    static constexpr RayKind KIND = TRANSMISSION;
+    static constexpr bool DELTA = false, IS_DIFFUSE = true;
+    Vec3 color, normal;
+
+    double importance() const { return color.x + color.y + color.z; }
+    Vec3 eval(Vec3 to_light) const { return color * pdf(to_light); }
+    double pdf(Vec3 to_light) const { return max(-dot(normal, to_light), 0.0) / PI; }
+    LobeSample sample(Vec2 u) const {
+        double cosine;
+        Vec3 direction = cosine_direction(-normal, u, cosine);
+        return {direction, color, cosine / PI};
+    }
+};
 
 template <class T> struct OrenNayarOf {
     static constexpr RayKind KIND = DIFFUSE;
@@ -41,7 +75,7 @@ template <class T> struct OrenNayarOf {
     }
 
    private:
-    // What is reflected once of light that comes under a cosine.
+    // The share of light that comes under a cosine and is reflected once.
     T albedo_under(T cosine) const {
         T sine = sqrt(max(1.0 - cosine * cosine, T{}));
         T g = sine * (acos(cosine) - 2.0 / 3 - sine * cosine) + 2.0 / 3 * (sine / cosine) * (1.0 - sine * sine * sine);
