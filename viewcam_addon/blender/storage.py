@@ -12,6 +12,7 @@ import functools
 import json
 from collections.abc import Collection, Iterator
 from dataclasses import fields, replace
+from typing import cast
 
 import bpy
 import numpy as np
@@ -21,6 +22,7 @@ from .. import checks
 from ..camera_values import FIELD_OF_VIEW, HOLD, CameraValues, without_border
 from ..errors import InputError
 from ..intrinsics import Frame
+from ..pinhole import Triple
 from . import datablocks, versions
 
 Raw = tuple[tuple[float, ...], str, float | None]
@@ -74,14 +76,15 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
     follows = tuple(name for name in ("eye", "look_at") if getattr(group, f"{name}_target"))
     asked = asked_of(camera_object)
     when_set = _parsed(group.when_set, 9) if group.pole == HOLD else None  # nobody else asks
+    eye, look_at, up = _vectors(numbers)
     return CameraValues(
-        eye=numbers[0:3],
-        look_at=numbers[3:6],
-        up=numbers[6:9],
+        eye=eye,
+        look_at=look_at,
+        up=up,
         distance=numbers[9],
         counted_in=_frame(tuple(group.counted_in)),
         set_for=_frame(tuple(group.picture)),
-        view_when_set=(when_set[0][0:3], when_set[0][3:6], when_set[0][6:9]) if when_set else None,
+        view_when_set=_vectors(when_set[0]) if when_set else None,
         precision=2.0**-53 if is_exact and not follows else 2.0**-24,
         follows=follows,
         asked=tuple(asked.items()),
@@ -115,7 +118,12 @@ def animated(before: CameraValues, changed: Raw) -> CameraValues:
     if zoom == before.zoom and numbers == (*before.eye, *before.look_at, *before.up, before.distance):
         return before
     precision = 2.0**-53 if is_exact else 2.0**-24
-    return before.animated(numbers[0:3], numbers[3:6], numbers[6:9], numbers[9], zoom, precision)
+    return before.animated(*_vectors(numbers), numbers[9], zoom, precision)
+
+
+def _vectors(numbers: tuple[float, ...]) -> tuple[Triple, Triple, Triple]:
+    """Eye, look-at and up."""
+    return cast(Triple, numbers[0:3]), cast(Triple, numbers[3:6]), cast(Triple, numbers[6:9])
 
 
 def _numbers(text: str, rounded: tuple[float, ...]) -> tuple[tuple[float, ...], bool]:
@@ -300,5 +308,6 @@ def _parsed(text: str, count: int) -> tuple[tuple[float, ...], tuple[float, ...]
 def _frame(stored: tuple[float, ...]) -> Frame | None:
     """The picture whose five numbers were stored, None where they are those of none."""
     with contextlib.suppress(InputError, ValueError, OverflowError):
-        return Frame(*map(int, stored[:3]), *stored[3:])
+        width, height, percentage, aspect_x, aspect_y = stored
+        return Frame(int(width), int(height), int(percentage), aspect_x, aspect_y)
     return None
