@@ -26,6 +26,7 @@ from ..pinhole import Triple
 from . import datablocks, versions
 
 Raw = tuple[tuple[float, ...], str, float | None]
+_View = tuple[Triple, Triple, Triple]  # eye, look-at and up
 
 EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
 _VECTORS = ("eye", "look_at", "up")
@@ -76,15 +77,14 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
     follows = tuple(name for name in ("eye", "look_at") if getattr(group, f"{name}_target"))
     asked = asked_of(camera_object)
     when_set = _parsed(group.when_set, 9) if group.pole == HOLD else None  # nobody else asks
-    eye, look_at, up = _vectors(numbers)
     return CameraValues(
-        eye=eye,
-        look_at=look_at,
-        up=up,
+        eye=cast(Triple, numbers[0:3]),
+        look_at=cast(Triple, numbers[3:6]),
+        up=cast(Triple, numbers[6:9]),
         distance=numbers[9],
         counted_in=_frame(tuple(group.counted_in)),
         set_for=_frame(tuple(group.picture)),
-        view_when_set=_vectors(when_set[0]) if when_set else None,
+        view_when_set=cast(_View, (when_set[0][0:3], when_set[0][3:6], when_set[0][6:9])) if when_set else None,
         precision=2.0**-53 if is_exact and not follows else 2.0**-24,
         follows=follows,
         asked=tuple(asked.items()),
@@ -118,12 +118,8 @@ def animated(before: CameraValues, changed: Raw) -> CameraValues:
     if zoom == before.zoom and numbers == (*before.eye, *before.look_at, *before.up, before.distance):
         return before
     precision = 2.0**-53 if is_exact else 2.0**-24
-    return before.animated(*_vectors(numbers), numbers[9], zoom, precision)
-
-
-def _vectors(numbers: tuple[float, ...]) -> tuple[Triple, Triple, Triple]:
-    """Eye, look-at and up."""
-    return cast(Triple, numbers[0:3]), cast(Triple, numbers[3:6]), cast(Triple, numbers[6:9])
+    eye, look_at, up = cast(_View, (numbers[0:3], numbers[3:6], numbers[6:9]))
+    return before.animated(eye, look_at, up, numbers[9], zoom, precision)
 
 
 def _numbers(text: str, rounded: tuple[float, ...]) -> tuple[tuple[float, ...], bool]:
