@@ -31,6 +31,20 @@ Flags = NDArray[np.bool_]
 PIXELS, FIELD_OF_VIEW = "PIXELS", "FIELD_OF_VIEW"
 CANONICAL, HOLD = "CANONICAL", "HOLD"
 
+PARTS = EYE, VIEW, DISTANCE = "eye", "view", "distance"
+# The parts of the camera that each value decides where it is animated: a moving eye turns the view, since the look-at point
+# stands still.
+DECIDES = {
+    "eye": frozenset({EYE, VIEW}),
+    "look_at": frozenset({VIEW}),
+    "up": frozenset({VIEW}),
+    "held_roll": frozenset({VIEW}),
+    "distance": frozenset({DISTANCE}),
+    "zoom": frozenset({DISTANCE}),
+}
+FACTORS = ("zoom",)
+"""Numbers on the distance, each of which may be keyed by itself."""
+
 
 @dataclass(frozen=True)
 class CameraValues:
@@ -109,7 +123,12 @@ class CameraValues:
         """
         if checks.number("zoom", self.zoom) <= 0:
             raise InputError(f"zoom is {self.zoom:g}: give a factor above 0")
-        return self.distance * self.zoom * self.growth(frame, sensor_fit)
+        return self.zoomed_distance * self.growth(frame, sensor_fit)
+
+    @property
+    def zoomed_distance(self) -> float:
+        """The distance with its factors, in the pixels that it counts."""
+        return self.distance * self.zoom
 
     def growth(self, frame: Frame, sensor_fit: str) -> float:
         """The factor on the distance in the picture of `frame`: 1 unless the field of view of another picture is kept."""
@@ -118,12 +137,15 @@ class CameraValues:
         return intrinsics.growth(sensor_fit, self.counted_in, frame)
 
     def animated(
-        self, eye: Triple, look_at: Triple, up: Triple, distance: float, zoom: float, precision: float
+        self, eye: Triple, look_at: Triple, up: Triple, distance: float, precision: float, **factors: float
     ) -> "CameraValues":
-        """These values with the numbers of another frame; dataclasses.replace takes eight times as long."""
+        """These values with the numbers of another frame; dataclasses.replace takes eight times as long.
+
+        factors : new numbers by name, some of FACTORS.
+        """
         values = object.__new__(CameraValues)
-        numbers = {"eye": eye, "look_at": look_at, "up": up, "distance": distance, "zoom": zoom, "precision": precision}
-        values.__dict__.update(self.__dict__ | numbers)
+        numbers = {"eye": eye, "look_at": look_at, "up": up, "distance": distance, "precision": precision}
+        values.__dict__.update(self.__dict__ | numbers | factors)
         return values
 
     def stating(

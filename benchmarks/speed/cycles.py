@@ -9,19 +9,18 @@ from pathlib import Path
 import bpy
 
 import viewcam_addon
-from viewcam_addon.blender import opening, versions
+from viewcam_addon.blender import camera, opening, versions
 from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.blender.scenes.depsgraph import render_still
 from viewcam_addon.blender.scenes.export import export_scene
 from viewcam_addon.blender.scenes.ledger import Ledger, Remedy
 from viewcam_addon.blender.temporary_settings import Overrides, still_of_one_layer
+from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.scene import scene_file
 
-from .. import race, suzannes
+from .. import race
 
 SCENES = Path(__file__).resolve().parents[2] / "sample_scenes"
-
-_SUZANNES = {"suzannes": suzannes.six, "three suzannes": suzannes.three}
 
 # The most samples of a pixel where a noise threshold is asked for: Blender's own limit.
 _MOST_SAMPLES = 4096
@@ -102,3 +101,43 @@ def _adaptive(scene: bpy.types.Scene, sampling: str, parameter: float) -> Remedy
             overrides.set(scene.cycles, "samples", _MOST_SAMPLES)
 
     return set_all
+
+
+def _three_suzannes(width: int, height: int) -> tuple[bpy.types.Scene, bpy.types.Object]:
+    """Smooth Suzannes with UV maps and materials; returns the scene and the camera before them."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene = bpy.context.scene
+    for index in range(3):
+        bpy.ops.mesh.primitive_monkey_add(location=(2.4 * index - 2.4, 0, 0), rotation=(0, 0, 0.3 * index - 0.3))
+        suzanne = bpy.context.object
+        suzanne.pass_index = index + 1
+        suzanne.data.materials.append(bpy.data.materials.new(f"paint {index}"))
+        suzanne.data.polygons.foreach_set("use_smooth", [True] * len(suzanne.data.polygons))
+        modifier = suzanne.modifiers.new("Subdivision", "SUBSURF")
+        modifier.levels = modifier.render_levels = 3
+    camera_object = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera_object)
+    scene.render.resolution_x, scene.render.resolution_y = width, height
+    pinhole = Pinhole((0.4, -6, 1.1), (0, 0, -0.1), (0, 0, 1), 1.45 * width / 1.92, width, height)
+    camera.apply(camera_object, pinhole, scene)
+    scene.camera = camera_object
+    return scene, camera_object
+
+
+def _six_suzannes(width: int, height: int) -> tuple[bpy.types.Scene, bpy.types.Object]:
+    """Two rows of them on a floor under a sun without size: 377,858 triangles, and the edges of shadows."""
+    scene, camera_object = _three_suzannes(width, height)
+    for suzanne in [each for each in scene.objects if each.type == "MESH"]:
+        copy = suzanne.copy()
+        copy.data = suzanne.data.copy()
+        copy.location = (suzanne.location.x, 2.5, 0.6)
+        copy.pass_index += 3
+        scene.collection.objects.link(copy)
+    bpy.ops.mesh.primitive_plane_add(size=60, location=(0, 0, -1))
+    bpy.ops.object.light_add(type="SUN", rotation=(0.8, 0.3, 0.2))
+    sun = bpy.context.object.data
+    sun.energy, sun.angle = 3, 0
+    return scene, camera_object
+
+
+_SUZANNES = {"suzannes": _six_suzannes, "three suzannes": _three_suzannes}

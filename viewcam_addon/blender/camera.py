@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from .. import intrinsics, rotation
 from .. import roll as rolls
-from ..camera_values import HOLD, CameraValues, moved_poses, without_border
+from ..camera_values import FACTORS, HOLD, CameraValues, moved_poses, without_border
 from ..errors import InputError
 from ..pinhole import Pinhole, Triple, basis, make_views
 from . import causes, conversion, datablocks, findings, hold, pose, preferences, storage, targets
@@ -146,7 +146,8 @@ class CameraSync:
         if not storage.is_counted_in_earlier(camera_object, before):
             before = replace(before, counted_in=without_border(frame))
         values = before.stating(eye, look_at, up, distance, frame, camera_object.data.sensor_fit)
-        names = [*storage.EXACT, "counted_in", "enabled", *(["zoom"] if values.zoom != before.zoom else [])]
+        changed = [name for name in FACTORS if getattr(values, name) != getattr(before, name)]
+        names = [*storage.EXACT, "counted_in", "enabled", *changed]
         storage.store(camera_object, values, *names)
         storage.settle(camera_object, values, frame)
 
@@ -332,7 +333,7 @@ class CameraSync:
                 continue
             if is_changed or distance != values.distance:
                 eye, look_at, up = map(tuple, pose_after)
-                sync._values = values.animated(eye, look_at, up, distance, values.zoom, 2.0**-53)
+                sync._values = values.animated(eye, look_at, up, distance, 2.0**-53)
                 sync._raw = storage.follow(sync.camera_object, sync._values, vectors)
             sync._state, sync._rests, sync._is_moving, sync._placed = state, (), False, ()
         return left
@@ -383,7 +384,7 @@ class CameraSync:
                 conversion.store(camera_object.data.dof, focus_distance=math.dist(values.eye, values.look_at))
             sync._state = (rotation.Channels(mode, location, tuple(turn), *channels[3:]), *lens)
             sync._values, sync._raw, sync._rests, sync._is_moving, sync._placed = values, raw, (), False, ()
-            if (values.distance, values.zoom) != (before.distance, before.zoom):
+            if values.zoomed_distance != before.zoomed_distance:
                 try:
                     sync.resized(scene)
                     sync._agree()

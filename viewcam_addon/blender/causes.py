@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import bpy
 
+from ..camera_values import DECIDES
 from ..errors import listed
 from . import datablocks, pose, storage, versions
 from .findings import APPLY_OR_ADOPT, CENTER, DISTANCE, EYE, LENS, POSE, VIEW, Button, Cause
@@ -21,21 +22,9 @@ def causes(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[
     yield from _sharers(camera_object)
 
 
-# The part of the camera that each value decides where it is animated: a moving eye turns the view, since the look-at point
-# stands still.
-_DECIDES = {
-    "eye": POSE,
-    "look_at": frozenset({VIEW}),
-    "up": frozenset({VIEW}),
-    "held_roll": frozenset({VIEW}),
-    "distance": frozenset({DISTANCE}),
-    "zoom": frozenset({DISTANCE}),
-}
-
-
 def decided_by(names: Iterable[str]) -> frozenset[str]:
     """The parts of EYE, VIEW and DISTANCE that values, by their names, decide."""
-    return frozenset().union(*(_DECIDES.get(name, frozenset()) for name in names))
+    return frozenset().union(*(DECIDES.get(name, frozenset()) for name in names))
 
 
 def decided_by_values(camera_object: bpy.types.Object) -> frozenset[str]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..camera_values import PARTS
 from ..pinhole import Pinhole
 
 _FLOAT32 = 2.0**-24  # the relative error of storing a number as float32
@@ -27,7 +28,7 @@ LARGEST_ZOOM = 3 * _FLOAT32
 # The roundings of the shift: itself, and its product with the size.
 _SHIFT_ROUNDINGS = 2
 
-EYE, VIEW, DISTANCE, CENTER = "eye", "view", "distance", "center"
+EYE, VIEW, DISTANCE, CENTER = *PARTS, "center"
 POSE, LENS = frozenset({EYE, VIEW}), frozenset({DISTANCE, CENTER})
 APPLY_OR_ADOPT = "apply the values again, or adopt the camera as it stands"
 

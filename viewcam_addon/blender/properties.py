@@ -468,7 +468,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
     def numbers(self) -> tuple[tuple, tuple, tuple, float]:
         """Eye, look-at, up and the effective distance, zoom included, in float64. A followed point is where its target is."""
         values = targets.values(self.id_data)
-        return values.eye, values.look_at, values.up, values.distance * values.zoom
+        return values.eye, values.look_at, values.up, values.zoomed_distance
 
     def precision(self) -> float:
         """The relative rounding of the values: 2⁻⁵³ where all are known in float64, else float32's 2⁻²⁴."""

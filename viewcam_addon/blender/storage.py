@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import checks
-from ..camera_values import FIELD_OF_VIEW, HOLD, CameraValues, without_border
+from ..camera_values import FACTORS, FIELD_OF_VIEW, HOLD, CameraValues, without_border
 from ..errors import InputError
 from ..intrinsics import Frame
 from ..pinhole import Triple
 from . import datablocks, versions
 
-Raw = tuple[tuple[float, ...], str, float | None]
+Raw = tuple[tuple[float, ...], str, tuple[float | None, ...]]
 _View = tuple[Triple, Triple, Triple]  # eye, look-at and up
 
 EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
@@ -93,7 +93,7 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
 
 
 def raw(camera_object: bpy.types.Object) -> Raw | None:
-    """The four values and the zoom as Blender holds them: ten numbers, `exact`, and the factor, None where that is the default.
+    """The four values and FACTORS as Blender holds them: ten numbers, `exact`, and the factors, None where one is the default.
 
     It takes a third of the time that the properties take. The evaluated object may be given as well. Returns None where a curve
     asks for another look at a value, or where a value has never been set.
@@ -103,7 +103,7 @@ def raw(camera_object: bpy.types.Object) -> Raw | None:
         rounded = (*stored["eye"], *stored["look_at"], *stored["up"], stored["distance"])
     except KeyError:
         return None
-    return None if _ASKED in stored else (rounded, stored.get("exact", ""), stored.get("zoom"))
+    return None if _ASKED in stored else (rounded, stored.get("exact", ""), tuple(map(stored.get, FACTORS)))
 
 
 def animated(before: CameraValues, changed: Raw) -> CameraValues:
@@ -112,14 +112,18 @@ def animated(before: CameraValues, changed: Raw) -> CameraValues:
     before : the values before, which follow no target.
     changed : the numbers that Blender holds of them now, see `raw`.
     """
-    rounded, exact, zoom = changed
-    zoom = before.zoom if zoom is None else zoom
+    rounded, exact, stored = changed
+    factors = {
+        name: number
+        for name, number in zip(FACTORS, stored, strict=True)
+        if number is not None and number != getattr(before, name)
+    }
     numbers, is_exact = _numbers(exact, rounded)
-    if zoom == before.zoom and numbers == (*before.eye, *before.look_at, *before.up, before.distance):
+    if not factors and numbers == (*before.eye, *before.look_at, *before.up, before.distance):
         return before
     precision = 2.0**-53 if is_exact else 2.0**-24
     eye, look_at, up = cast(_View, (numbers[0:3], numbers[3:6], numbers[6:9]))
-    return before.animated(eye, look_at, up, numbers[9], zoom, precision)
+    return before.animated(eye, look_at, up, numbers[9], precision, **factors)
 
 
 def _numbers(text: str, rounded: tuple[float, ...]) -> tuple[tuple[float, ...], bool]:
@@ -203,7 +207,7 @@ def follow(camera_object: bpy.types.Object, values: CameraValues, vectors: list[
     finally:
         is_storing = before
     eye, look_at, up = vectors
-    return (*eye, *look_at, *up, stored["distance"]), exact, stored.get("zoom")
+    return (*eye, *look_at, *up, stored["distance"]), exact, tuple(map(stored.get, FACTORS))
 
 
 def stated(camera_object: bpy.types.Object) -> frozenset[str]:

@@ -51,7 +51,7 @@ def add_of_job(added: argparse._ActionsContainer, *names: str) -> None:
     for field in _optional():
         if field.name in names:
             how = {"action": "store_true"} if field.default is False else {"default": field.default}
-            added.add_argument(f"--{field.name}", **how | dict(field.metadata))
+            added.add_argument(f"--{field.name.replace('_', '-')}", **how | dict(field.metadata))
 
 
 def add_scene_choices(added: argparse.ArgumentParser) -> None:

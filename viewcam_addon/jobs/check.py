@@ -4,7 +4,7 @@ import argparse
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from .tracing import Tracing, Written
 
 File = str | os.PathLike[str]
 
-_FLAGS = ("strict", "recenter", "clay", "trust")
+_FLAGS = {field.name for field in fields(Job) if field.default is False}
 _WHOLE = ("frame", "samples", "seed", "threads")
 
 

@@ -182,7 +182,8 @@ class Job:
         optional = [field.name for field in dataclasses.fields(self) if field.metadata]
         for name in (*optional, "level", "samples", "error", "seed"):
             if name in stated:
-                words += [f"--{name}"] if stated[name] is True else [f"--{name}", str(stated[name])]
+                option = f"--{name.replace('_', '-')}"
+                words += [option] if stated[name] is True else [option, str(stated[name])]
         return shlex.join(["check", Path(self.blend or "FILE.blend").name, *words])
 
     def to_json(self) -> dict[str, Any]:
