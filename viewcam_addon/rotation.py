@@ -21,6 +21,7 @@ from .pinhole import Pinhole
 Array = NDArray[np.float64]
 
 IDENTITY = np.eye(4)
+_THREE_HALVES = 1.5 * IDENTITY[:3, :3]
 # Radians: in so small a turn the axis, and so close to gimbal lock one of the angles, may be any, within float32's rounding.
 _FREE = 2.0**-26
 
@@ -158,6 +159,16 @@ def nearest(matrix: Array) -> Array:
     """The orthonormal matrices nearest to (..., 3, 3) ones (the polar decomposition's), mirroring where those mirror."""
     left, _, right = np.linalg.svd(matrix)
     return left @ right
+
+
+def straightened(axes: Array) -> Array:
+    """`nearest` of axes of length one whose skew is small, in a fifth of the time: (..., 3, 3).
+
+    Two steps of Newton's method for the polar decomposition. Each leaves 3/2 of the square of what is off: of 2⁻¹⁷, 2⁻⁶⁶.
+    """
+    for _ in range(2):
+        axes = axes @ (_THREE_HALVES - 0.5 * (axes.swapaxes(-2, -1) @ axes))
+    return axes
 
 
 def skew(matrix: Array) -> Array:

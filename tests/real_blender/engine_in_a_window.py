@@ -5,7 +5,8 @@ blender [--enable-event-simulate] -p 0 0 1600 1000 --addons … --python engine_
 PART is `render`, with simulated events: picks the engine in the properties editor, looks into its panels, presses F12 and saves
 the result to OUT. Or it is `cancel`, without them, since Blender then hears no others: makes FILE heavy, presses F12, then
 Escape by xdotool, and writes the seconds until Blender says that the render was canceled to OUT, for each of some times. Or it
-is `view`: turns the viewport in Rendered shading, and writes to OUT how many pictures a second there are.
+is `view`: turns the viewport in Rendered shading, and writes to OUT how many pictures a second there are, and how long Blender
+waited for each call of the engine's.
 Leaves with status 0, or 5 and a traceback.
 """
 
@@ -28,6 +29,7 @@ TRACED_FOR = 2.0  # seconds that a heavy render goes on before it is canceled
 TIMES_CANCELED = 6  # times
 KINDS = ("images", "objects", "scenes", "meshes", "materials", "texts", "cameras", "node_groups")
 TURNS = 20  # of the view
+PATIENCE = 600  # seconds for all of them, on a busy machine
 
 messages, ended = [], []
 
@@ -129,32 +131,66 @@ def view():
     space = area.spaces.active
     space.region_3d.view_perspective = "CAMERA"
     yield
-    space.shading.type = "RENDERED"
     package = type(bpy.context.scene.virtual_pinhole_reference).__module__.removesuffix("render_settings")
-    pictures = sys.modules[f"{package}rendering.live_view"]
-    ends = time.monotonic() + 60
+    pictures, engine = (sys.modules[f"{package}rendering.{name}"] for name in ("live_view", "engine"))
+    calls = timed(engine.VIEWCAM_RenderEngine, ("view_update", "view_draw"))
+    space.shading.type = "RENDERED"
+    ends = time.monotonic() + PATIENCE
     while not any(each.samples > 1 for each in pictures.LiveView._all) and time.monotonic() < ends:
         yield
     (live,) = pictures.LiveView._all
     assert live.picture.shape[:2] == (part.height, part.width) and live.samples > 1
     space.region_3d.view_perspective = "PERSP"
-    started, number, longest = time.monotonic(), live.number, 0.0
+    started, number = time.monotonic(), live.number
     for _ in range(TURNS):
-        space.region_3d.view_rotation.rotate(Euler((0.0, 0.0, 0.02)))
-        area.tag_redraw()
-        before = live.number
-        while live.number == before and time.monotonic() < ends:
-            step = time.monotonic()
-            yield
-            longest = max(longest, time.monotonic() - step)
+        yield from turn(area, live, ends)
     seconds = time.monotonic() - started
-    Path(OUT).write_text(json.dumps({"pictures": (live.number - number) / seconds, "longest": longest}))
+    figures = {"pictures": (live.number - number) / seconds, "calls": list(calls)}
     while live.samples < 2 and time.monotonic() < ends:
         yield
     assert live.samples >= 2, "the light does not come back"
+    calls.clear()
+    follow = type(live).follow
+
+    def waits(self, *arguments):
+        follow(self, *arguments)
+        while self._is_at_work:
+            time.sleep(0.001)
+
+    type(live).follow = waits
+    for _ in range(3):
+        yield from turn(area, live, ends)
+    type(live).follow = follow
+    Path(OUT).write_text(json.dumps({**figures, "calls_that_wait": list(calls)}))
     space.shading.type = "SOLID"
     yield
     yield
+
+
+def turn(area, live, ends):
+    """Steps from one view to the next one's picture."""
+    area.spaces.active.region_3d.view_rotation.rotate(Euler((0.0, 0.0, 0.02)))
+    area.tag_redraw()
+    before = live.number
+    while live.number == before and time.monotonic() < ends:
+        yield
+
+
+def timed(engine, names):
+    """The calls of an engine's methods from now on, each as its seconds by the clock and of this thread's processor."""
+    calls = []
+
+    def timing(method):
+        def call(self, context, depsgraph):  # Blender counts them
+            started = time.monotonic(), time.thread_time()
+            method(self, context, depsgraph)
+            calls.append((time.monotonic() - started[0], time.thread_time() - started[1]))
+
+        return call
+
+    for name in names:
+        setattr(engine, name, timing(getattr(engine, name)))
+    return calls
 
 
 def swipe():

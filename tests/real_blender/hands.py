@@ -142,8 +142,8 @@ def start(steps, interval=0.01):
 SIDEBAR, PROPERTIES, VIEWPORT = ("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW"), ("VIEW_3D", "WINDOW")
 SCREEN_HEIGHT = 2000
 _HEADER = int(60 * SCALE)  # pixels from the panel's top within which its checkbox stands
-_PATIENCE = 4  # looks
-_STEPS = 200  # that something may take to happen
+_LOOKS = 4  # at a button
+_PATIENCE = 120  # seconds that something may take to happen
 _ROW = int(18 * SCALE)  # pixels between two looks, less than a button's height
 _NOTHING = 25  # rows without a button, more than a panel's texts and closed sub-panels are, below which there is none
 # Where in a row its buttons are looked for, as shares of the panel's width; of operators there are many in a row.
@@ -206,7 +206,7 @@ def find(button, where=SIDEBAR):
 def seek(button, where):
     """Steps that end with where the button stands, as of `find`, or None if there is no such button."""
     if place := _remembered(button, where):
-        for _ in range(_PATIENCE):  # the button that the mouse comes from may want to be left first
+        for _ in range(_LOOKS):  # the button that the mouse comes from may want to be left first
             if (yield from look(*place, where)).startswith(button):
                 return place
     print(f"looking for {button}", flush=True)
@@ -425,16 +425,15 @@ def call(operator, where=VIEWPORT, **properties):
         return operator("INVOKE_DEFAULT", True, **properties)  # with its undo step
 
 
-def until(is_so, what, steps=_STEPS, seconds=0):
+def until(is_so, what, patience=_PATIENCE, seconds=0):
     """Steps until something has happened: none is counted on to take a time.
 
-    seconds : the seconds of each, where it does take some.
+    patience : seconds, many times what it takes on a quiet machine. seconds : of each step, where it does take some.
     """
-    for _ in range(steps):
-        if is_so():
-            return
+    ends = time.monotonic() + patience
+    while not is_so():
+        assert time.monotonic() < ends, f"{what} does not happen within {patience} s"
         yield seconds
-    raise AssertionError(f"{what} does not happen")
 
 
 def settle():

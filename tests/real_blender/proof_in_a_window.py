@@ -27,7 +27,7 @@ FILE, FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
 ADDON = "bl_ext.user_default.virtual_pinhole"
 PROOF, LABELS = (f"{ADDON}.viewcam_addon.blender.interface.{name}" for name in ("proof", "labels"))
 ROW = 12  # pixels between two looks for a button, less than its height
-PATIENCE = 60  # seconds that one comparison may take on a busy machine
+PATIENCE = 600  # seconds that one comparison may take on a busy machine
 LEFT, MIDDLE, RIGHT, CANCEL = 0.3, 0.5, 0.7, 0.83  # shares of the sidebar's width
 
 opened = []

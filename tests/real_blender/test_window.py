@@ -36,6 +36,7 @@ def go_through(real_blender, name, *arguments, expected="", attempts=ATTEMPTS, *
         outcome = real_blender.run_in_a_window(Path(__file__).with_name(f"{name}_in_a_window.py"), *words, **options)
         if outcome.returncode == 0:
             break
+        print(outcome.stdout + outcome.stderr)  # so that it is seen of each attempt which step has failed
     output = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0 and expected in output, output
     assert "Traceback" not in output, output  # what fails in a panel, a drawing or a handle is only printed

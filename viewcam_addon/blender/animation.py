@@ -29,6 +29,8 @@ _Object = bpy.types.Object  # to look it up takes as long as to ask a camera for
 def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
     targets.forget_shapes(depsgraph)
+    if depsgraph.id_type_updated("SCENE"):
+        datablocks.forget_curves()
     for sync in CameraSync.carry(_evaluated_cameras(depsgraph), scene, depsgraph):
         with _errors_told(sync.camera_object, scene):
             sync.at_frame(scene, depsgraph)
@@ -39,7 +41,8 @@ def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | Non
 def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Blender evaluates what this sets without calling it again, so that a constraint in the way makes no endless loop."""
     targets.forget_shapes(depsgraph)
-    if depsgraph.id_type_updated("SCENE"):
+    if depsgraph.id_type_updated("SCENE"):  # so it is, too, where what depends on what has changed, as by a new curve
+        datablocks.forget_curves()
         resolution.follow(scene)
     for sync, _ in _evaluated_cameras(depsgraph):
         with _errors_told(sync.camera_object, scene):
@@ -54,6 +57,7 @@ def on_load(_path: str, _more: object = None) -> None:
     """Targets may have moved where the add-on was not, and Blender does not save the drivers of an override's own targets."""
     targets.forget_shapes()
     cameras.forget_all()
+    datablocks.forget_curves()
     scene = bpy.context.scene
     watching = [each for each in scene.objects if each.type == "CAMERA" and targets.names(each)]
     for camera_object in watching:
@@ -67,6 +71,7 @@ def on_load(_path: str, _more: object = None) -> None:
 def on_undo(_scene: bpy.types.Scene, _more: object = None) -> None:
     """Undo may bring back a camera's channels and not evaluate them, so that its values would follow where it was before."""
     targets.forget_shapes()
+    datablocks.forget_curves()
     for block in bpy.data.objects:
         if _is_camera(block) and not CameraSync.of(block).is_untouched(by_values=False):
             CameraSync.of(block).forget()

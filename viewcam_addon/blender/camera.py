@@ -263,21 +263,24 @@ class CameraSync:
         except InputError:  # no picture at all
             return [sync for sync, _ in cameras]
         for sync, evaluated in cameras:
-            camera_object, raw = sync.camera_object, None
-            if sync._carried_in == picture and not camera_object.parent and not camera_object.constraints:
-                raw = storage.raw(evaluated)
-            if raw is None:
+            camera_object = sync.camera_object
+            if sync._carried_in != picture or camera_object.parent or camera_object.constraints:
+                left.append(sync)
+                continue
+            if not datablocks.is_known_as_animated(camera_object):
+                state = conversion.state_of(camera_object)
+                if state != sync._state and sync._is_free(state):
+                    moved.append((sync, evaluated, state))
+                elif state != sync._state:
+                    left.append(sync)
+                continue
+            raw = storage.raw(evaluated)
+            if raw is None or conversion.state_of(camera_object) != sync._state:
                 left.append(sync)
                 continue
             values = sync._values if raw == sync._raw else storage.animated(sync._values, raw)
-            is_stated, state = values is not sync._values, conversion.state_of(camera_object)
-            if state == sync._state:
-                if is_stated:
-                    stated.append((sync, values, raw))
-            elif not is_stated and sync._is_free(state):
-                moved.append((sync, evaluated, state))
-            else:
-                left.append(sync)
+            if values is not sync._values:
+                stated.append((sync, values, raw))
         if moved:
             left += cls._follow(moved, picture)
         poses = _poses_of([values for _, values, _ in stated])
@@ -315,7 +318,7 @@ class CameraSync:
         is_moved = np.array([here.location != there.location for here, there in channels])
         is_turned = np.array([here[:3:2] != there[:3:2] for here, there in channels])  # in its mode or its rotation
         rounding, eyes = findings.LARGEST_TURN, matrices[:, :3, 3]
-        after = moved_poses(before, is_moved, is_turned, eyes, rotation.nearest(axes), preferences.up_axis(), rounding)
+        after = moved_poses(before, is_moved, is_turned, eyes, rotation.straightened(axes), preferences.up_axis(), rounding)
         is_view = make_views(*after.swapaxes(0, 1)) & (np.abs(after) <= intrinsics.LARGEST_FLOAT32).all(axis=(-2, -1))
         left = []
         for (sync, _, state), is_valid, is_changed, pose_after, vectors in zip(
@@ -333,8 +336,8 @@ class CameraSync:
                 continue
             if is_changed or distance != values.distance:
                 eye, look_at, up = map(tuple, pose_after)
-                sync._values = values.animated(eye, look_at, up, distance, 2.0**-53)
-                sync._raw = storage.follow(sync.camera_object, sync._values, vectors)
+                sync._values, sync._raw = values.animated(eye, look_at, up, distance, 2.0**-53), None
+                storage.follow(sync.camera_object, sync._values, vectors)
             sync._state, sync._rests, sync._is_moving, sync._placed = state, (), False, ()
         return left
 
@@ -352,10 +355,9 @@ class CameraSync:
         return distance if 0 < distance <= intrinsics.LARGEST_FLOAT32 else None
 
     def _is_free(self, state: tuple) -> bool:
-        """True if no value decides where the camera is that Blender has moved, and nothing keeps its values from following."""
+        """True if nothing keeps the values of a camera that Blender has moved from following."""
         camera_object, (channels, kind, *_) = self.camera_object, state
-        is_linked = camera_object.library or camera_object.data.library
-        return channels.is_plain and kind == "PERSP" and not is_linked and not datablocks.is_animated(camera_object)
+        return channels.is_plain and kind == "PERSP" and not camera_object.library and not camera_object.data.library
 
     @classmethod
     def _bring(

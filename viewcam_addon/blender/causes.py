@@ -178,7 +178,10 @@ def _is_moving(block: bpy.types.Object) -> bool:
 
 
 def _libraries(camera_object: bpy.types.Object) -> Iterator[Cause]:
-    blocks = ((camera_object, "Camera", POSE), (camera_object.data, "The camera data", LENS))
+    data = camera_object.data
+    blocks = [(camera_object, "Camera", POSE), (data, "The camera data", LENS)]
+    if camera_object.library == data.library:  # one sentence is enough
+        blocks = [(camera_object, "Camera", POSE | LENS)]
     for block, kind, acts_on in blocks:
         if block.library:
             clause = f"{kind} {block.name!r} is linked from {block.library.name!r}, and what is set here is not saved"

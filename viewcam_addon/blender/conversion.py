@@ -152,7 +152,7 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     if skew > pose.LARGEST_SKEW:
         raise InputError(f"camera {camera_object.name!r} is oblique, {pose.who_shears(camera_object)}")
     mirrored = bool(volume < 0)
-    _, v, w = rotation.nearest(axes).T
+    _, v, w = rotation.straightened(axes).T
     eye = matrix[:3, 3]
     # The look-at point is as far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.
     reach = 2.0 ** math.ceil(math.log2(max(1.0, np.abs(eye).max())))

@@ -10,6 +10,7 @@ gone. `picture` and `counted_in` keep resolution, percentage and pixel aspect. R
 import contextlib
 import functools
 import json
+import struct
 from collections.abc import Collection, Iterator
 from dataclasses import fields, replace
 from typing import cast
@@ -36,6 +37,7 @@ _PLAIN = tuple(each.name for each in fields(CameraValues) if each.name not in _N
 _ASKED = "asked"  # where Blender keeps what `ask` has noted
 # Values that are noted of a camera once it has been set.
 _NOTED = ("distance", "counted_in", "set_for", "view_when_set", "held_roll")
+_NUMBERS = struct.Struct("<10d")
 is_storing = False  # else the artist or a script sets a property, and the camera moves
 
 
@@ -185,29 +187,27 @@ def store(camera_object: bpy.types.Object, values: CameraValues, *names: str) ->
                 setattr(group, name, value)
         forget_asked(camera_object, names)
         if not EXACT.isdisjoint(names):
-            group.exact = json.dumps([*values.eye, *values.look_at, *values.up, values.distance])
+            group.exact = _digits(values)
     finally:
         is_storing = before
 
 
-def follow(camera_object: bpy.types.Object, values: CameraValues, vectors: list[list[float]]) -> Raw:
+def follow(camera_object: bpy.types.Object, values: CameraValues, vectors: list[list[float]]) -> None:
     """Write the four values of a camera, each of which has been set before, and move nothing: as `store`, in half of the time.
 
     vectors : eye, look-at and up as `zeroed` has them. Blender hears of the distance, which is set last, and evaluates anew all
-    that looks at any of them. Returns them as `raw`.
+    that looks at any of them.
     """
     global is_storing
     group, before, is_storing = camera_object.virtual_pinhole, is_storing, True
     stored = versions.stored_properties(group)
     for name, vector in zip(_VECTORS, vectors, strict=True):
         stored[name][:] = vector
-    stored["exact"] = exact = json.dumps([*values.eye, *values.look_at, *values.up, values.distance])
+    stored["exact"] = _digits(values)
     try:
         group.distance = values.distance
     finally:
         is_storing = before
-    eye, look_at, up = vectors
-    return (*eye, *look_at, *up, stored["distance"]), exact, tuple(map(stored.get, FACTORS))
 
 
 def stated(camera_object: bpy.types.Object) -> frozenset[str]:
@@ -295,11 +295,21 @@ def _shown_values(numbers: tuple[float, ...]) -> tuple[float, ...]:
         return tuple(np.array(rounded, dtype=np.float32).tolist())
 
 
+def _digits(values: CameraValues) -> str:
+    """Eye, look-at, up and distance with all their digits: hexadecimal, since JSON takes twenty times as long."""
+    return _NUMBERS.pack(*values.eye, *values.look_at, *values.up, values.distance).hex()
+
+
 @functools.lru_cache(maxsize=4096)
 def _parsed(text: str, count: int) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
-    """So many finite numbers from JSON, and what float32 makes of them; None if it holds anything else."""
-    with contextlib.suppress(ValueError, RecursionError), np.errstate(over="ignore"):  # InputError is a ValueError
-        numbers = checks.vector("the text", json.loads(text), count)
+    """So many finite numbers of a text, as `_digits` writes them or in JSON, and what float32 makes of them; None if it holds
+    anything else."""
+    with (
+        contextlib.suppress(ValueError, RecursionError, struct.error),
+        np.errstate(over="ignore"),
+    ):  # InputError is a ValueError
+        stated = json.loads(text) if text.startswith("[") else _NUMBERS.unpack(bytes.fromhex(text))
+        numbers = checks.vector("the text", stated, count)
         return numbers, tuple(np.array(numbers, dtype=np.float32).tolist())
     return None
 

@@ -115,6 +115,11 @@ def _collections_of(source: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy
     return [bag.fcurves for bag in bags if bag]
 
 
+def slot_of(data: bpy.types.AnimData) -> int:
+    """The handle of the slot that a datablock uses of its action."""
+    return data.action_slot_handle if bpy.app.version >= (4, 4) else 0
+
+
 def remove_curves(block: bpy.types.ID, data_path: str) -> None:
     """Take the curves of a property out of a datablock's own action."""
     for collection in _collections_of(block.animation_data) if block.animation_data else []:
