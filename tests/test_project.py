@@ -343,6 +343,14 @@ def test_docstrings_begin_with_what_a_thing_is_or_does():
     assert guilty(vague_beginnings) == {}
 
 
+def test_parameters_in_docstrings_stand_one_a_line():
+    """So an editor shows them."""
+    several = re.compile(r'(?m)^ *(?:"""|.*[.] )?[a-z_, ]+ : .*[.;] [a-z_, ]+ : \w.*')
+    assert guilty(several.findall) == {}
+    two = "size : its size. edge " + ": its length."
+    assert several.findall(f"    {two}") and several.findall(f'    """A box. {two}"""')
+
+
 def test_comments_begin_with_what_a_thing_is_or_does():
     """In Python, in the core, and where things are built."""
     vague = re.compile(r"(?m)^ *(?:#|//) (?:How|Of|That of|The same|Those|What|Whether|Which|Who|Whose)\b.*")

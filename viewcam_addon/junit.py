@@ -75,7 +75,7 @@ def write(path: Path, words: str, status: int, result: Mapping[str, Any], second
 
 
 def _case(name: str, kind: str | None, sentence: str, figures: Mapping[str, Any], seconds: float) -> ElementTree.Element:
-    """One test.
+    """A test case, as an element of XML.
 
     kind : "failure", "error" or "skipped", None where it passed.
     sentence : a sentence that says why.

@@ -557,7 +557,7 @@ def _null(matrix: Array) -> Array:
 
 
 def _match(solution: Solution, like: Pinhole, precision: float, reach: float, spare: int, depth: float | None) -> Match:
-    """One camera's answer.
+    """The match of one of the cameras that were solved for.
 
     reach : from the eye to the look-at point.
     spare : residuals beyond the unknowns.

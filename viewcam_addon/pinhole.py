@@ -168,7 +168,7 @@ class Pinhole:
 
     @property
     def plane(self) -> ViewPlane:
-        """All of it but its pose."""
+        """The view plane: all of the camera but its pose."""
         return self._plane
 
     @cached_property

@@ -428,7 +428,8 @@ def call(operator, where=VIEWPORT, **properties):
 def until(is_so, what, patience=_PATIENCE, seconds=0):
     """Steps until something has happened: none is counted on to take a time.
 
-    patience : seconds, many times what it takes on a quiet machine. seconds : of each step, where it does take some.
+    patience : seconds, many times what it takes on a quiet machine.
+    seconds : the seconds of each step, where it does take some.
     """
     ends = time.monotonic() + patience
     while not is_so():

@@ -16,7 +16,7 @@ LEVELS = (
 
 
 def _update_passes(_group: "ReferenceSettings", context: bpy.types.Context) -> None:
-    """The compositor's sockets follow."""
+    """Let the compositor's sockets follow the passes that were chosen."""
     context.view_layer.update_render_passes()
 
 

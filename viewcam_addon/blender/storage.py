@@ -13,6 +13,7 @@ import json
 import struct
 from collections.abc import Collection, Iterator
 from dataclasses import fields, replace
+from typing import cast
 
 import bpy
 import numpy as np
@@ -22,9 +23,11 @@ from .. import checks
 from ..camera_values import FACTORS, FIELD_OF_VIEW, HOLD, CameraValues, without_border
 from ..errors import InputError
 from ..intrinsics import Frame
+from ..pinhole import Triple
 from . import datablocks, versions
 
 Raw = tuple[tuple[float, ...], str, tuple[float | None, ...]]
+_View = tuple[Triple, Triple, Triple]  # eye, look-at and up
 
 EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
 _VECTORS = ("eye", "look_at", "up")
@@ -77,13 +80,13 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
     asked = asked_of(camera_object)
     when_set = _parsed(group.when_set, 9) if group.pole == HOLD else None  # nobody else asks
     return CameraValues(
-        eye=numbers[0:3],
-        look_at=numbers[3:6],
-        up=numbers[6:9],
+        eye=cast(Triple, numbers[0:3]),
+        look_at=cast(Triple, numbers[3:6]),
+        up=cast(Triple, numbers[6:9]),
         distance=numbers[9],
         counted_in=_frame(tuple(group.counted_in)),
         set_for=_frame(tuple(group.picture)),
-        view_when_set=(when_set[0][0:3], when_set[0][3:6], when_set[0][6:9]) if when_set else None,
+        view_when_set=cast(_View, (when_set[0][0:3], when_set[0][3:6], when_set[0][6:9])) if when_set else None,
         precision=2.0**-53 if is_exact and not follows else 2.0**-24,
         follows=follows,
         asked=tuple(asked.items()),
@@ -121,7 +124,8 @@ def animated(before: CameraValues, changed: Raw) -> CameraValues:
     if not factors and numbers == (*before.eye, *before.look_at, *before.up, before.distance):
         return before
     precision = 2.0**-53 if is_exact else 2.0**-24
-    return before.animated(numbers[0:3], numbers[3:6], numbers[6:9], numbers[9], precision, **factors)
+    eye, look_at, up = cast(_View, (numbers[0:3], numbers[3:6], numbers[6:9]))
+    return before.animated(eye, look_at, up, numbers[9], precision, **factors)
 
 
 def _numbers(text: str, rounded: tuple[float, ...]) -> tuple[tuple[float, ...], bool]:
@@ -314,5 +318,6 @@ def _parsed(text: str, count: int) -> tuple[tuple[float, ...], tuple[float, ...]
 def _frame(stored: tuple[float, ...]) -> Frame | None:
     """The picture whose five numbers were stored, None where they are those of none."""
     with contextlib.suppress(InputError, ValueError, OverflowError):
-        return Frame(*map(int, stored[:3]), *stored[3:])
+        width, height, percentage, aspect_x, aspect_y = stored
+        return Frame(int(width), int(height), int(percentage), aspect_x, aspect_y)
     return None

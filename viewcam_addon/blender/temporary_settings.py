@@ -48,7 +48,7 @@ class Overrides:
 
     @property
     def is_shared(self) -> bool:
-        """True if anything is."""
+        """True if anything is shared with other renders."""
         return bool(self._shared)
 
     def enter(self, context: contextlib.AbstractContextManager) -> None:

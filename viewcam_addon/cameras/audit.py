@@ -108,7 +108,7 @@ class Views:
 
 
 def views_of(cameras: Sequence[Camera]) -> Views:
-    """The cameras as arrays."""
+    """The cameras of a dataset as arrays."""
     matrices = np.array([axes.camera_to_world(camera.pinhole) for camera in cameras])
     k = np.array([axes.intrinsics(camera.pinhole) for camera in cameras])
     size = np.array([(camera.pinhole.width, camera.pinhole.height) for camera in cameras], float)

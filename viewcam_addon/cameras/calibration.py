@@ -42,7 +42,7 @@ class Calibration:
     lens: Lens
 
     def to_json(self) -> dict[str, Any]:
-        """All of it, as JSON can hold it."""
+        """The calibration, as JSON can hold it."""
         return {"plane": asdict(self.plane), "lens": self.lens.to_json()}
 
     @classmethod

@@ -26,7 +26,7 @@ import json
 import re
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn, cast
 
 import numpy as np
 
@@ -86,6 +86,9 @@ NOT_BESIDE = (*FORMS_OF_RIGS, "cameras.bin", "images.bin", "points3D.bin")
 _FOLDERS = ((), ("0",), ("sparse", "0"), ("sparse",), ("colmap", "sparse", "0"))
 
 
+_Model = tuple[tuple[str, ...], str]  # the folder's parts below the source, and the files' suffix
+
+
 class _Intrinsics(NamedTuple):
     """The entry of cameras.txt about one camera."""
 
@@ -122,14 +125,14 @@ def recognizes(source: Source) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    folder, suffix = model(source)
+    folder, suffix = cast(_Model, model(source))
     files = _files(source, folder, suffix)
     if suffix == ".bin":
         intrinsic, images = _binary_cameras(files[0]), [*_binary_images(files[1])]
     else:
         intrinsic, images = _text_cameras(files[0]), [*_text_images(files[1])]
     if rigs := _files(source, folder, suffix, _RIGS):
-        _refuse_other_poses(images, _poses_of_frames(*map(_Reader if suffix == ".bin" else _Words, rigs)), rigs)
+        _refuse_other_poses(images, _poses_of_frames(*((_Reader if suffix == ".bin" else _Words)(each) for each in rigs)), rigs)
     has_texts = suffix == ".bin" and _files(source, folder, ".txt")
     notes = ("The folder has the model as text, too: the binary one counts",) if has_texts else ()
     planes: dict[int, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}
@@ -163,17 +166,18 @@ def _poses(images: Sequence[_Image], planes: dict) -> list[tuple[Pinhole, tuple[
 
 
 def notes_in(source: Source) -> list[str]:
-    folder, suffix = model(source)
+    folder, suffix = cast(_Model, model(source))
     file = source.file(*folder, NOTES if suffix == ".bin" else f"{_FILES[1]}{suffix}")
     return [file.text] if file else []
 
 
-def model(source: Source) -> tuple[tuple[str, ...], str] | None:
+def model(source: Source) -> _Model | None:
     """The place of the model in a folder, part by part, and the suffix of its files; None if there is none."""
     if not source.is_folder:
         path = source.path
-        ours = path and path.stem in (*_FILES, *_RIGS, "points3D") and path.suffix in (".txt", ".bin")
-        return ((), path.suffix) if ours and _files(source, (), path.suffix) else None
+        if path is None or path.stem not in (*_FILES, *_RIGS, "points3D") or path.suffix not in (".txt", ".bin"):
+            return None
+        return ((), path.suffix) if _files(source, (), path.suffix) else None
     for folder in _FOLDERS:
         for suffix in (".bin", ".txt"):
             if _files(source, folder, suffix):
@@ -189,8 +193,8 @@ def model(source: Source) -> tuple[tuple[str, ...], str] | None:
 
 def _files(source: Source, folder: Sequence[str], suffix: str, names: Sequence[str] = _FILES) -> list[Source]:
     """The files of cameras and images; none if one is not there."""
-    paths = [source.file(*folder, f"{name}{suffix}") for name in names]
-    return paths if all(paths) else []
+    files = [file for name in names if (file := source.file(*folder, f"{name}{suffix}")) is not None]
+    return files if len(files) == len(names) else []
 
 
 def _plane(intrinsic: _Intrinsics, what: str, options: Options) -> tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]:
@@ -202,7 +206,7 @@ def _plane(intrinsic: _Intrinsics, what: str, options: Options) -> tuple[ViewPla
             f"{what} is {intrinsic.model} with {len(intrinsic.parameters)} parameters: it should have {len(names)}"
         )
     values = dict(zip(names, intrinsic.parameters, strict=True))
-    f_x, f_y = values.get("fx", values.get("f")), values.get("fy", values.get("f"))
+    f_x, f_y = (values[name] if name in values else values["f"] for name in ("fx", "fy"))
     if not (f_x > 0 and f_y > 0):
         raise InputError(f"{what} has the focal length {min(f_x, f_y):g}: give one above 0")
     plane = axes.view_plane(f_x, f_y, values["cx"], values["cy"], (intrinsic.width, intrinsic.height))
@@ -227,8 +231,10 @@ def _lens(model: str, values: dict[str, float]) -> distortion.Lens:
             prism = (s1, 0.0, s3, 0.0)
             return distortion.Lens(terms, "equidistant", radial=(k1, k2, k3, k4), tangential=(p1, p2), prism=prism)
         case "RAD_TAN_THIN_PRISM_FISHEYE":  # whose p0 and p1 are OpenCV's p2 and p1
-            radial, (p2, p1), prism = numbers[:6], numbers[6:8], numbers[8:]
-            return distortion.Lens(terms, "equidistant", radial=radial, tangential=(p1, p2), prism=prism, radial_first=True)
+            radial, (p2, p1, s1, s2, s3, s4) = numbers[:6], numbers[6:]
+            return distortion.Lens(
+                terms, "equidistant", radial=radial, tangential=(p1, p2), prism=(s1, s2, s3, s4), radial_first=True
+            )
     if "FISHEYE" in model:
         return distortion.Lens(terms, "equidistant", radial=numbers)
     return distortion.opencv(values)
@@ -248,8 +254,8 @@ def _text_cameras(source: Source) -> dict[int, _Intrinsics]:
             raise InputError(f"{place} is {checks.quoted(line)}: it should be CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
         if words[1] not in MODELS:
             raise InputError(f"{place}: the camera model {checks.quoted(words[1])} is unknown: convert it to PINHOLE")
-        size = (pixels(f"{what} of {place}", word) for what, word in zip(("width", "height"), words[2:4], strict=True))
-        result[_id(words[0], place)] = _Intrinsics(words[1], *size, flat(f"parameters of {place}", words[4:]))
+        width, height = (pixels(f"{what} of {place}", word) for what, word in zip(("width", "height"), words[2:4], strict=True))
+        result[_id(words[0], place)] = _Intrinsics(words[1], width, height, flat(f"parameters of {place}", words[4:]))
     return result
 
 
@@ -295,9 +301,9 @@ def _poses_of_frames(rigs: "_Reader | _Words", frames: "_Reader | _Words") -> di
     for _ in range(frames.count()):
         _, rig, *pose, taken = frames.numbers("2I7dI")
         for _ in range(taken):
-            *sensor, image = frames.numbers("iIQ")
-            if sensor[0] == _SENSORS["CAMERA"] and (rig, *sensor) in in_rig:
-                poses[image] = (*pose, *in_rig[rig, *sensor])
+            kind, number, image = frames.numbers("iIQ")
+            if kind == _SENSORS["CAMERA"] and (rig, kind, number) in in_rig:
+                poses[image] = (*pose, *in_rig[rig, kind, number])
     return poses
 
 
@@ -375,7 +381,7 @@ class _Reader:
         self._at = end + 1
         return text_bytes
 
-    def _ended(self):
+    def _ended(self) -> NoReturn:
         raise InputError(f"{self._source.name} ends in the middle, or is no COLMAP file: copy it again")
 
 
@@ -386,9 +392,9 @@ def _binary_cameras(source: Source) -> dict[int, _Intrinsics]:
         number, model, width, height = reader.numbers("IiQQ")
         if model not in names:
             raise InputError(f"camera {number} of {source.name} is of the unknown model {model}: convert it to PINHOLE")
-        size = (pixels(f"{side} of camera {number}", value) for side, value in (("width", width), ("height", height)))
+        width, height = (pixels(f"{side} of camera {number}", value) for side, value in (("width", width), ("height", height)))
         name = names[model]
-        result[number] = _Intrinsics(name, *size, reader.numbers(f"{len(MODELS[name][1])}d"))
+        result[number] = _Intrinsics(name, width, height, reader.numbers(f"{len(MODELS[name][1])}d"))
     return result
 
 

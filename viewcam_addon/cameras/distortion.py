@@ -63,7 +63,7 @@ class Lens:
             object.__setattr__(self, name, tuple(terms))
 
     def to_json(self) -> dict[str, Any]:
-        """All of it, as JSON can hold it."""
+        """The lens, as JSON can hold it."""
         return {**dataclasses.asdict(self), "terms": dict(self.terms)}
 
     @classmethod

@@ -36,12 +36,13 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from .. import rotation
 from ..errors import InputError
-from ..intrinsics import ViewPlane
+from ..pinhole import ViewPlane
 from . import axes, own, texts, tokens
 from .camera import Camera, Options, not_a_pinhole
 from .expressions import JOINTS, Degrees, Expressions, Radians, Unknown, numbers
@@ -565,7 +566,7 @@ class _Code:
         if sign != "(" or len(parts) < 2 or parts[-1] != "add" or "scene" in parts[-2].lower():
             return False
         added = re.match(r"\s*([\w$.]+)\s*[,)]", self.text[at : at + 200])
-        return bool(added) and self._is_camera(added[1].split("."))
+        return added is not None and self._is_camera(added[1].split("."))
 
     def _set(self, scene: _Scene, role: str, value: object, at: int) -> None:
         before = scene.values.get(role)
@@ -608,8 +609,8 @@ class _Code:
         flat = tuple(values)
         if (nine := numbers(flat[-9:], 9)) and len(flat) in (9, 10):
             values = [nine[:3], nine[3:6], nine[6:]]
-        if len(values) == 3 and numbers(flat, 3) and not named:
-            scene.aimed.append((start, numbers(flat, 3)))
+        if len(values) == 3 and (point := numbers(flat, 3)) and not named:
+            scene.aimed.append((start, point))
             return
         if len(values) == 1:
             point = numbers(values[0], 3)
@@ -771,7 +772,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     return [texts.mirroring(camera, "The text's camera")]
 
 
-def _known(values: dict, role: str, text: str, advice: str) -> object:
+def _known(values: dict, role: str, text: str, advice: str) -> Any:
     if role not in values:
         return None
     value, at = values[role]
@@ -893,7 +894,7 @@ def _plane(scene: _Scene, text: str, options: Options) -> tuple:
     value = _known(values, role, text, "write the field of view as a number")
     if not isinstance(value, float):
         texts.fail(text, values[role][1], "write the field of view as a number")
-    axis = {"fov_of_shorter": "smaller", "fov_y": "y", "fov_x": "x", "view_angle": "y"}.get(role)
+    axis = {"fov_of_shorter": "smaller", "fov_y": "y", "fov_x": "x", "view_angle": "y"}.get(role, "")
     if role == "view_angle":
         value = value if isinstance(value, Radians) else Degrees(value)
         axis = "x" if _plain_number(values, "use_horizontal", 0.0, text) else "y"

@@ -119,7 +119,7 @@ def half_pixel(options: Options, habit: str = "center") -> float:
 
 
 def told_of_half_pixel(options: Options, program: str) -> tuple[str, ...]:
-    """The note on it."""
+    """The note that half a pixel was added."""
     if options.pixel:
         return ()
     return (f"{program} counts pixels from the first one's center: half a pixel was added to the principal point",)

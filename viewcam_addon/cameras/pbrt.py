@@ -18,13 +18,13 @@ Include, since a paste has no folder.
 import math
 import re
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from .. import checks
 from ..errors import InputError
-from ..pinhole import Pinhole
+from ..pinhole import Pinhole, Triple
 from . import axes, naming, own, texts
 from .camera import Camera, Options, not_a_pinhole
 from .source import Source
@@ -84,18 +84,23 @@ class _Transform(NamedTuple):
     mirrored: bool = True
 
 
+def _vectors(look: Sequence[float]) -> tuple[Triple, Triple, Triple]:
+    """Eye, look-at and up of a LookAt's numbers."""
+    return cast(Triple, look[0:3]), cast(Triple, look[3:6]), cast(Triple, look[6:9])
+
+
 class _Scene:
     """The statements before WorldBegin."""
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.transforms = _Transform(), _Transform()  # as the shutter opens, and as it closes
-        self.active = (0, 1)
+        self.transforms: tuple[_Transform, ...] = _Transform(), _Transform()  # as the shutter opens, and as it closes
+        self.active: tuple[int, ...] = (0, 1)
         self.moves = self.cameras = 0
-        self.kept: list[tuple[tuple[_Transform, _Transform], tuple[int, ...]]] = []
-        self.named: dict[str, tuple[_Transform, _Transform]] = {}
+        self.kept: list[tuple[tuple[_Transform, ...], tuple[int, ...]]] = []
+        self.named: dict[str, tuple[_Transform, ...]] = {}
         self.is_lux = bool(_LUX.search(text))
-        self.at_camera: tuple[_Transform, _Transform] | None = None
+        self.at_camera: tuple[_Transform, ...] | None = None
         self.lens: tuple[str, int, _Parameters] | None = None
         self.film: _Parameters | None = None
 
@@ -129,7 +134,7 @@ class _Scene:
                 texts.fail(self.text, at, 'give its kind, as in Camera "perspective"')
             self.lens = (arguments[0], at, parameters)
             self.at_camera = self.transforms
-            if not np.array_equal(*(each.matrix for each in self.transforms)):
+            if not np.array_equal(self.transforms[0].matrix, self.transforms[1].matrix):
                 texts.fail(self.text, at, "the camera moves while the shutter is open, give one transform for All")
         elif word == "Film":
             self.film = parameters
@@ -167,7 +172,7 @@ class _Scene:
         if self.lens is None:
             if look is None:
                 raise InputError("the text has no Camera, only its pose: copy the Camera statement as well")
-            pinhole = texts.posed(look[0:3], look[3:6], look[6:9], options.plane_or_refuse("the text"), mirrored)
+            pinhole = texts.posed(*_vectors(look), options.plane_or_refuse("the text"), mirrored)
             return texts.mirroring(Camera("Camera", pinhole, False), "pbrt")
         if _number(parameters, "lensradius", 0.0, self.text) > 0:
             texts.fail(
@@ -181,7 +186,7 @@ class _Scene:
         c_x, c_top = film.width * -left / (right - left), film.height * top / (top - bottom)
         if look is not None and d_x > 0 and d_y > 0:
             plane = axes.view_plane(d_x, d_y, c_x, c_top, (film.width, film.height))
-            pinhole = texts.posed(look[0:3], look[3:6], look[6:9], plane, mirrored)
+            pinhole = texts.posed(*_vectors(look), plane, mirrored)
         else:
             to_pixels = np.array([[d_x, 0, c_x], [0, -d_y, c_top], [0, 0, 1]]) @ self._invertible(matrix, at)[:3, :3]
             eye = np.linalg.solve(matrix[:3, :3], -matrix[:3, 3])
@@ -203,10 +208,10 @@ class _Scene:
         # A film without its size has that of the version, which nobody knows.
         if self.film is None or not {"xresolution", "yresolution", "cropwindow", "pixelbounds"} & self.film.keys():
             return texts.film(options, "pbrt 3 and 4", default=_SIZE), None
-        size = tuple(
+        width, height = (
             _whole(self.film, name, usual, self.text) for name, usual in zip(("xresolution", "yresolution"), _SIZE, strict=True)
         )
-        film = texts.film(options, "pbrt", size=size)
+        film = texts.film(options, "pbrt", size=(width, height))
         crop = None
         if "pixelbounds" in self.film:
             x0, x1, y0, y1 = (int(x) for x in _numbers(self.film, "pixelbounds", 4, self.text))
@@ -252,14 +257,15 @@ def _angle(parameters: _Parameters, text: str) -> float:
 
 def _statements(text: str) -> Iterator[tuple[str, int, list, _Parameters]]:
     """Each statement: its word, its place, its plain arguments, and its parameters."""
-    word, at, arguments, parameters = "", 0, [], {}
+    word, at = "", 0
+    arguments: list = []
+    parameters: _Parameters = {}
     values: list | None = None  # of the parameter that is being read
-    inside, is_open = False, False
+    is_open = False
     for match in _WORDS.finditer(text):
         string, name, number, bracket, stray = match.groups()
         if bracket:
             is_open = bracket == "["
-            inside = is_open and values is not None
             continue
         if name in ("true", "false") or (name in ("All", "StartTime", "EndTime") and word == "ActiveTransform"):
             (arguments if values is None else values).append(name)
@@ -275,7 +281,7 @@ def _statements(text: str) -> Iterator[tuple[str, int, list, _Parameters]]:
             if word == "WorldBegin" or not word:
                 continue
             texts.fail(text, match.start(), "pbrt's statements have words, numbers, quotes and brackets only")
-        elif inside or (is_open and values is not None):
+        elif is_open and values is not None:
             values.append(string)
         else:
             parts = string.split()

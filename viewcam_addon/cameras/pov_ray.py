@@ -19,10 +19,12 @@ import contextlib
 import math
 import re
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
+from ..pinhole import ViewPlane
 from . import axes, naming, own, texts
 from .camera import Camera, Options, not_a_pinhole
 from .expressions import Expressions, Unknown, numbers
@@ -108,7 +110,7 @@ class _Block:
         self.text, self.options, self.size, self.version = text, options, size, version
         self.conditions = _conditions(text)
         self._refuse_condition(opened)
-        self.declared = {}
+        self.declared: dict[str, list[int]] = {}
         for match in _DECLARE.finditer(text, 0, opened):
             self.declared.setdefault(match[1], []).append(match.end())
         self._before, self._depth = opened, 0
@@ -116,7 +118,7 @@ class _Block:
         self._aspect_of_film = False
         self.film: texts.Film | None = None
         self.reader = Expressions(text, self._name, angled=True)
-        self.values: dict[str, object] = {}
+        self.values: dict[str, Any] = {}
         self.moves: list[tuple[np.ndarray, np.ndarray]] = []
         self._collect(opened, 0)
 
@@ -208,7 +210,7 @@ class _Block:
         result = numbers(value, 3)
         if result is None:
             texts.fail(self.text, _place(value, at), f"give plain numbers for {word}")
-        return result
+        return result[0], result[1], result[2]
 
     def _move(self, word: str, at: int) -> int:
         value, end = self.reader.value(at)
@@ -262,6 +264,7 @@ class _Block:
         # A picture whose pixels nobody said has square ones, and a width that is whole: half a pixel may be missing there.
         is_known = film.is_stated or self._aspect_of_film or self._is_given
         exact = size[0] if is_known else size[1] * lengths[0] / lengths[1] / film.pixel_aspect
+        notes: tuple[str, ...] = ()
         if "look_at" in values:
             look_at = values["look_at"]
             plane = axes.view_plane(
@@ -269,7 +272,7 @@ class _Block:
             )
             if abs(plane.distance[0] / plane.distance[1] - 1) < 2.0**-20:
                 plane = _square(plane, size)
-            pinhole, notes = texts.posed(tuple(eye.tolist()), look_at, tuple(sky), plane, is_left_handed), ()
+            pinhole = texts.posed(tuple(eye.tolist()), look_at, tuple(sky), plane, is_left_handed)
             if self.moves:
                 u, v, w = pinhole.basis()
                 direction, up = -w * lengths[2], v * lengths[1]
@@ -301,7 +304,7 @@ class _Block:
         return texts.film(self.options, "POV-Ray's camera", self.size, aspect, _SIZE)
 
 
-def _square(plane, size: tuple[int, int]):
+def _square(plane: ViewPlane, size: tuple[int, int]) -> ViewPlane:
     """The view plane with one distance, where two differ by their rounding."""
     d = math.sqrt(plane.distance[0] * plane.distance[1])
     return axes.view_plane(d, d, size[0] / 2, size[1] / 2, size)

@@ -105,7 +105,7 @@ def _camera(
     options: Options,
     image: str | None = None,
 ) -> Camera:
-    """The camera of P.
+    """The camera of a projection matrix P.
 
     program : the program whose pixels count from the first one's center; None where they count from the corner.
     """

@@ -20,7 +20,7 @@ _CENTIMETERS = 100.0
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
-    """The poses.
+    """The cameras' poses, as Unreal has them.
 
     Raises
     ------

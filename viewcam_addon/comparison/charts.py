@@ -98,7 +98,7 @@ def marks(mismatches: Mismatches, size: tuple[int, int]) -> str:
 
 
 def mismatch_text(mismatches: Mismatches, i: int) -> str:
-    """One mismatch in a line."""
+    """A mismatch, told in a line."""
     where = f"column {mismatches.columns[i]}, row {mismatches.rows[i]}: {KINDS[mismatches.kinds[i]]}"
     if mismatches.explained[i]:
         return f"{where}, explained by a shift of {figure(mismatches.shifts[i])} px"

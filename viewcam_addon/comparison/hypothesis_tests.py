@@ -70,7 +70,7 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class HypothesisTest:
-    """One size of tiles, asked in one quantity.
+    """A test for differences in one quantity, over tiles of one size.
 
     size : one of SIZES.
     errors : (rows, columns, channels), each tile's difference in standard errors, signed; of contours negative where the test
@@ -134,7 +134,7 @@ class HypothesisTest:
 
 
 def run(sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: float) -> tuple[HypothesisTest, ...]:
-    """All sizes, asked so that chance makes any of them fail with the probability `level` at most.
+    """The tests over tiles of all sizes, so that chance makes any of them fail with the probability `level` at most.
 
     allowed : the allowance for rounding on these sides.
     freedom : the degrees of freedom of both sides' variances.

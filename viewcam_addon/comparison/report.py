@@ -54,7 +54,7 @@ class Legend:
 
 @dataclass(frozen=True)
 class Tab:
-    """One of the pictures to choose from.
+    """A picture of the page to choose, by a tab.
 
     name : its name in the page's address.
     words : the button's text, which says what it shows.
@@ -331,7 +331,7 @@ def write_light(
 
 
 def _view(comparison: RadianceComparison, name: str, values: np.ndarray) -> Tab:
-    """One map, in the scale that suits its kind."""
+    """The view of a map, in the scale that suits its kind."""
     quantity, _, kind = name.partition(": ")
     words = kind if quantity == "Combined" else name.replace(": ", " · ")
     words, view = words[:1].upper() + words[1:], name.lower().replace(": ", "-").replace(" ", "-")

@@ -37,7 +37,7 @@ _MOST_DIGITS = 9
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """One quantity on both sides, each (height, width, channels) float64, rows from the bottom.
+    """Both sides of a quantity, each (height, width, channels) float64, rows from the bottom.
 
     test_variance : the variance of `test`, which is a mean, from the test pictures' differences; inf where there is one picture
         only.

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PassErrors:
-    """One line of the table.
+    """A line of the table of errors: one pass, or one quantity of light.
 
     name, unit : the pass and the unit of its figures.
     count : the number of pixels compared.

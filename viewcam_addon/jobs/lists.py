@@ -90,7 +90,7 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class Row:
-    """One row.
+    """A row of a list of shots.
 
     place : its place in the list, "line 17" of a CSV, say.
     kind : the word for a field in this list, "column" or "key".

@@ -58,7 +58,7 @@ class Plan:
         return self.scheduler is not None or self.workers is not None
 
     def to_json(self) -> dict[str, Any]:
-        """All of it, as JSON can hold it."""
+        """The plan, as JSON can hold it."""
         return {**dataclasses.asdict(self), "out": str(self.out), "blend": self.blend and str(self.blend)}
 
     @classmethod

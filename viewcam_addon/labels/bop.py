@@ -192,7 +192,7 @@ def _turned_and_stretched(matrices: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _levels(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """0 and 255."""
+    """A mask as a picture of 0 and 255."""
     return np.uint8(255) * mask
 
 

@@ -35,7 +35,7 @@ _MOST_IDS = 2**24 - 1
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """One object in one place.
+    """An object in one place, an instance of it.
 
     key : (object's name, which one of those with this name): the same in every frame.
     id : a number for masks, 1 … 2²⁴ − 1.

@@ -258,7 +258,7 @@ class _Links:
     __hash__ = None  # type: ignore[assignment] # equal by value, and changed later
 
     def receiving(self, name: str) -> int:
-        """`Object::lit_by` of an object."""
+        """The bits of the lights that an object receives, `Object::lit_by`."""
         return sum(1 << bit for bit, names in enumerate(self._receivers) if name in names)
 
     def blocking(self, name: str) -> int:

@@ -17,7 +17,7 @@ from .operators import NamesCamera
 
 
 class Background:
-    """One kind.
+    """A kind of task that runs in the background, such as comparisons: the one on its way, and the last result.
 
     running : the one on its way, with `poll` (what it came to, None while it runs), `wait` and `cancel`; or None.
     latest : the last one's result, or None.
@@ -68,7 +68,7 @@ class Background:
         return outcome
 
     def wait(self) -> Any:
-        """The result, waited for."""
+        """Wait for the task on its way, and return its result."""
         try:
             self.running.wait()
             return self.poll()
@@ -107,7 +107,7 @@ class Background:
 
 
 class StartsForCamera(NamesCamera):
-    """An operator that starts one for a camera.
+    """An operator that starts a task in the background for a camera.
 
     busy : the sentence for who asks for one while another is on its way.
     """

@@ -39,7 +39,7 @@ def shot(camera_object: bpy.types.Object, scene: bpy.types.Scene, name: str, fra
 
 
 class BackgroundBatch:
-    """One on its way, from the moment it is made.
+    """A batch in the background, which is on its way from the moment it is made.
 
     into : the folder in which one is made for it, named by file, `what` and time.
     shots : the list.

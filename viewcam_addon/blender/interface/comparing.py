@@ -103,7 +103,7 @@ class Outcome:
 
 
 class RunningComparison:
-    """One comparison on its way, from the moment it is made.
+    """A comparison in the background, which is on its way from the moment it is made.
 
     scene : the one of the window.
     level : one of film.LEVELS, or "auto".
@@ -233,7 +233,7 @@ class RunningComparison:
 
 
 def _step(event: Mapping[str, Any], pictures: int) -> tuple[int, str]:
-    """The number of steps before one of them, and what it is called.
+    """The number of steps before the one that an event tells of, and the name of that one.
 
     pictures : the number of Cycles' pictures.
     """

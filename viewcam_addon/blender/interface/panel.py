@@ -137,7 +137,7 @@ def _draw_why(column: bpy.types.UILayout, word: str | None) -> None:
 
 
 def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
-    """One field, and what it is."""
+    """Draw the lens: one field, and beside it the list of what it is."""
     field = {unit: look for look, unit in datablocks.LENSES.items()}.get(group.lens_unit, "distance")
     panel_rows.value(column, group, field, choice="lens_unit")
 

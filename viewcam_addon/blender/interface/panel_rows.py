@@ -20,7 +20,7 @@ class CameraPanel:
 
 
 class SubPanel(CameraPanel):
-    """One that is closed at first, below the panel Virtual Pinhole."""
+    """A panel below Virtual Pinhole, which is closed at first."""
 
     bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
     bl_order = 1  # after Proof, which is open

@@ -156,7 +156,7 @@ _pixels = functools.lru_cache(maxsize=4)(stored)
 
 
 def _free_image_editor(manager: bpy.types.WindowManager) -> bpy.types.SpaceImageEditor | None:
-    """One that shows the comparison already, else one that shows nothing and is neither pinned nor painted in."""
+    """An Image Editor that shows the comparison already, else one that shows nothing and is neither pinned nor painted in."""
     areas = [area for window in manager.windows for area in window.screen.areas if area.ui_type == "IMAGE_EDITOR"]
     spaces = [area.spaces.active for area in areas]
     free = [space for space in spaces if not (space.image or space.use_image_pin) and space.mode == "VIEW"]

@@ -13,7 +13,7 @@ _CHARACTER = 6.8  # pixels, in the mean of a panel's text
 
 
 class Readout(NamedTuple):
-    """A row.
+    """A row of Read-Outs: a label and what the camera has of it.
 
     texts : one text, or three for the vectors.
     exact : the text that is copied, with all digits and without units.

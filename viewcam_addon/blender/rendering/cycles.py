@@ -162,7 +162,7 @@ def override_settings(
 
 
 def _override_device(overrides: Overrides, scene: bpy.types.Scene, device: str) -> None:
-    """All of a kind, and no processor beside them."""
+    """Let Cycles render on all devices of a kind, and on no processor beside them."""
     preferences = bpy.context.preferences.addons["cycles"].preferences
     known = [kind for kind, *_ in preferences.get_device_types(bpy.context) if kind != "NONE"]
     devices = preferences.get_devices_for_type(device) if device in known else ()

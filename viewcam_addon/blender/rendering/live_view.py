@@ -60,7 +60,7 @@ class LiveView:
         self._steps: list[int] = []  # samples of the pictures of light that are still to come
         self._rows = 0  # of the next one that are there
         self._is_at_work = self._is_closed = False
-        self._read: tuple[bool, Scene] | None = None  # whether with light, and the scene
+        self._read: tuple[bool, Scene] | None = None  # true with light, and the scene
         self._followed: tuple | None = None  # view and settings
         self._all.add(self)
         threading.Thread(target=self._work, name="viewcam view", daemon=True).start()
@@ -216,7 +216,7 @@ def _redraw() -> float | None:
 
 
 def unregister() -> None:
-    """End all threads."""
+    """End the threads of all viewports."""
     for each in list(LiveView._all):
         each.close()
     if bpy.app.timers.is_registered(_redraw):

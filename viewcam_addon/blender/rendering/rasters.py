@@ -116,7 +116,7 @@ def render(
 
 
 def _material(overrides: Overrides, view_layer: bpy.types.ViewLayer) -> bpy.types.Material:
-    """One that writes what renderers.PARTS names into outputs of the view layer, gone when the overrides end."""
+    """A material that writes what renderers.PARTS names into outputs of the view layer, gone when the overrides end."""
     material = bpy.data.materials.new("Virtual Pinhole")
     overrides.afterwards(bpy.data.materials.remove, material)
     if not material.node_tree:  # from 5.0 on new materials have one

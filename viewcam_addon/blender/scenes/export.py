@@ -13,7 +13,7 @@ What has no counterpart is noted in the ledger, with the remedy that takes it ou
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -178,7 +178,7 @@ def scene_through(depsgraph: bpy.types.Depsgraph, camera: Pinhole, clip: tuple[f
 
 
 def _scene(
-    depsgraph: bpy.types.Depsgraph, view: dict[str, object], ledger: Ledger, lit: bool, notes_doubles: bool = True
+    depsgraph: bpy.types.Depsgraph, view: dict[str, Any], ledger: Ledger, lit: bool, notes_doubles: bool = True
 ) -> Scene:
     shading = Shading() if lit else None
     names: dict[tuple[int, int], str] = {}
@@ -284,7 +284,7 @@ def _hashed(columns: NDArray[np.uint64]) -> NDArray[np.uint64]:
     return key
 
 
-def _shown_by_light(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading, surfaces: set[str]) -> dict[str, object]:
+def _shown_by_light(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading, surfaces: set[str]) -> dict[str, Any]:
     """The part of a Scene that makes its light, and what shows it. surfaces : the names of its objects."""
     images = shading.pictures()
     light = light_in(depsgraph, ledger, images)
@@ -296,7 +296,7 @@ def seen_from(scene: Scene, depsgraph: bpy.types.Depsgraph, camera_object: bpy.t
     return replace(scene, **_view_in(depsgraph, camera_object))
 
 
-def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> dict[str, object]:
+def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> dict[str, Any]:
     """The part of a Scene that is its camera's."""
     camera = camera_object.evaluated_get(depsgraph)
     return {
@@ -350,14 +350,14 @@ def placements(
     for source, numbers in rows.items():
         ledger.placed(source.name, len(numbers))
     draws = _draws(depsgraph) if shading and any(shading.asks_for_random(source.slots) for source in rows) else None
-    placed = []
+    result: list[Placement] = []
     for source, numbers in rows.items():
         random = None
-        if draws and shading.asks_for_random(source.slots):
+        if draws and shading and shading.asks_for_random(source.slots):
             draw = np.where(draws[0][numbers], draws[1][numbers], random_number(source.name))
             random = cycles_attributes.unit_number(draw.astype(np.uint32))
-        placed.append(Placement(source, _by_rows(matrices[numbers]), random))
-    return list(_drawn(placed, ledger))
+        result.append(Placement(source, _by_rows(matrices[numbers]), random))
+    return list(_drawn(result, ledger))
 
 
 def _draws(depsgraph: bpy.types.Depsgraph) -> tuple[NDArray[np.bool_], NDArray[np.uint32]]:
@@ -432,7 +432,7 @@ def _source(
     if not used:
         return None
     receivers, blockers = None, None
-    if links and linking.is_linked(placed.real.original) and shading.shines(slots):
+    if links and shading and linking.is_linked(placed.real.original) and shading.shines(slots):
         receivers, blockers = links.of(placed, ledger, True)
     # Cycles shares a geometry among objects unless a slot belongs to the object (BlenderSync::BKE_object_is_modified).
     own = any(slot.link == "OBJECT" for slot in evaluated.material_slots)

@@ -85,7 +85,7 @@ def import_cameras(
 
 
 class _CameraImport:
-    """One import while it runs."""
+    """An import of cameras while it runs."""
 
     def __init__(self, name: str, scene: bpy.types.Scene, overrides: Overrides) -> None:
         self._name, self._scene, self._overrides = name, scene, overrides

@@ -92,7 +92,7 @@ class _Point(_Kind):
         return values | {"position": tuple(values.pop("matrix")[:3, 3])}
 
     def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
-        """Around it."""
+        """UV of a point lamp, around it."""
         x, y, z = _within(inverse, "normal")
         length = node("vector_math", operation="length", a=node("combine_xyz", x=x, y=y, z=z))
         across = _affine(node("math", operation="arctan2", a=x, b=y), -0.5 / math.pi, 0.5)
@@ -108,7 +108,7 @@ class _Spot(_Kind):
         return (*super().settings_shown(light), "show_cone")
 
     def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
-        """Over its cone."""
+        """UV of a spot, over its cone."""
         x, y, z = _within(inverse, "incoming")
         half = -0.5 / math.tan(light.spot_size / 2)
         across, along = (_affine(node("math", operation="divide", a=each, b=z), half, 0.5) for each in (x, y))

@@ -101,7 +101,7 @@ class _Copy:
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Something in the file, once.
+    """An object of the file in one place.
 
     data : the datablock that is shown.
     matrix : (4, 4), of `data` relative to the eye.
@@ -117,7 +117,7 @@ class _Placed:
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """The file's camera.
+    """The camera of the file that a recentered scene is seen through.
 
     actual : the pinhole to render.
     claimed : the pinhole that it is said to be. Both are in the file's world space.

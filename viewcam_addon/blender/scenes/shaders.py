@@ -159,7 +159,7 @@ class Tree:
         self.viewport = viewport
         self._shines = shines
         self._deep = 0
-        self._is_beside = False  # whether values are asked for a little beside, too, as heights are
+        self._is_beside = False  # true while values are asked for a little beside, too, as heights are
 
     def surface(self, of: Input | None) -> Node | None:
         """The tracer's node, or None where there is no surface."""

@@ -22,7 +22,7 @@ _MOST = 1 << 20  # angles
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Light by directions.
+    """The light of an IES file by direction.
 
     across : about the axis z, up : from −z upwards, degrees, ascending.
     watts : (across, up).

@@ -137,7 +137,7 @@ class Lamp:
 
     @property
     def numbers(self) -> dict[str, float | bool | tuple[float, ...]]:
-        """The rest of what its kind declares."""
+        """The numbers that a kind of lamp declares, but for those that all have."""
         return dict(list(self._own.items())[2:])
 
     @property
@@ -236,7 +236,7 @@ class Area(Lamp):
 
     @property
     def area(self) -> float:
-        """In world space."""
+        """The area in world space."""
         across, along = self.matrix[:3, :2].T * np.array(self.size)[:, None]
         return float(np.linalg.norm(np.cross(across, along))) * (np.pi / 4 if self.ellipse else 1.0)
 

@@ -375,7 +375,7 @@ def write(scene: Scene, path: str | os.PathLike[str]) -> None:
 
 
 def read(path: str | os.PathLike[str]) -> Scene:
-    """Read a scene.
+    """Read a scene from its file.
 
     Raises
     ------

@@ -17,7 +17,7 @@ LARGEST = 1e18
 
 
 def value(default: Any, check: Callable[[str, Any], Any] | None, *read: Any) -> Any:
-    """Any value.
+    """A field of a frozen dataclass with any value.
 
     check : a function: its name and a value → the value to store, or InputError.
     read : a method of `Field` and its arguments by which `scene_file` reads it, or another word.
