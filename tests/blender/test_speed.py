@@ -372,9 +372,10 @@ def key_the_pose(camera_object, number=0):
         camera_object.keyframe_insert("rotation_euler", frame=frame)
 
 
-# Calibrated: twice what 4.2 and 5.0 take, and a quarter of what they took while each camera was placed, or followed, by itself.
-# Below 2.5 neither can be: a camera that is set as a frame changes is copied and evaluated by Blender a second time.
-LARGEST_MULTIPLES_OF_KEYED = {"values": 13, "pose": 18}
+# Calibrated: twice what 4.2 takes on average (9 to 14, by what else runs), and a third of what it took while each camera was
+# placed, or followed, by itself. Below 2.5 it can't be: a camera that is set as a frame changes is copied and evaluated by
+# Blender a second time.
+LARGEST_MULTIPLE_OF_KEYED = 20
 
 
 def seconds_of_a_frame(scene):
@@ -398,8 +399,7 @@ def multiple_of_keyed(keyed_cameras, scene, kind):
     return keyed / seconds_of_a_frame(scene)
 
 
-@pytest.mark.parametrize("kind", LARGEST_MULTIPLES_OF_KEYED)
+@pytest.mark.parametrize("kind", ["values", "pose"])
 def test_two_hundred_keyed_cameras_are_carried_in_one_pass(two_hundred_cameras, scene, kind):
-    most = LARGEST_MULTIPLES_OF_KEYED[kind]
-    multiple = least_of_few(lambda: multiple_of_keyed(two_hundred_cameras, scene, kind), most, 2)
-    assert multiple < most, f"{multiple:.1f} times Blender's own"
+    multiple = least_of_few(lambda: multiple_of_keyed(two_hundred_cameras, scene, kind), LARGEST_MULTIPLE_OF_KEYED, 2)
+    assert multiple < LARGEST_MULTIPLE_OF_KEYED, f"{multiple:.1f} times Blender's own"
