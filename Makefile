@@ -189,7 +189,7 @@ WINDOWS_SLOW = $(WINDOWS_PYTEST) -m "slow and not exhaustive"
 test-windows-suite: .venv/zips
 	status=0; \
 	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_SLOW) tests/cameras/test_usd.py tests/cameras/test_undistortion.py || status=1; \
-	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_SLOW) tests/blender/scenes/test_features.py tests/blender/odd || status=1; \
+	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_SLOW) tests/blender/scenes/test_features.py tests/blender/test_odd_blender.py || status=1; \
 	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_PYTEST) $(filter-out $(SLOW),$(QUICK)) || status=1; \
 	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_PYTEST) $(WINDOWS_BLENDER) $(filter-out $(SLOW),$(WINDOWS_OWN)) || status=1; \
 	.venv/bin/python .ci/emulated.py windows-4.2 $(WINDOWS_PYTEST) $(WINDOWS_BLENDER) || status=1; \

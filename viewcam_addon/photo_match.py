@@ -36,10 +36,10 @@ from .pinhole import Pinhole, Triple, check_distance
 Array = NDArray[np.float64]
 
 _STEPS = 60
-_CONVERGED = 1e-11  # of the parameters: what is left of them after one step more is their rounding
+_CONVERGED = 1e-11  # share of the parameters: one step more would change them by their rounding
 _SHORTEST, _LONGEST = 0.02, 200.0  # d of a start, of half the picture's larger side
-_LARGEST_ERROR = math.log(2.0)  # of d, as a factor: what is less certain than that is no answer
-_LARGEST_SHIFT = 0.5  # of the principal point's error, of half the picture's larger side: what is less certain is no answer
+_LARGEST_ERROR = math.log(2.0)  # d's, as a factor: a less certain one is no answer
+_LARGEST_SHIFT = 0.5  # the principal point's, in halves of the picture's larger side: a less certain one is no answer
 _OPEN = 1e-13  # an eigenvalue of 7 by 7 numbers near 1 that is less than this is rounding
 # The share of the coordinates' spread within which a point is in a plane.
 _FLAT = 1e-6
@@ -124,11 +124,8 @@ def from_edges(
     is_principal_point_free : true to find the principal point as well, which takes edges along all three axes; else that of
         `like` is kept.
 
-    Raises
-    ------
-    InputError
-        if edges are missing or contradict one another, or leave the lens or a free principal point open, or if no camera sees
-        the known one so.
+    Raises InputError if edges are missing or contradict one another, or leave the lens or a free principal point open, or if no
+    camera sees the known one so.
     """
     precision = checks.number("precision", precision, least=1e-9)
     named = [axis for axis, *_ in edges]
@@ -189,10 +186,8 @@ def from_points(
     precision : the standard deviation of pixels.
     distance : d in pixels where the lens is known.
 
-    Raises
-    ------
-    InputError
-        if there are too few points, if they lie on a line or in a plane seen head-on, or if no camera sees them so.
+    Raises InputError if there are too few points, if they lie on a line or in a plane seen head-on, or if no camera sees them
+    so.
     """
     precision = checks.number("precision", precision, least=1e-9)
     points, pixels = checks.array("points", points), checks.array("pixels", pixels)
@@ -227,10 +222,7 @@ def from_rectangle(
     axes : the two that the sides run along, as "XY" on the floor or "XZ" on a wall.
     distance : d in pixels where the lens is known.
 
-    Raises
-    ------
-    InputError
-        as from_points does, and if a side has no length.
+    Raises InputError as from_points does, and if a side has no length.
     """
     if len(axes) != 2 or any(axis not in _AXES for axis in axes) or axes[0] == axes[1]:
         raise InputError(f"a rectangle's sides run along {axes!r}: name two axes, such as XY")
@@ -485,7 +477,7 @@ def _refined(
     values, vectors = np.linalg.eigh(normal / both)
     # Where a step changes nothing (lens and distance of a plane seen head-on) all is open.
     variances = np.where(values[..., :1] > _OPEN, 1.0 / np.maximum(values, _OPEN), 1e300)
-    covariance = np.zeros((*distance.shape, unknowns, unknowns))  # of a known lens
+    covariance = np.zeros((*distance.shape, unknowns, unknowns))  # a known lens has none
     covariance[..., np.array(asked)[:, None], asked] = np.einsum("...pk,...k,...qk->...pq", vectors, variances, vectors) / both
     units = np.concatenate([np.ones((*distance.shape, 4)), np.repeat(scale[..., None], unknowns - 4, axis=-1)], axis=-1)
     covariance = covariance * units[..., :, None] * units[..., None, :]

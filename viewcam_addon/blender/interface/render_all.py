@@ -16,8 +16,7 @@ from ...jobs.job import Job
 from ...jobs.names import made_fit, one_file
 from .. import own_picture
 from . import scene_cameras
-from .background import Background, Cancels
-from .background_batch import BackgroundBatch, shot
+from .background import Background, BackgroundBatch, Cancels, shot
 
 _SHEET = "contact-sheet.html"
 
@@ -45,10 +44,7 @@ background = Background(0.5, _looked)
 def shots(scene: bpy.types.Scene, animation: bool) -> list[Job]:
     """The list of shots: each camera that is rendered, in its own picture; of an animation each frame of its range.
 
-    Raises
-    ------
-    InputError
-        if there is none, or one has pixels of another shape than the scene, which a batch can't give it.
+    Raises InputError if there is none, or one has pixels of another shape than the scene, which a batch can't give it.
     """
     rows, taken = [], set()
     for camera_object in scene_cameras.of_scene(scene):
