@@ -55,9 +55,9 @@ def read(name: str, path: Path | None, text: str, size: str, values: str) -> dic
     size : the attribute of a camera that has the pixels of its picture.
     values : the key of its customData that is wanted.
 
-    It has y_up; meters_per_unit; documentation of the root layer; values (of all prims, texts); left_out (what is not read, as it
-    stands in the file); cameras: each a name and an error, or samples: each with the time, seconds (None if there is one alone),
-    size, matrix (16, for row vectors) and the attributes of the lens by their names.
+    It has y_up; meters_per_unit; documentation of the root layer; values (of all prims, texts); left_out (what is not read, as
+    it stands in the file); cameras: each a name and an error, or samples: each with the time, seconds (None if there is one
+    alone), size, matrix (16, for row vectors) and the attributes of the lens by their names.
 
     Raises InputError if OpenUSD is not here, can't open it, or needs more than the bounds.
     """
