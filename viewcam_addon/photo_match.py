@@ -193,11 +193,11 @@ def from_points(
     points, pixels = checks.array("points", points), checks.array("pixels", pixels)
     if points.ndim != 2 or points.shape[1:] != (3,) or pixels.shape != (len(points), 2):
         raise InputError(f"{len(points)} points and {len(pixels)} pixels do not belong together: give as many of both")
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    is_flat = len(points) < 4 or spread[2] <= _FLAT * spread[0]
+    singular_values = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    is_flat = len(points) < 4 or singular_values[2] <= _FLAT * singular_values[0]
     if len(points) < (4 if is_flat else 6):
         raise InputError(f"{len(points)} points are too few: give four in one plane, or six in space")
-    if spread[1] <= _FLAT * spread[0]:
+    if singular_values[1] <= _FLAT * singular_values[0]:
         raise InputError("the points lie on one line: give some beside it")
     middle = np.array(like.principal_point)
     solution = solve_points(points, pixels - middle, _half(like), is_flat, _known_distance(distance))
@@ -440,18 +440,18 @@ def _refined(
     """
     unknowns = 4 + others.shape[-1]
     scale = np.broadcast_to(scale, distance.shape)
-    asked = [parameter for parameter in range(unknowns) if parameter != 3 or not is_lens_known]
+    free = [parameter for parameter in range(unknowns) if parameter != 3 or not is_lens_known]
     damping = np.full(distance.shape, 1e-4)
     residual, jacobian = measured(rotation, others, distance)
     cost = (residual**2).sum(axis=-1)
     for _ in range(_STEPS):
-        slopes = jacobian[..., asked]
+        slopes = jacobian[..., free]
         normal = np.swapaxes(slopes, -1, -2) @ slopes
         gradient = np.einsum("...mp,...m->...p", slopes, residual)
         diagonal = np.einsum("...pp->...p", normal)
-        damped = normal + (damping[..., None] * diagonal + 1e-300)[..., None] * np.eye(len(asked))
+        damped = normal + (damping[..., None] * diagonal + 1e-300)[..., None] * np.eye(len(free))
         step = np.zeros((*distance.shape, unknowns))
-        step[..., asked] = -_solved(damped, gradient)
+        step[..., free] = -_solved(damped, gradient)
         step[..., 3] = np.clip(step[..., 3], -1.0, 1.0)
         tried_rotation = _turned(rotation, step[..., :3])
         tried_distance = distance * np.exp(step[..., 3])
@@ -470,7 +470,7 @@ def _refined(
         damping = np.where(better, np.maximum(damping / 10.0, 1e-15), np.minimum(damping * 10.0, 1e12))
         if (np.abs(step).max(axis=-1) < _CONVERGED).all():
             break
-    slopes = jacobian[..., asked]
+    slopes = jacobian[..., free]
     normal = np.swapaxes(slopes, -1, -2) @ slopes
     size = np.sqrt(np.maximum(np.einsum("...pp->...p", normal), 1e-300))
     both = size[..., :, None] * size[..., None, :]
@@ -478,7 +478,7 @@ def _refined(
     # Where a step changes nothing (lens and distance of a plane seen head-on) all is open.
     variances = np.where(values[..., :1] > _OPEN, 1.0 / np.maximum(values, _OPEN), 1e300)
     covariance = np.zeros((*distance.shape, unknowns, unknowns))  # a known lens has none
-    covariance[..., np.array(asked)[:, None], asked] = np.einsum("...pk,...k,...qk->...pq", vectors, variances, vectors) / both
+    covariance[..., np.array(free)[:, None], free] = np.einsum("...pk,...k,...qk->...pq", vectors, variances, vectors) / both
     units = np.concatenate([np.ones((*distance.shape, 4)), np.repeat(scale[..., None], unknowns - 4, axis=-1)], axis=-1)
     covariance = covariance * units[..., :, None] * units[..., None, :]
     return _nearest_rotation(rotation), others, distance, residual, covariance

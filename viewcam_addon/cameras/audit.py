@@ -676,10 +676,10 @@ def _lens_of_tracks(views: Views, evidence: Tracks) -> list[Mistake]:
     there = there[:: max(1, len(there) // _FITTED_TO)]
     which = evidence.which[there]
     center, focal = (each[(which + views.shifted) % len(views.eye)] for each in (views.center, views.focal))
-    points, taken = (places[there] - center) / focal, (evidence.places[there] - center) / focal
+    points, measured = (places[there] - center) / focal, (evidence.places[there] - center) / focal
     best: tuple[Lens, float, float] | None = None
     for projection, terms, of_focal in _FITTED_LENSES:
-        fit = _fitted(points, taken, focal, projection, terms, of_focal, evidence.floor)
+        fit = _fitted(points, measured, focal, projection, terms, of_focal, evidence.floor)
         if fit is not None and (best is None or fit[2] < _BETTER * best[2]):
             best = fit
     if best is None:

@@ -355,8 +355,8 @@ def _maker(image: Image) -> str:
 
 
 def _light_crops(comparison: RadianceComparison, on_screen: tuple) -> list[Crop]:
-    asked = [(row, test) for row in comparison.rows for test in row.hypothesis_tests]
-    failed = [(row, test) for row, test in asked if not test.ok and test.size not in (CONTOURS, WHOLE)]
+    tested = [(row, test) for row in comparison.rows for test in row.hypothesis_tests]
+    failed = [(row, test) for row, test in tested if not test.ok and test.size not in (CONTOURS, WHOLE)]
     return [_crop(comparison, on_screen, row, test) for row, test in failed[:_MOST_CROPS]]
 
 

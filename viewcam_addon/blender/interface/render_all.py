@@ -46,14 +46,14 @@ def shots(scene: bpy.types.Scene, animation: bool) -> list[Job]:
 
     Raises InputError if there is none, or one has pixels of another shape than the scene, which a batch can't give it.
     """
-    rows, taken = [], set()
+    rows, names = [], set()
     for camera_object in scene_cameras.of_scene(scene):
         if camera_object.hide_render:
             continue
         name = made_fit(camera_object.name)
-        while one_file(name) in taken:
+        while one_file(name) in names:
             name += "_"
-        taken.add(one_file(name))
+        names.add(one_file(name))
         picture = own_picture.of_camera(camera_object, scene)
         frames = range(int(picture["frame_start"]), int(picture["frame_end"]) + 1) if animation else (scene.frame_current,)
         rows += [shot(camera_object, scene, f"{name}_{frame:04d}" if animation else name, frame) for frame in frames]

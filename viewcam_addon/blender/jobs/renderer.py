@@ -143,15 +143,15 @@ class BlenderRenderer:
             pictures.write(self.scene, image, preview)
         evaluated = self.scene.camera.evaluated_get(datablocks.depsgraph_of(self.scene))
         self._taken = cameras.read(evaluated, self.scene)
-        taken = record(self._taken, datablocks.camera_data_of(evaluated))
+        camera = record(self._taken, datablocks.camera_data_of(evaluated))
         rendered = self._settings.rendered(bool(image)) | ({"camera": self._of_shot(shot).name} if self._of_file else {})
         if calibration := shot.calibration:
             if image and preview:
                 self._tracing.distort(image, preview, calibration, self._taken.plane)
-            taken = {**record(calibration.at(self._taken), lens=calibration.lens), "pinhole": taken}
+            camera = {**record(calibration.at(self._taken), lens=calibration.lens), "pinhole": camera}
             rendered |= {"width": calibration.plane.width, "height": calibration.plane.height}
         return {
-            **taken,
+            **camera,
             **({"stated": record(self._stated)["camera"]} if self._stated else {}),
             "rendered": rendered,
             "warnings": [*self._settings.warnings, *warnings],
