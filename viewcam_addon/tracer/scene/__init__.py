@@ -6,8 +6,9 @@ or rays (native.py, core); the classes hold arrays and check their shapes. Mater
 bounces matter from level `direct` on; a scene of level `geometry` leaves them out.
 """
 
+import dataclasses
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -342,7 +343,7 @@ def same(first: Any, second: Any) -> bool:
     if isinstance(first, tuple):
         return len(first) == len(second) and all(map(same, first, second))
     if is_dataclass(first):
-        return all(same(getattr(first, field.name), getattr(second, field.name)) for field in fields(first))
+        return all(same(getattr(first, field.name), getattr(second, field.name)) for field in dataclasses.fields(first))
     return first == second
 
 
