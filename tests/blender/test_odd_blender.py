@@ -13,6 +13,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+bpy = pytest.importorskip("bpy")
+
 from mathutils import Matrix
 
 from viewcam_addon.blender import camera as cameras
@@ -22,7 +25,6 @@ from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 
-bpy = pytest.importorskip("bpy")
 pytestmark = pytest.mark.slow
 
 

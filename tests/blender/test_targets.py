@@ -10,14 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+bpy = pytest.importorskip("bpy")
+
 import viewcam_addon
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import datablocks, findings, hold, targets
 from viewcam_addon.blender.interface import panel
 from viewcam_addon.pinhole import Pinhole
-
-bpy = pytest.importorskip("bpy")
-
 
 POINTS = ("eye", "look_at")
 

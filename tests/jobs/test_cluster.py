@@ -19,6 +19,8 @@ from pathlib import Path
 
 import pytest
 
+pytest.importorskip("distributed")
+
 from viewcam_addon import child_process, cli
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import cluster, one, run, served_renderer
@@ -26,7 +28,6 @@ from viewcam_addon.jobs.folder import Folder, Outputs
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.served_renderer import ServedRenderer
 
-pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
 
 

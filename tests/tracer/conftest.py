@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from core_probes import SampledLight, Sampler, radiance_seen
 from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
@@ -15,6 +14,8 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres, scene_file
 
 sys.path.insert(0, str(Path(__file__).parent))
+
+from core_probes import SampledLight, Sampler, radiance_seen
 
 
 @pytest.fixture(scope="session")

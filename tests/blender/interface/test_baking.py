@@ -8,13 +8,14 @@ import math
 import numpy as np
 import pytest
 
+bpy = pytest.importorskip("bpy")
+
 import viewcam_addon
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import versions
 from viewcam_addon.blender.interface import baking, panel
 from viewcam_addon.errors import InputError
 
-bpy = pytest.importorskip("bpy")
 pytestmark = pytest.mark.slow
 
 

@@ -8,15 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+bpy = pytest.importorskip("bpy")
+
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import linking
 from viewcam_addon.comparison import radiance
 from viewcam_addon.image import Image
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.render import render
-
-bpy = pytest.importorskip("bpy")
-
 
 ALL = {"Monkey", "Floor"}
 

@@ -9,6 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+bpy = pytest.importorskip("bpy")
+
 from mathutils import Vector
 
 from viewcam_addon.blender.camera import apply
@@ -22,7 +25,6 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, scene_file
 
-bpy = pytest.importorskip("bpy")
 pytestmark = pytest.mark.slow
 
 

@@ -120,7 +120,7 @@ def survey(
 
 
 def level_needed(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object) -> str:
-    """The least level (levels.py) that models all light of what `export_scene` gives, found without reading any geometry."""
+    """The least level (tracer/scene) that models all light of what `export_scene` gives, found without reading any geometry."""
 
     def look(depsgraph: bpy.types.Depsgraph) -> str:
         ledger, shading = Ledger(), Shading()

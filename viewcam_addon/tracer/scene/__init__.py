@@ -344,10 +344,10 @@ def same(first: Any, second: Any) -> bool:
         return len(first) == len(second) and all(map(same, first, second))
     if is_dataclass(first):
         return all(same(getattr(first, field.name), getattr(second, field.name)) for field in dataclasses.fields(first))
-    return first == second
+    return bool(first == second)
 
 
-def _same_array(first: NDArray, second: NDArray) -> bool:
+def _same_array(first: NDArray[Any], second: NDArray[Any]) -> bool:
     if first.shape != second.shape or first.dtype != second.dtype:
         return False
     if first.size < _FEW:
