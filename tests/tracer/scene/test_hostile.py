@@ -313,7 +313,7 @@ def render_file(folder, level="path", samples=16, **changes):
     """The Combined pass of the scene with other keys; it must hold numbers, none of them negative."""
     scene, picture = folder / "scene.json", folder / "out.exr"
     scene.write_text(json.dumps(LIT_SCENE | changes))
-    status = main(["render_file", str(scene), str(picture), "--level", level, "--samples", str(samples)])
+    status = main(["render", str(scene), str(picture), "--level", level, "--samples", str(samples)])
     assert status == 0
     passes = image.read(picture).passes
     for name in ("Combined", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color", "Emission", "Environment"):
@@ -325,7 +325,7 @@ def refusal(folder, capfd, **changes):
     """The sentence with which the scene is refused."""
     scene, picture = folder / "scene.json", folder / "out.exr"
     scene.write_text(json.dumps(LIT_SCENE | changes))
-    assert main(["render_file", str(scene), str(picture), "--level", "path"]) == 2
+    assert main(["render", str(scene), str(picture), "--level", "path"]) == 2
     lines = capfd.readouterr().err.strip().splitlines()
     assert len(lines) == 1 and "bug" not in lines[0], lines
     assert not picture.exists()
@@ -386,7 +386,7 @@ def test_colors_that_are_none_are_refused_by_name(tmp_path, capfd, number, owner
     }[owner]
     scene = tmp_path / "scene.json"
     scene.write_text(json.dumps(LIT_SCENE | changes).replace('"COLOR"', color))
-    assert main(["render_file", str(scene), str(tmp_path / "out.exr"), "--level", "path"]) == 2
+    assert main(["render", str(scene), str(tmp_path / "out.exr"), "--level", "path"]) == 2
     lines = capfd.readouterr().err.strip().splitlines()
     assert len(lines) == 1 and "bug" not in lines[0], lines
     assert number in ("NaN", "Infinity") or {"material": "gray", "lamp": "Sun", "world": "world"}[owner] in lines[0], lines[0]
@@ -500,5 +500,5 @@ def test_what_light_can_not_be_is_refused_by_name(tmp_path, capfd, changes, word
 def test_more_samples_than_there_are_random_numbers_are_refused_or_taken(tmp_path, capfd):
     scene = tmp_path / "scene.json"
     scene.write_text(json.dumps(LIT_SCENE))
-    assert main(["render_file", str(scene), str(tmp_path / "out.exr"), "--level", "path", "--samples", "0"]) == 2
+    assert main(["render", str(scene), str(tmp_path / "out.exr"), "--level", "path", "--samples", "0"]) == 2
     assert "--samples" in capfd.readouterr().err

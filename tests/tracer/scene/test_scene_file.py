@@ -340,7 +340,7 @@ def test_whatever_a_key_is_replaced_by_is_read_or_refused_in_a_sentence(example,
 
 @pytest.fixture(scope="session")
 def lit_example():
-    """The second lit_example of the documentation, which has light, as parsed JSON."""
+    """The second example of the documentation, which has light, as parsed JSON."""
     return json.loads(re.findall(r"```json\n(.*?)```", DOCUMENTATION.read_text(encoding="utf-8"), re.DOTALL)[1])
 
 
