@@ -95,11 +95,8 @@ def document(
     more : further keys at the top.
     of_frames : further keys of each frame.
 
-    Raises
-    ------
-    InputError
-        if there is no camera, two have one picture, one is mirrored or some but not all have a fisheye, or if the scale is not
-        one that instant-ngp takes.
+    Raises InputError if there is no camera, two have one picture, one is mirrored or some but not all have a fisheye, or if the
+    scale is not one that instant-ngp takes.
     """
     cameras = naming.checked(cameras, FILE)
     if aabb_scale is not None and checks.whole("aabb_scale", aabb_scale) not in AABB_SCALES:
