@@ -667,7 +667,7 @@ OPEN3D_VIEW = {
     "boundingbox_max": [1, 2, 3],
     "boundingbox_min": [-1, -2, 1],
     "field_of_view": 60.0,
-    "front": [0, -3, 4],  # of any length
+    "front": [0, -3, 4],  # any length
     "lookat": [10, 20, 30],
     "up": [0, 0, 1],
     "zoom": 0.5,
