@@ -880,7 +880,7 @@ def Xform "root"
 @pytest.mark.parametrize("head", USD_HEADS)
 @pytest.mark.skipif(bpy.app.version < (4, 5, 0), reason="Blender's importer takes the unit since 4.5")
 def test_a_usd_s_camera_stands_where_blenders_importer_puts_it(tmp_path, head):
-    """Which takes the stage's unit and up axis."""
+    """By the stage's unit and up axis."""
     pytest.importorskip("pxr")
     (tmp_path / "a.usda").write_text(USD_STAGE.format(head))
     bpy.ops.wm.read_factory_settings(use_empty=True)
