@@ -134,7 +134,8 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
                 return self.execute(context)
             cls.names, cls.question = [camera.name for camera in read], f"The text has {len(read)} cameras: name one of them"
         except InputError as error:
-            cls.names, cls.question = [], datablocks.sentence(error)
+            # Without the words of the shell: what can be chosen stands below it.
+            cls.names, cls.question = [], datablocks.sentence(error).partition(": give --")[0]
         return context.window_manager.invoke_props_dialog(self, width=_DIALOG_WIDTH)
 
     def draw(self, _context: bpy.types.Context) -> None:
