@@ -132,11 +132,11 @@ def test_other_numbers_alone_are_no_pose(text):
 
 @pytest.mark.parametrize("factor", [1.0, 1000.0])
 def test_variables_as_matlab_shows_them_are_read_with_the_factor_that_it_takes_out(factor):
-    def shown(name, matrix, factor=1.0):
+    def display(name, matrix, factor=1.0):
         by = f"   {factor:.1e} *\n\n" if factor != 1 else ""
         return f"{name} =\n\n{by}" + "".join(f"   {row(each, '   ')}\n" for each in matrix / factor) + "\n\n"
 
-    text = shown("K", K, factor) + shown("R", R) + shown("t", T[:, None])
+    text = display("K", K, factor) + display("R", R) + display("t", T[:, None])
     (read,) = cameras.read(text, options=CORNER)
     np.testing.assert_allclose(read.pinhole.distance, known.pinhole.distance, rtol=1e-15)
     np.testing.assert_allclose(read.pinhole.eye, known.pinhole.eye, rtol=1e-12)

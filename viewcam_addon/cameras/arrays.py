@@ -53,7 +53,7 @@ _TEMPLATE = re.compile(r"\s*<[\w\s,:]{0,60}>")
 _ORDER = re.compile(r"byrow\s*=\s*(?:TRUE|T)\b")
 _SCALARS = ("fx", "fy", "cx", "cy")
 _DIAGONAL = re.compile(r"\(\s*[1-4]\s*\)")
-# What consoles print around the numbers of a matrix, and that nothing but numbers is left.
+# The words of consoles around the numbers of a matrix; and a text of numbers alone.
 _PRINTED_AROUND = re.compile(
     r"\A<?Matrix [34]x4|>\s*\Z|\A[34]×4 \w+\{[^}\n]{0,40}\}:|(?:\b\w+\.)*\b(?:array|tensor|[Mm]atrix)\s*(?=\()"
     r"|,\s*(?:dtype|device|requires_grad|grad_fn)\s*=\s*[\w.'\"<>:]{1,40}"
@@ -164,7 +164,7 @@ def _alone(text: str) -> list[float]:
     return numbers if np.abs(square - scale * np.eye(3)).max() <= _LIKE_A_TURN * scale else []
 
 
-def _shown(match: re.Match) -> str:
+def _as_written(match: re.Match) -> str:
     """A variable that MATLAB shows, as it is written."""
     factor = float(match[2] or 1)
     rows = [" ".join(repr(factor * float(word)) for word in line.split()) for line in match[3].splitlines() if line.strip()]
@@ -176,7 +176,7 @@ def _values(text: str) -> Mapping[str, Any]:
     """The arrays, in rows, and the numbers of a text by their plain names. What is recognized is then read."""
     if alone := _alone(text):
         return {"pose": alone}
-    text = _SHOWN.sub(_shown, _GOES_ON.sub("   ", text))
+    text = _SHOWN.sub(_as_written, _GOES_ON.sub("   ", text))
     text = texts.without(_COMMENT_OF_C, text) if _IN_C.search(text) else texts.without(_COMMENT, text)
     code = _Code(text.replace("−", "-"))
     values = code.values()

@@ -183,9 +183,7 @@ def described(
     return row
 
 
-def listed(
-    column: bpy.types.UILayout, context: bpy.types.Context, label: str, texts: tuple[str, ...], share: float
-) -> None:
+def listed(column: bpy.types.UILayout, context: bpy.types.Context, label: str, texts: tuple[str, ...], share: float) -> None:
     """A label and texts beside one another, where a long one takes the room that a short one leaves; or one below the other."""
     line, room = "   ".join(texts), _width(context) - _BESIDE_TEXT
     if readouts.fits(line, room if is_narrow(context) else (1.0 - share) * room):
