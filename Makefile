@@ -168,11 +168,11 @@ test-blender: .venv/zips $(patsubst %,.venvs/%/ready,$(filter 4.2 4.5,$(WHEELS))
 PLATFORMS = $(call PYTEST,.venv) -m platforms
 
 test-windows: .venv/zips $(patsubst %,.venvs/%/ready,$(filter 4.2 5.0,$(MATRIX)))
-	$(PLATFORMS) tests/platforms/test_windows.py
+	$(PLATFORMS) tests/platforms/test_emulated.py -k "not arm64"
 	$(MAKE) test-windows-suite
 
 test-windows-smoke: .venv/zips
-	$(PLATFORMS) tests/platforms/test_windows.py -k smoke
+	$(PLATFORMS) tests/platforms/test_emulated.py -k smoke
 
 # With the newer one what is quick and needs no Blender, then what touches it, and what of files, processes and consoles is
 # Windows' own; with the older one what touches Blender. The first is apart, since of libraries of one name a process has one on
@@ -189,17 +189,17 @@ WINDOWS_SLOW = $(WINDOWS_PYTEST) -m "slow and not exhaustive"
 test-windows-suite: .venv/zips
 	status=0; \
 	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_SLOW) tests/cameras/test_usd.py tests/cameras/test_undistortion.py || status=1; \
-	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_SLOW) tests/blender/scenes/test_features.py tests/blender/odd || status=1; \
+	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_SLOW) tests/blender/scenes/test_features.py tests/blender/test_odd_blender.py || status=1; \
 	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_PYTEST) $(filter-out $(SLOW),$(QUICK)) || status=1; \
 	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_PYTEST) $(WINDOWS_BLENDER) $(filter-out $(SLOW),$(WINDOWS_OWN)) || status=1; \
 	.venv/bin/python .ci/emulated.py windows-4.2 $(WINDOWS_PYTEST) $(WINDOWS_BLENDER) || status=1; \
 	exit $$status
 
 test-arm64: .venv/zips
-	$(PLATFORMS) tests/platforms/test_arm64.py
+	$(PLATFORMS) tests/platforms/test_emulated.py -k arm64
 
 test-zips: .venv/zips extension
-	$(PLATFORMS) tests/platforms/test_wheels.py tests/platforms/test_libraries.py tests/platforms/test_zips.py
+	$(PLATFORMS) tests/platforms/test_libraries.py tests/platforms/test_zips.py
 
 extension: .venv/extension
 	blender=$$(.ci/find-blender) || exit 1; \

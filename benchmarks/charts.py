@@ -194,10 +194,7 @@ def draw(charts: Sequence[Chart], path: Path, command: str, measured_on: str = "
     command : the command that measures them again, for the captions.
     measured_on : the machine and versions, those here if it is empty.
 
-    Raises
-    ------
-    InputError
-        if the file can't be written.
+    Raises InputError if the file can't be written.
     """
     # Letters stay text. The font that matplotlib brings along is the widest of the usual ones, so that another fits as well.
     settings = {"svg.fonttype": "none", "svg.hashsalt": charts[0].name, "font.family": "DejaVu Sans", "font.size": 9}
@@ -371,10 +368,7 @@ def run(
 
     Returns 0, or 1 if the method in use is behind another somewhere, and their figures.
 
-    Raises
-    ------
-    InputError
-        if there is no such sweep, or the folder can't be written to.
+    Raises InputError if there is no such sweep, or the folder can't be written to.
     """
 
     def measure(sweep: str, quick: bool) -> Iterable[Chart]:
@@ -416,10 +410,7 @@ def run_all(
 def read(figures: Path) -> dict[str, Any]:
     """The figures of an earlier run, as `run_all` tells them. figures : the JSON that it wrote.
 
-    Raises
-    ------
-    InputError
-        if the file can't be read or has no figures of charts.
+    Raises InputError if the file can't be read or has no figures of charts.
     """
     try:
         record = json.loads(figures.read_text(encoding="utf-8"))
@@ -435,10 +426,7 @@ def read(figures: Path) -> dict[str, Any]:
 def redraw(earlier: dict[str, Any], folder: Path) -> tuple[int, dict[str, Any]]:
     """Draw charts into `folder` from figures, without measuring anything. Returns 0 and these figures.
 
-    Raises
-    ------
-    InputError
-        if the folder can't be written to.
+    Raises InputError if the folder can't be written to.
     """
     for drawing, group in itertools.groupby(earlier["charts"].values(), operator.itemgetter("drawing")):
         first, *others = group

@@ -70,7 +70,7 @@ def clear_glass(name: str, code: str, ior: float = 1.5):
 def _empty_material(name: str, code: str):
     material = bpy.data.materials.new(name)
     material.use_nodes = True
-    material.diffuse_color = color(code)  # what the solid viewport shows
+    material.diffuse_color = color(code)  # shown by the solid viewport
     material.node_tree.nodes.clear()
     output = material.node_tree.nodes.new("ShaderNodeOutputMaterial")
     output.location = (220, 0)

@@ -5,7 +5,7 @@ Node groups are what keeps the sample scenes small: thousands of objects are a r
 
 import bpy
 
-COLUMN_WIDTH, ROW_HEIGHT = 220, 190  # of the layout, in the node editor's units
+COLUMN_WIDTH, ROW_HEIGHT = 220, 190  # the layout, in the node editor's units
 
 
 class Nodes:

@@ -10,7 +10,7 @@ import building as b
 from nodes import Nodes, use_nodes
 from staging import fresh_scene, state_camera
 
-BAY, STORY, DEPTH = 3.2, 4.1, 1.1  # of the façade's arches, in meters
+BAY, STORY, DEPTH = 3.2, 4.1, 1.1  # the façade's arches, in meters
 BAYS, STORIES = 6, 6
 
 

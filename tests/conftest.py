@@ -46,10 +46,10 @@ def pytest_collection_modifyitems(items):
         if "bpy" in vars(item.module) or "fresh_blender" in item.fixturenames:
             item.add_marker(pytest.mark.blender)
         if "benchmarks" in item.path.parts and not item.get_closest_marker("speed"):
-            item.add_marker(pytest.mark.exhaustive)  # what measures is not what is shipped
+            item.add_marker(pytest.mark.exhaustive)  # benchmarks measure, and are not shipped
         if "real_blender" in item.path.parts or any(map(item.get_closest_marker, ("exhaustive", "light", "speed"))):
             item.add_marker(pytest.mark.timeout(_LONG))
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)  # what takes long begins first
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)  # the longest first
 
 
 @pytest.fixture(scope="session", autouse=True)

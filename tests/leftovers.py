@@ -124,7 +124,7 @@ def survivors(package):
         parent, _, own = name.rpartition(".")
         if getattr(sys.modules.get(parent), own, None) is module:
             delattr(sys.modules[parent], own)
-    module = None  # what this holds itself is not what is asked for
+    module = None  # or this function itself would hold it
     for _ in range(3):
         gc.collect()
     kinds = (types.FunctionType, type, types.ModuleType)

@@ -54,7 +54,7 @@ def test_whatever_else_differs_is_seen(folders, change):
 
 @pytest.mark.exhaustive
 class TestWheel(disturbed.Disturbances):
-    KILLS = 8  # of which the fifth is at the start
+    KILLS = 8  # the fifth at the start
 
     @pytest.fixture(scope="class")
     @classmethod

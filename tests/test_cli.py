@@ -346,7 +346,7 @@ def test_ctrl_c_while_modules_are_imported_ends_the_process_without_a_traceback(
     foreground = {} if on_windows else {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
     command, environment = [sys.executable, "-m", "viewcam_addon", "render"], os.environ | {"PYTHONPATH": paths}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, **foreground)
-    status = 3 if on_windows else -signal.SIGINT  # that of C's runtime there
+    status = 3 if on_windows else -signal.SIGINT  # the status of C's runtime there
     assert (done.returncode, done.stdout, done.stderr) == (status, "", "")
 
 

@@ -234,7 +234,7 @@ def circle(modules: dict[str, str]) -> list[str]:
 
 def test_no_modules_import_one_another_in_a_circle():
     """Neither by `if TYPE_CHECKING` nor in functions, so that each can be read without the other."""
-    openers = {PACKAGE / "__init__.py", NEEDS_BLENDER / "__init__.py"}  # what Blender is to hear of is imported as it registers
+    openers = {PACKAGE / "__init__.py", NEEDS_BLENDER / "__init__.py"}  # they import Blender's classes as they register
     files = [path for path in sources() if path not in openers]
     modules = {".".join(path.relative_to(ROOT).with_suffix("").parts): path.read_text(encoding="utf-8") for path in files}
     assert len(modules) > 100 and not (actual := circle(modules)), " → ".join(actual)
@@ -352,19 +352,24 @@ def test_parameters_in_docstrings_stand_one_a_line():
 
 
 def test_comments_begin_with_what_a_thing_is_or_does():
-    """In Python, in the core, and where things are built."""
-    vague = re.compile(r"(?m)^ *(?:#|//) (?:How|Of|That of|The same|Those|What|Whether|Which|Who|Whose)\b.*")
+    """In Python, in the core, and where things are built; those behind a line's code, too."""
+    words = "How|Of|That of|The same|Those|What|Whether|Who"
+    behind = rf"[^\s\"'] +(?:#|//) (?:{words}|{words.lower()})\b.*"
+    vague = re.compile(rf"(?m)^ *(?:#|//) (?:{words}|Which|Whose)\b.*|{behind}")
     files = [name for name in tracked_files() if name.endswith((".py", ".h", ".cpp", "Makefile", ".toml", ".ci/run"))]
     texts = {name: (ROOT / name).read_text(encoding="utf-8") for name in files}
     assert {name: faults for name, text in texts.items() if (faults := vague.findall(text))} == {}
-    assert len(vague.findall("x = 1\n    # Of a picture.\n// The same of four.\n")) == 2
+    full, trailing = "    # Of a picture.\n// The same of four.\n", "x = 1" + "  # what it is\n" + "int y;" + "  // of four\n"
+    assert len(vague.findall(full + trailing)) == 4
 
 
 def test_names_say_what_a_value_is_and_are_spelled_as_blender_spells():
     assert guilty(poor_names) == {}
     assert not [name for name in tracked_files() if is_british(name)]
-    core = [path for path in PACKAGE.rglob("*") if path.suffix in (".h", ".cpp")]
-    assert core and not [path for path in core if is_british(path.read_text(encoding="utf-8"))]
+    core = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*") if path.suffix in (".h", ".cpp")}
+    assert core and not [path for path, text in core.items() if is_british(text)]
+    code = {path: re.sub(r'"(?:\\.|[^"\\\n])*"|//.*|/\*[\s\S]*?\*/', "", text) for path, text in core.items()}
+    assert {path: poor for path, text in code.items() if (poor := re.findall(rf"\b(?:{NO_NAMES})_?\b", text))} == {}
 
 
 def test_only_blender_knows_blender():

@@ -16,9 +16,8 @@ from . import image as images
 from .errors import InputError
 from .image import Image
 from .tracer import render as tracing
-from .tracer.scene import Scene, scene_file
+from .tracer.scene import Scene, least_level, scene_file
 from .tracer.scene.film import MOST_SAMPLES, SAMPLES
-from .tracer.scene.levels import least_level
 
 if TYPE_CHECKING:  # each function imports what no other needs: a picture is traced before half of it would be loaded
     from .comparison.light_verdict import RadianceComparison
@@ -35,10 +34,7 @@ _OTHER_SEEDS = 1000
 def read_scene(path: File) -> Scene:
     """A scene file, as docs/scene-file.md has it and `viewcam export` writes it.
 
-    Raises
-    ------
-    InputError
-        if there is none, or something in it is wrong; it names the key.
+    Raises InputError if there is none, or something in it is wrong; it names the key.
     """
     return scene_file.read(Path(path))
 
@@ -66,10 +62,7 @@ def render(
 
     Returns the passes by name, (height, width, channels) float32, rows from the bottom, with the camera.
 
-    Raises
-    ------
-    InputError
-        if there is no such level, a number makes no sense, or the scene needs more memory than there is.
+    Raises InputError if there is no such level, a number makes no sense, or the scene needs more memory than there is.
     """
     scene = scene if isinstance(scene, Scene) else read_scene(scene)
     level = least_level(scene)[0] if level == "auto" else level
@@ -105,10 +98,7 @@ def label(
 
     Returns the passes as an Image, and what is told of each instance as plain JSON values.
 
-    Raises
-    ------
-    InputError
-        if there is no such label, flow has no other frame, or frames differ in size.
+    Raises InputError if there is no such label, flow has no other frame, or frames differ in size.
     """
     from .labels import scene_labels
 
@@ -148,11 +138,8 @@ def compare(
 
     Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
-    Raises
-    ------
-    InputError
-        if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, no pixel of
-        either picture shows an object, or nearly all pixels with light had to be taken out.
+    Raises InputError if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, no
+    pixel of either picture shows an object, or nearly all pixels with light had to be taken out.
     """
     from .comparison import geometry, radiance, renderers
     from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
@@ -179,7 +166,7 @@ def compare(
         alarms = false_alarms or FALSE_ALARMS
         if framed is None:
             return radiance.compare(of, pictures, camera, test_samples, false_alarms=alarms)
-        if not framed.bounces.parts_diffuse:  # who rendered by himself may have the pass all the same
+        if not framed.bounces.parts_diffuse:  # a picture of another renderer may have the pass all the same
             kept = ({name: passes for name, passes in each.passes.items() if name != "Diffuse Indirect"} for each in pictures)
             pictures = [replace(each, passes=passes) for each, passes in zip(pictures, kept, strict=True)]
         makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(framed, threads))

@@ -85,10 +85,7 @@ class CameraValues:
     def view(self) -> Pinhole:
         """The direction in which the values look, in a picture of one pixel and whatever a held roll is.
 
-        Raises
-        ------
-        InputError
-            if eye = look-at, up = 0, or a number is not finite.
+        Raises InputError if eye = look-at, up = 0, or a number is not finite.
         """
         return Pinhole(self.eye, self.look_at, self.up, 1.0, 1, 1)
 
@@ -99,10 +96,8 @@ class CameraValues:
         frame : the picture that the scene renders.
         sensor_fit : "AUTO", "HORIZONTAL" or "VERTICAL".
 
-        Raises
-        ------
-        InputError
-            if the values make no camera: eye = look-at, up = 0, distance ≤ 0, zoom ≤ 0, a number that is not finite.
+        Raises InputError if the values make no camera: eye = look-at, up = 0, distance ≤ 0, zoom ≤ 0, a number that is not
+        finite.
         """
         distance = self.distances(frame, sensor_fit)
         size, center = (plane.width, plane.height), plane.principal_point
@@ -116,10 +111,7 @@ class CameraValues:
     def distance_at_full_size(self, frame: Frame, sensor_fit: str) -> float:
         """The effective distance in the picture of `frame` at 100 %: zoom, and what the resolution keeps, included.
 
-        Raises
-        ------
-        InputError
-            if zoom is no number above 0.
+        Raises InputError if zoom is no number above 0.
         """
         if checks.number("zoom", self.zoom) <= 0:
             raise InputError(f"zoom is {self.zoom:g}: give a factor above 0")
@@ -181,10 +173,7 @@ class CameraValues:
     def rolled(self, angle: float, up_axis: Triple, held: float) -> "CameraValues":
         """This view with the roll that `roll_from` says: another up, or where it is held another held roll.
 
-        Raises
-        ------
-        InputError
-            as `view` does.
+        Raises InputError as `view` does.
         """
         if self.pole == HOLD:
             return replace(self, held_roll=self.held_roll + angle - self.roll_from(up_axis, held))
@@ -232,10 +221,7 @@ class CameraValues:
     def roll_from(self, up: Triple, held: float) -> float:
         """The roll of the picture from what another up gives: radians, from u towards v. held : the roll that is held.
 
-        Raises
-        ------
-        InputError
-            as `view` does.
+        Raises InputError as `view` does.
         """
         return rolls.angle_from(up, rolls.turned(self.view(), held))
 

@@ -107,7 +107,7 @@ def array(name: str, values: ArrayLike) -> NDArray[np.float64]:
             raise TypeError
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} is {quoted(values)}: give numbers, in lists of equal length") from None
-    with np.errstate(over="ignore"):  # of longer floats
+    with np.errstate(over="ignore"):  # longer floats overflow
         return np.asarray(values, dtype=np.float64)
 
 

@@ -104,10 +104,7 @@ class ProcessGroup:
 
     handle : an open handle of this process, which the child inherits under the same number.
 
-    Raises
-    ------
-    OSError
-        if the process can't be started, or the file not be written.
+    Raises OSError if the process can't be started, or the file not be written.
     """
 
     def __init__(self, command: Sequence[str], log: Path, variables: Mapping[str, str], handle: int | None = None) -> None:
@@ -189,10 +186,7 @@ class ServerProcess:
     log : a file for what it prints, nowhere by default.
     events : receives the events that it tells on the way; nothing does by default.
 
-    Raises
-    ------
-    InputError
-        if the process can't be started.
+    Raises InputError if the process can't be started.
     """
 
     def __init__(
@@ -225,16 +219,9 @@ class ServerProcess:
 
         ends : the time by which the answer must be there, of time.monotonic().
 
-        Raises
-        ------
-        InputError
-            with the sentence of the one that it met there.
-        OSError
-            as the system refused it something.
-        ProcessEnded
-            if it ended first, or gave no heartbeat for a minute. Ask no more then.
-        AnswerTimeout
-            if it did not answer in time. It is ended then.
+        Raises InputError with the sentence of the one that it met there. Raises OSError as the system refused it something.
+        Raises ProcessEnded if it ended first, or gave no heartbeat for a minute. Ask no more then. Raises AnswerTimeout if it
+        did not answer in time. It is ended then.
         """
         try:
             self._ours.send_bytes(json.dumps(request).encode())

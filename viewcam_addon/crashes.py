@@ -12,7 +12,7 @@ import signal
 import sys
 
 COMMANDS = ("export", "cycles", "check", "demo", "batch", "audit")
-"""The commands that open a .blend in their own process. Of a batch, another one may do so, whose crashes render_client.py
+"""The commands that open a .blend in their own process. Of a batch, another one may do so, whose crashes served_renderer.py
 tells."""
 
 passed_on: dict[int, int] = {}

@@ -135,7 +135,7 @@ def _listening(stream: int) -> Iterator[TextIO]:
     try:
         yield copy
     finally:
-        with contextlib.suppress(OSError):  # what could not be written is tried once more
+        with contextlib.suppress(OSError):  # events that could not be written are tried once more
             copy.close()
 
 

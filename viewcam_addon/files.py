@@ -41,11 +41,8 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     The temporary path keeps the suffix of `path`, since some writers choose the format by it. Whatever is raised inside the
     block removes the temporary file and leaves an older file at `path` as it was.
 
-    Raises
-    ------
-    InputError
-        if the folder can't be written, or if `path` is a folder, a disk, a socket or a pipe that nobody reads; FullDiskError if
-        the disk is full.
+    Raises InputError if the folder can't be written, or if `path` is a folder, a disk, a socket or a pipe that nobody reads;
+    FullDiskError if the disk is full.
     """
     path = Path(path)
     with _in_a_sentence(path), contextlib.ExitStack() as ends:
@@ -73,10 +70,7 @@ def temporary_folder() -> Iterator[Path]:
     Its process holds a lock on it, which ends with the process, however that ends. So the first one that a process makes also
     removes those that killed processes of this user and machine have left. On Windows, which has no such locks, they stay.
 
-    Raises
-    ------
-    OSError
-        if it can't be made.
+    Raises OSError if it can't be made.
     """
     _remove_abandoned()
     with tempfile.TemporaryDirectory(prefix=_prefix(), ignore_cleanup_errors=True) as name, contextlib.ExitStack() as ends:
@@ -92,13 +86,7 @@ def _prefix() -> str:
 
 @contextlib.contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """A context in which this process holds the folder's lock.
-
-    Raises
-    ------
-    OSError
-        if another does, or there are no locks.
-    """
+    """A context in which this process holds the folder's lock. Raises OSError if another does, or there are no locks."""
     if sys.platform == "win32":
         raise OSError(errno.ENOSYS, "folders have no locks")
     import fcntl
@@ -131,10 +119,7 @@ def written_together(folder: Path, name: str) -> Iterator[Path]:
 
     name : the beginning of the temporary folder's name, which is hidden beside them: .NAME-1a2b3c4d.labels.
 
-    Raises
-    ------
-    InputError
-        if it can't be made there; FullDiskError if the disk is full.
+    Raises InputError if it can't be made there; FullDiskError if the disk is full.
     """
     temporary = folder / f".{name}-{secrets.token_hex(4)}.labels"
     with _in_a_sentence(folder):
@@ -153,11 +138,8 @@ def folder_written_whole(folder: Path, may_replace: Callable[[Path], bool] = lam
 
     may_replace : a function: true if a folder that is there, and not empty, may go.
 
-    Raises
-    ------
-    InputError
-        if something stands there that is no empty folder and may not go, or it can't be written; FullDiskError if the disk is
-        full.
+    Raises InputError if something stands there that is no empty folder and may not go, or it can't be written; FullDiskError if
+    the disk is full.
     """
     folder = folder.absolute()
     with _in_a_sentence(folder):
@@ -186,10 +168,7 @@ def folder_written_whole(folder: Path, may_replace: Callable[[Path], bool] = lam
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
     """The content of a file.
 
-    Raises
-    ------
-    OSError
-        if it can't be read, or is no regular file: a pipe keeps its reader waiting for ever, a device may never end.
+    Raises OSError if it can't be read, or is no regular file: a pipe keeps its reader waiting for ever, a device may never end.
     """
     kind = stat.S_IFMT(os.stat(path).st_mode)
     if kind not in (stat.S_IFREG, stat.S_IFDIR):  # a folder's own error says more
@@ -207,7 +186,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         file = _replaceable(path)
         if file:
             folder = next((folder for folder in file.absolute().parents if os.path.lexists(folder)), None)
-            if folder is None:  # of Windows alone
+            if folder is None:  # Windows alone
                 raise InputError(
                     f"{path} is on the drive or share {file.absolute().anchor}, which is not there: choose another"
                 )
@@ -223,10 +202,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 def is_replaced(path: str | os.PathLike[str]) -> bool:
     """True if `written_whole` makes or replaces a regular file there, beside which others may stand.
 
-    Raises
-    ------
-    InputError
-        if nothing can be written there, as far as that is known.
+    Raises InputError if nothing can be written there, as far as that is known.
     """
     path = Path(path)
     with _in_a_sentence(path):

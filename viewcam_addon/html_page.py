@@ -32,10 +32,7 @@ def filled(template: str, **values: Any) -> "Markup":
     template : its path below the package, with slashes.
     values : a value for each name in it; filters and tests are Jinja2's.
 
-    Raises
-    ------
-    InputError
-        if there is no Jinja2.
+    Raises InputError if there is no Jinja2.
     """
     if sentence := lacking():
         raise InputError(sentence)

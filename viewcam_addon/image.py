@@ -137,13 +137,7 @@ class Image:
         return width, height
 
     def __getitem__(self, name: str) -> NDArray[np.float32]:
-        """A pass by its name.
-
-        Raises
-        ------
-        InputError
-            if the picture does not have it.
-        """
+        """A pass by its name. Raises InputError if the picture does not have it."""
         if name not in self.passes:
             raise InputError(
                 f"{self.source} has no pass {name!r} but {', '.join(self.passes) or 'none'}: render it with that pass"
@@ -156,11 +150,8 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
 
     only : names of the passes to keep, all by default.
 
-    Raises
-    ------
-    InputError
-        if there is no such file, if it is no EXR or a damaged one, if it holds no known pass, or, by its header, a part of a
-        picture only, another size than its camera's, or more than there is memory for.
+    Raises InputError if there is no such file, if it is no EXR or a damaged one, if it holds no known pass, or, by its header,
+    a part of a picture only, another size than its camera's, or more than there is memory for.
     """
     pixels, camera, attributes = _pixels(Path(path))
     passes = {name: _stacked(channels) for name, channels in _passes(pixels).items() if only is None or name in only}
@@ -175,10 +166,7 @@ def read_channels(path: str | os.PathLike[str], named: Mapping[str, Sequence[str
 
     named : pass → its channels, each by its whole name or by how that ends, `Depth.Z` for `ViewLayer.Depth.Z`.
 
-    Raises
-    ------
-    InputError
-        as `read` does, and if there is no such channel, or more than one.
+    Raises InputError as `read` does, and if there is no such channel, or more than one.
     """
     pixels, camera, attributes = _pixels(Path(path))
 
@@ -254,10 +242,8 @@ class FrameSize:
 def check_same_frames(paths: Sequence[str | os.PathLike[str]]) -> None:
     """Refuse files that can't be pictures of one camera, before any pixel of them is read.
 
-    Raises
-    ------
-    InputError
-        as `read` does of a header, or if they differ in their size, or in the shape of their pixels where both state one.
+    Raises InputError as `read` does of a header, or if they differ in their size, or in the shape of their pixels where both
+    state one.
     """
     first, *others = (Path(path) for path in paths)
     expected = _frame(_headers(first), first)
@@ -324,10 +310,7 @@ def write(path: str | os.PathLike[str], image: Image, is_bent: bool = False) -> 
     is_bent : true if a lens bends the picture: then it has no worldToNDC and no camera of its own, which would be the
         pinhole's, but worldToCamera alone.
 
-    Raises
-    ------
-    InputError
-        if the folder can't be written or the disk is full.
+    Raises InputError if the folder can't be written or the disk is full.
     """
     channels = {
         f"{_LAYER}.{name}.{letter}": np.ascontiguousarray(array[::-1, :, i])

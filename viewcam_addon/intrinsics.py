@@ -35,10 +35,8 @@ _FLOAT32_STEP = 2.0**-23
 class CameraData:
     """A perspective camera's data as Blender stores it. Lengths in millimeters, shift in units of the fitted side.
 
-    Raises
-    ------
-    InputError
-        if a length is not positive, if the fit is unknown, or if a number is beyond float32, which is what Blender stores.
+    Raises InputError if a length is not positive, if the fit is unknown, or if a number is beyond float32, which is what
+    Blender stores.
     """
 
     lens: float
@@ -67,10 +65,8 @@ class Frame:
     border : (left, bottom, right, top) as fractions of the picture, or None for the whole.
     crop : true to keep only the border.
 
-    Raises
-    ------
-    InputError
-        if a number is not whole and ≥ 1, an aspect not positive or beyond float32, or a border not between 0 and 1 or reversed.
+    Raises InputError if a number is not whole and ≥ 1, an aspect not positive or beyond float32, or a border not between 0 and
+    1 or reversed.
     """
 
     resolution_x: int
@@ -124,10 +120,7 @@ def _set(instance: object, name: str, value: object) -> None:
 def view_plane(camera: CameraData, frame: Frame) -> ViewPlane:
     """The view plane of a Blender camera in the picture of `frame` (its window, if it crops to a border).
 
-    Raises
-    ------
-    InputError
-        if the window holds no pixel.
+    Raises InputError if the window holds no pixel.
     """
     width, height = frame.size
     column, row, window_width, window_height = frame.window
@@ -150,11 +143,8 @@ def camera_data(plane: ViewPlane, frame: Frame, sensor_width: float, sensor_heig
 
     A lens below Blender's 1 mm is never clamped: lens and sensor are doubled together until it fits.
 
-    Raises
-    ------
-    InputError
-        if the view plane has another size than the picture, if its two distances ask for another pixel aspect, or if the lens,
-        the sensor or the shift would be beyond float32.
+    Raises InputError if the view plane has another size than the picture, if its two distances ask for another pixel aspect, or
+    if the lens, the sensor or the shift would be beyond float32.
     """
     sensor = CameraData(SHORTEST_LENS, sensor_width, sensor_height, sensor_fit)
     column, row, *window_size = frame.window
@@ -218,10 +208,8 @@ def lens_in(unit: str, distance: float, frame: Frame, sensor: tuple[float, float
 def distance_by_lens(unit: str, value: float, frame: Frame, sensor: tuple[float, float], sensor_fit: str) -> float:
     """The distance that a lens is: the way back from `lens_in`.
 
-    Raises
-    ------
-    InputError
-        if there is none: an angle that is not between 0 and 180°, or a length that gives no distance that a camera can have.
+    Raises InputError if there is none: an angle that is not between 0 and 180°, or a length that gives no distance that a
+    camera can have.
     """
     if unit not in _LENGTHS:
         tangent = math.tan(value / 2) if 0 < value < math.pi else 0.0

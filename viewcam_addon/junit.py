@@ -49,10 +49,7 @@ def write(path: Path, words: str, status: int, result: Mapping[str, Any], second
     result : the object that --json writes, with `sentence` or `error`.
     seconds : the seconds that it took.
 
-    Raises
-    ------
-    InputError
-        if it can't be written.
+    Raises InputError if it can't be written.
     """
     if shots := result.get("shots"):
         cases = [

@@ -29,10 +29,7 @@ def check(what: str, size: int, remedy: str) -> None:
     what : begins a sentence and has a plural's verb ("the arrays of scene.npz").
     remedy : ends it.
 
-    Raises
-    ------
-    InputError
-        with both numbers.
+    Raises InputError with both numbers.
     """
     if size > (limit := most()):
         raise InputError(f"{what} need {size / 2**30:,.3g} GiB of memory and there are {limit / 2**30:,.3g} GiB: {remedy}")

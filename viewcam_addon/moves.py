@@ -42,10 +42,7 @@ def dollied(pinhole: Pinhole, reach: float) -> Pinhole:
 
     The view direction is kept but for the rounding of the new eye, 2⁻⁵³ of its largest coordinate, seen from `reach`.
 
-    Raises
-    ------
-    InputError
-        if `reach` is no such number, or so small that the eye's rounding swallows it.
+    Raises InputError if `reach` is no such number, or so small that the eye's rounding swallows it.
     """
     reach = checks.number("distance to the look-at point", reach)
     if reach <= 0:
@@ -70,10 +67,7 @@ def orbited(pinhole: Pinhole, around: float, upwards: float) -> Pinhole:
     Both at 0 give the very same pinhole. The way back is (−around, −upwards), and (around, −upwards) once up has turned into
     its opposite, since `around` is counted about up as it stands.
 
-    Raises
-    ------
-    InputError
-        if an angle is not finite.
+    Raises InputError if an angle is not finite.
     """
     around, upwards = checks.number("orbit's angle around", around), checks.number("orbit's angle upwards", upwards)
     if around == upwards == 0:
@@ -93,11 +87,8 @@ def framed_by_eye(pinhole: Pinhole, points: ArrayLike, margin: float = 0.0) -> P
 
     The look-at point stays as long as it lies before the eye, else it moves along the view to the middle of the points' depths.
 
-    Raises
-    ------
-    InputError
-        if there is no such place (the nearest of the points on the view axis, or a principal point outside the margins), if the
-        points are no finite numbers, or the margin no such share.
+    Raises InputError if there is no such place (the nearest of the points on the view axis, or a principal point outside the
+    margins), if the points are no finite numbers, or the margin no such share.
     """
     across, depth = _seen_from_eye(pinhole, points)
     nearest, farthest = np.zeros(len(depth)), np.full(len(depth), np.inf)  # depths that are allowed for each point
@@ -126,11 +117,8 @@ def framed_by_eye(pinhole: Pinhole, points: ArrayLike, margin: float = 0.0) -> P
 def framed_by_distance(pinhole: Pinhole, points: ArrayLike, margin: float = 0.0) -> Pinhole:
     """The largest view-plane distance d with which all points are in the picture; the eye stays. Parameters as `framed_by_eye`.
 
-    Raises
-    ------
-    InputError
-        if there is none (points that do not lie before the eye, nothing but points on the view axis, or a principal point
-        outside the margins), if the points are no finite numbers, or the margin no such share.
+    Raises InputError if there is none (points that do not lie before the eye, nothing but points on the view axis, or a
+    principal point outside the margins), if the points are no finite numbers, or the margin no such share.
     """
     across, depth = _seen_from_eye(pinhole, points)
     if depth.min() <= 0:

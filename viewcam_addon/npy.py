@@ -19,15 +19,12 @@ _HEADERS = {(1, 0): _format.read_array_header_1_0, (2, 0): _format.read_array_he
 def header(file: IO[bytes]) -> tuple[np.dtype, int]:
     """The type of an array and its size in bytes, as its header has them; the file then stands behind it.
 
-    Raises
-    ------
-    ValueError
-        if it is none.
+    Raises ValueError if it is none.
     """
     try:
         version = _format.read_magic(file)
         shape, _, dtype = _HEADERS[version](file)
-    except Exception as error:  # of the tokenizer and the parser of Python, of no common class
+    except Exception as error:  # Python's tokenizer and parser have no common class
         raise ValueError("no header") from error
     if any(type(length) is not int or length < 0 for length in shape):
         raise ValueError("no shape")
@@ -35,13 +32,7 @@ def header(file: IO[bytes]) -> tuple[np.dtype, int]:
 
 
 def read(data: bytes) -> NDArray:
-    """The array of real numbers that a .npy file holds.
-
-    Raises
-    ------
-    ValueError
-        if it holds none, or not all of it.
-    """
+    """The array of real numbers that a .npy file holds. Raises ValueError if it holds none, or not all of it."""
     file = io.BytesIO(data)
     dtype, size = header(file)
     if dtype.kind not in "iuf" or file.tell() + size != len(data):
@@ -49,7 +40,7 @@ def read(data: bytes) -> NDArray:
     file.seek(0)
     try:
         array: NDArray = _format.read_array(file, allow_pickle=False)
-    except (OSError, OverflowError, TypeError) as error:  # of 33 axes, or of one that no machine counts to
+    except (OSError, OverflowError, TypeError) as error:  # 33 axes, or one that no machine counts to
         raise ValueError("no array") from error
     return array
 

@@ -36,10 +36,10 @@ from .pinhole import Pinhole, Triple, check_distance
 Array = NDArray[np.float64]
 
 _STEPS = 60
-_CONVERGED = 1e-11  # of the parameters: what is left of them after one step more is their rounding
+_CONVERGED = 1e-11  # share of the parameters: one step more would change them by their rounding
 _SHORTEST, _LONGEST = 0.02, 200.0  # d of a start, of half the picture's larger side
-_LARGEST_ERROR = math.log(2.0)  # of d, as a factor: what is less certain than that is no answer
-_LARGEST_SHIFT = 0.5  # of the principal point's error, of half the picture's larger side: what is less certain is no answer
+_LARGEST_ERROR = math.log(2.0)  # d's, as a factor: a less certain one is no answer
+_LARGEST_SHIFT = 0.5  # the principal point's, in halves of the picture's larger side: a less certain one is no answer
 _OPEN = 1e-13  # an eigenvalue of 7 by 7 numbers near 1 that is less than this is rounding
 # The share of the coordinates' spread within which a point is in a plane.
 _FLAT = 1e-6
@@ -124,11 +124,8 @@ def from_edges(
     is_principal_point_free : true to find the principal point as well, which takes edges along all three axes; else that of
         `like` is kept.
 
-    Raises
-    ------
-    InputError
-        if edges are missing or contradict one another, or leave the lens or a free principal point open, or if no camera sees
-        the known one so.
+    Raises InputError if edges are missing or contradict one another, or leave the lens or a free principal point open, or if no
+    camera sees the known one so.
     """
     precision = checks.number("precision", precision, least=1e-9)
     named = [axis for axis, *_ in edges]
@@ -189,20 +186,18 @@ def from_points(
     precision : the standard deviation of pixels.
     distance : d in pixels where the lens is known.
 
-    Raises
-    ------
-    InputError
-        if there are too few points, if they lie on a line or in a plane seen head-on, or if no camera sees them so.
+    Raises InputError if there are too few points, if they lie on a line or in a plane seen head-on, or if no camera sees them
+    so.
     """
     precision = checks.number("precision", precision, least=1e-9)
     points, pixels = checks.array("points", points), checks.array("pixels", pixels)
     if points.ndim != 2 or points.shape[1:] != (3,) or pixels.shape != (len(points), 2):
         raise InputError(f"{len(points)} points and {len(pixels)} pixels do not belong together: give as many of both")
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    is_flat = len(points) < 4 or spread[2] <= _FLAT * spread[0]
+    singular_values = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    is_flat = len(points) < 4 or singular_values[2] <= _FLAT * singular_values[0]
     if len(points) < (4 if is_flat else 6):
         raise InputError(f"{len(points)} points are too few: give four in one plane, or six in space")
-    if spread[1] <= _FLAT * spread[0]:
+    if singular_values[1] <= _FLAT * singular_values[0]:
         raise InputError("the points lie on one line: give some beside it")
     middle = np.array(like.principal_point)
     solution = solve_points(points, pixels - middle, _half(like), is_flat, _known_distance(distance))
@@ -227,10 +222,7 @@ def from_rectangle(
     axes : the two that the sides run along, as "XY" on the floor or "XZ" on a wall.
     distance : d in pixels where the lens is known.
 
-    Raises
-    ------
-    InputError
-        as from_points does, and if a side has no length.
+    Raises InputError as from_points does, and if a side has no length.
     """
     if len(axes) != 2 or any(axis not in _AXES for axis in axes) or axes[0] == axes[1]:
         raise InputError(f"a rectangle's sides run along {axes!r}: name two axes, such as XY")
@@ -448,18 +440,18 @@ def _refined(
     """
     unknowns = 4 + others.shape[-1]
     scale = np.broadcast_to(scale, distance.shape)
-    asked = [parameter for parameter in range(unknowns) if parameter != 3 or not is_lens_known]
+    free = [parameter for parameter in range(unknowns) if parameter != 3 or not is_lens_known]
     damping = np.full(distance.shape, 1e-4)
     residual, jacobian = measured(rotation, others, distance)
     cost = (residual**2).sum(axis=-1)
     for _ in range(_STEPS):
-        slopes = jacobian[..., asked]
+        slopes = jacobian[..., free]
         normal = np.swapaxes(slopes, -1, -2) @ slopes
         gradient = np.einsum("...mp,...m->...p", slopes, residual)
         diagonal = np.einsum("...pp->...p", normal)
-        damped = normal + (damping[..., None] * diagonal + 1e-300)[..., None] * np.eye(len(asked))
+        damped = normal + (damping[..., None] * diagonal + 1e-300)[..., None] * np.eye(len(free))
         step = np.zeros((*distance.shape, unknowns))
-        step[..., asked] = -_solved(damped, gradient)
+        step[..., free] = -_solved(damped, gradient)
         step[..., 3] = np.clip(step[..., 3], -1.0, 1.0)
         tried_rotation = _turned(rotation, step[..., :3])
         tried_distance = distance * np.exp(step[..., 3])
@@ -478,15 +470,15 @@ def _refined(
         damping = np.where(better, np.maximum(damping / 10.0, 1e-15), np.minimum(damping * 10.0, 1e12))
         if (np.abs(step).max(axis=-1) < _CONVERGED).all():
             break
-    slopes = jacobian[..., asked]
+    slopes = jacobian[..., free]
     normal = np.swapaxes(slopes, -1, -2) @ slopes
     size = np.sqrt(np.maximum(np.einsum("...pp->...p", normal), 1e-300))
     both = size[..., :, None] * size[..., None, :]
     values, vectors = np.linalg.eigh(normal / both)
     # Where a step changes nothing (lens and distance of a plane seen head-on) all is open.
     variances = np.where(values[..., :1] > _OPEN, 1.0 / np.maximum(values, _OPEN), 1e300)
-    covariance = np.zeros((*distance.shape, unknowns, unknowns))  # of a known lens
-    covariance[..., np.array(asked)[:, None], asked] = np.einsum("...pk,...k,...qk->...pq", vectors, variances, vectors) / both
+    covariance = np.zeros((*distance.shape, unknowns, unknowns))  # a known lens has none
+    covariance[..., np.array(free)[:, None], free] = np.einsum("...pk,...k,...qk->...pq", vectors, variances, vectors) / both
     units = np.concatenate([np.ones((*distance.shape, 4)), np.repeat(scale[..., None], unknowns - 4, axis=-1)], axis=-1)
     covariance = covariance * units[..., :, None] * units[..., None, :]
     return _nearest_rotation(rotation), others, distance, residual, covariance

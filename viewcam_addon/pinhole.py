@@ -31,7 +31,7 @@ from .errors import InputError
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
-Pair = tuple[exact.Vector, exact.Vector]  # of vectors: high + low, unevaluated
+Pair = tuple[exact.Vector, exact.Vector]  # vectors as high + low, unevaluated
 
 # Numbers between these two can be squared, or multiplied by an axis, without care.
 _SMALLEST_SAFE, _LARGEST_SAFE = 2.0**-500, 2.0**500
@@ -52,10 +52,7 @@ class ViewPlane:
     principal_point : (c_x, c_y) in pixels from the left and the bottom edge, the picture's center if it is None.
     width, height : pixels of the picture.
 
-    Raises
-    ------
-    InputError
-        if a distance is not positive, a size not whole and ≥ 1, or a number not finite.
+    Raises InputError if a distance is not positive, a size not whole and ≥ 1, or a number not finite.
     """
 
     distance: tuple[float, float]
@@ -63,7 +60,7 @@ class ViewPlane:
     width: int
     height: int
 
-    if TYPE_CHECKING:  # what may be given is more than what is kept
+    if TYPE_CHECKING:  # more types may be given than are kept
 
         def __init__(
             self, distance: float | Sequence[float], principal_point: Sequence[float] | None, width: int, height: int
@@ -85,8 +82,6 @@ class ViewPlane:
 class Pinhole:
     """A pinhole camera, immutable and validated.
 
-    Parameters
-    ----------
     eye, look_at : three floats, world space.
     up : three floats, world space, of any length but zero; need not be perpendicular to the view.
     distance : view-plane distance d in pixels, > 0; one float, or a pair (d_x, d_y) in pixel widths and pixel heights.
@@ -95,10 +90,8 @@ class Pinhole:
         picture's center if it is None.
     mirrored : true if u points left in the picture.
 
-    Raises
-    ------
-    InputError
-        if eye = look_at, up = 0, distance ≤ 0, a size is no whole number from 1 to 2³¹ − 1, or anything is no finite number.
+    Raises InputError if eye = look_at, up = 0, distance ≤ 0, a size is no whole number from 1 to 2³¹ − 1, or anything is no
+    finite number.
     """
 
     eye: Triple
@@ -110,7 +103,7 @@ class Pinhole:
     principal_point: tuple[float, float] = None  # type: ignore[assignment]
     mirrored: bool = False
 
-    if TYPE_CHECKING:  # what may be given is more than what is kept
+    if TYPE_CHECKING:  # more types may be given than are kept
 
         def __init__(
             self,
@@ -151,10 +144,7 @@ class Pinhole:
         eye, look_at, up : (n, 3) float64, world space.
         planes : the view plane of each.
 
-        Raises
-        ------
-        InputError
-            as the constructor does; it names the first such pose.
+        Raises InputError as the constructor does; it names the first such pose.
         """
         vectors = {"eye": eye, "look_at": look_at, "up": up}
         points = checks.broadcast(**{name: checks.array(name, values) for name, values in vectors.items()})
@@ -356,10 +346,7 @@ def basis(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike) -> tuple[Array, Arr
 
     Returns three (..., 3) float64 arrays of unit vectors, each component within 4e-16 of exact arithmetic on the same inputs.
 
-    Raises
-    ------
-    InputError
-        where eye = look_at, up = 0 or something is no finite number; it names the first such pose.
+    Raises InputError where eye = look_at, up = 0 or something is no finite number; it names the first such pose.
     """
     vectors = {"eye": eye, "look_at": look_at, "up": up}
     e, l, up = checks.broadcast(**{name: checks.array(name, values) for name, values in vectors.items()})
@@ -372,7 +359,7 @@ def basis(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike) -> tuple[Array, Arr
     leading, (e, l, up) = e.shape[:-1], (vector.reshape(-1, 3) for vector in (e, l, up))
     _check_poses(e, l, up)
     axes, safe = np.empty((3, *e.shape)), np.empty(len(e), bool)
-    with np.errstate(all="ignore"):  # what leaves float64's range here is done again, one by one, below
+    with np.errstate(all="ignore"):  # values that leave float64's range here are done again, one by one, below
         for batch in (slice(first, first + _AT_ONCE) for first in range(0, len(e), _AT_ONCE)):
             poses = (vector[batch].T.copy() for vector in (e, l, up))
             axes[:, batch].swapaxes(1, 2)[:], safe[batch] = _basis_of_many(*poses)
@@ -389,10 +376,7 @@ def canonical_axes(up: Triple, looking_down: bool) -> tuple[Triple, Triple, Trip
     w = (0, −1, 0). For any other up they are the text's, carried by the smallest rotation that takes (0, 1, 0) to up (for an up
     in the lower half-space, after half a turn about the x axis). In Blender, up = (0, 0, 1), that is (x, y, z) → (x, −z, y).
 
-    Raises
-    ------
-    InputError
-        if up = 0 or is not finite.
+    Raises InputError if up = 0 or is not finite.
     """
     up = checks.vector("up", up, 3)
     _check_up(up)
@@ -461,7 +445,7 @@ def _orthonormal(apart: Pair, across: Pair) -> tuple[exact.Vector, exact.Vector,
     upward = exact.cross_of_perpendicular(*apart, *across)
     if isinstance(upward, tuple):
         return _normalized(across[0]), _normalized(upward), _normalized(apart[0])
-    axes = np.array([across[0], upward, apart[0]]).swapaxes(0, 1)  # of all three axes at once
+    axes = np.array([across[0], upward, apart[0]]).swapaxes(0, 1)  # all three axes at once
     return tuple((axes / exact.length(axes)).swapaxes(0, 1))
 
 

@@ -47,10 +47,7 @@ def encoded(pixels: NDArray[np.uint8] | NDArray[np.uint16], palette: bytes | Non
 def decoded(content: bytes) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """(height, width, channels) of a PNG of grays or colors in 8 or 16 bits, as Blender and `encoded` write them.
 
-    Raises
-    ------
-    ValueError
-        if it is damaged or another PNG: one with a palette, with fewer bits, or in seven passes (Adam7).
+    Raises ValueError if it is damaged or another PNG: one with a palette, with fewer bits, or in seven passes (Adam7).
     """
     chunks = [(kind, chunk[8:-4]) for kind, chunk in _chunks(content)]
     if not content.startswith(_SIGNATURE) or not chunks or len(chunks[0][1]) != 13:

@@ -30,10 +30,7 @@ Array = NDArray[np.float64]
 def turned(pinhole: Pinhole, angle: float) -> Pinhole:
     """A pinhole with its picture turned by `angle` radians, from u towards v; at 0 with the very same up.
 
-    Raises
-    ------
-    InputError
-        if the angle is not finite.
+    Raises InputError if the angle is not finite.
     """
     if not math.isfinite(angle):
         raise InputError(f"roll is {angle}: give a finite angle")
@@ -48,10 +45,7 @@ def angle_from(up: Triple, pinhole: Pinhole) -> float:
 
     up : three floats, world space, of any length but zero. Where the view is parallel to it, its canonical axes count.
 
-    Raises
-    ------
-    InputError
-        if that up is 0 or no finite vector.
+    Raises InputError if that up is 0 or no finite vector.
     """
     u, _, _ = pinhole.axes()
     level_u, level_v, _ = replace(pinhole, up=up).axes()
@@ -64,10 +58,7 @@ def rolled(pinhole: Pinhole, up: Triple, angle: float) -> Pinhole:
 
     At 0 its up is that very one, unless the view is parallel to it: then v, which gives the same picture for certain.
 
-    Raises
-    ------
-    InputError
-        if that up is 0 or no finite vector, or if the angle is not finite.
+    Raises InputError if that up is 0 or no finite vector, or if the angle is not finite.
     """
     level = replace(pinhole, up=up)
     return turned(replace(level, up=level.axes()[1]) if level.is_singular else level, angle)
@@ -83,10 +74,7 @@ def steps(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike, within: float) -> t
     not only its ends, but the whole arc of view directions between them, as up sees it. A step to the opposite direction has no
     smallest rotation and is half a turn about u.
 
-    Raises
-    ------
-    InputError
-        as pinhole.basis does.
+    Raises InputError as pinhole.basis does.
     """
     u, v, w = basis(eye, look_at, up)
     pole = _normalized(np.broadcast_to(np.asarray(up, dtype=np.float64), w.shape))

@@ -55,17 +55,11 @@ def read(name: str, path: Path | None, text: str, size: str, values: str) -> dic
     size : the attribute of a camera that has the pixels of its picture.
     values : the key of its customData that is wanted.
 
-    Returns
-    -------
-    dict
-        y_up; meters_per_unit; documentation of the root layer; values (of all prims, texts); left_out (what is not read, as it
-        stands in the file); cameras: each a name and an error, or samples: each with the time, seconds (None if there is one
-        alone), size, matrix (16, for row vectors) and the attributes of the lens by their names.
+    It has y_up; meters_per_unit; documentation of the root layer; values (of all prims, texts); left_out (what is not read, as
+    it stands in the file); cameras: each a name and an error, or samples: each with the time, seconds (None if there is one
+    alone), size, matrix (16, for row vectors) and the attributes of the lens by their names.
 
-    Raises
-    ------
-    InputError
-        if OpenUSD is not here, can't open it, or needs more than the bounds.
+    Raises InputError if OpenUSD is not here, can't open it, or needs more than the bounds.
     """
     if importlib.util.find_spec("pxr") is None:
         raise InputError(
@@ -99,7 +93,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any] | None:
         from pxr import Sdf
 
         if "start" in request:
-            Sdf.Layer.CreateAnonymous(".usda").ImportFromString("#usda 1.0\n")  # what OpenUSD loads when it is first used
+            Sdf.Layer.CreateAnonymous(".usda").ImportFromString("#usda 1.0\n")  # loaded by OpenUSD when it is first used
             return None
         _bound(request["seconds"], request["memory"])
         return _read(request)
@@ -199,11 +193,11 @@ class _Layers:
 
         folder : the layer's folder; None if it is a text.
         """
-        for named in filter(None, layer.GetCompositionAssetDependencies()):  # what has no name is the layer itself
+        for named in filter(None, layer.GetCompositionAssetDependencies()):  # without a name: the layer itself
             place = self._allowed(named, folder)
             inner = None
             if place:
-                with contextlib.suppress(Exception):  # what is no layer is left out, too
+                with contextlib.suppress(Exception):  # no layer: left out, too
                     inner = self._opened(place)
             if inner is None:
                 self.left_out.append(named)

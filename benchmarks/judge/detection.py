@@ -168,7 +168,7 @@ class Block:
             if fault.of_picture:
                 for passes in lit:
                     passes.update(Combined=passes["Combined"].copy())
-                    fault.of_picture(passes, self._random(number, i))  # the same place in all of them
+                    fault.of_picture(passes, self._random(number, i))  # one place in all of them
             judged.append(self._judgments(of_geometry, lit, i, by_all=i == 0))
         return judged
 

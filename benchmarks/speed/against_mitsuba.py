@@ -25,7 +25,7 @@ STILL = Still(
     {0.003: (1.2, 1.5), 0.001: (1.2, 1.5)},
     {OURS: 1024, LLVM: 2048},
 )
-_SQUARES = (4.0, 9.0, 25.0, 49.0, 121.0, 289.0)  # of primes, as the orthogonal sampler wants them
+_SQUARES = (4.0, 9.0, 25.0, 49.0, 121.0, 289.0)  # squares of primes, as the orthogonal sampler wants them
 _POWERS = (4.0, 16.0, 64.0, 256.0)
 METHODS = (
     *OUR_METHODS,

@@ -75,7 +75,7 @@ def prepare(
     def picture(sampling: str, parameter: float, seed: int, file: Path) -> float:
         cycles.override_settings(overrides, scene, view_layer, light(sampling, parameter, seed))
         _adaptive(scene, sampling, parameter)(overrides)
-        scene.update_tag()  # what is kept would else keep the samples as well
+        scene.update_tag()  # or the samples would be kept as well
         view_layer.update()
         seconds = race.timed(lambda: render_still(scene))()
         bpy.data.images["Render Result"].save_render(str(file), scene=scene)

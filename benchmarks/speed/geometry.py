@@ -26,7 +26,7 @@ from .stills import CYCLES, OURS, prepare_cycles, start_contestant
 
 _WANTED = {PICTURE: 12.0, WHOLE: 6.0}
 _LEAST_SHARE = {"geometry": 0.6, "direct": 0.8}
-_SAMPLES = 16  # of the picture whose rays are counted at `direct`
+_SAMPLES = 16  # a pixel, where rays are counted at `direct`
 _ONCE = (1.0,)
 METHODS = (
     Method(OURS, OURS, "samples", _ONCE, ours=True),

@@ -98,10 +98,7 @@ def fresh(folder: Path, variant: str, threads: int) -> race.Runner:
 def write(scene: Scene, folder: Path) -> None:
     """Mitsuba's files of a scene, for mitsuba_job.load.
 
-    Raises
-    ------
-    InputError
-        if the scene has anything that is not translated here.
+    Raises InputError if the scene has anything that is not translated here.
     """
     import mitsuba
 

@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 TIE = 0.0
 _NONE = " What lies on the lower edge is 0."
 _AWAY = np.array([0.48, 0.36, 0.8])  # where things stand, seen from the eye: askew to all axes
-_THIN = 1e-10  # of the distance: thickness of the slab where scales are swept
+_THIN = 1e-10  # thickness of the slab where scales are swept, as a share of the distance
 # Cosine of the flattest rays.
 FLATTEST = 1e-3
 _CAMERA = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 1, 1, 1)

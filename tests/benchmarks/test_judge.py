@@ -86,7 +86,7 @@ def _searched(bench, fault, seed):
         for i in range(8):
             passes = tracer.render_light("path", samples // 8, 10**6 + seed + 8 * number + i)
             if fault and fault.of_picture:
-                fault.of_picture(passes, np.random.default_rng(seed))  # the same place in all of them
+                fault.of_picture(passes, np.random.default_rng(seed))  # one place in all of them
             tests.append(rivals.without_the_tracers_own(Image(passes, attributes={"samples": str(samples // 8)})))
         rounds.add(samples, reference, tests, None)
         pictures = rounds.reference, rounds.tests, bench.camera, rounds.samples // 8

@@ -1,4 +1,4 @@
-"""Fixtures of the tests that need Blender: an empty file with one camera in it; both sides of a comparison."""
+"""Fixtures of the tests that need Blender: an empty file with one camera in it; both sides of a comparison; the tracer."""
 
 import dataclasses
 import math
@@ -13,6 +13,7 @@ import pytest
 import viewcam_addon
 from viewcam_addon.comparison import geometry, tolerances
 from viewcam_addon.image import Image
+from viewcam_addon.jobs.tracing import Tracing
 from viewcam_addon.tracer import render
 from viewcam_addon.tracer.scene import Scene
 
@@ -376,3 +377,20 @@ def empty(scene):
         return block
 
     return add
+
+
+@pytest.fixture(scope="module")
+def tracing():
+    with Tracing() as tracing:
+        yield tracing
+
+
+@pytest.fixture
+def one_process(tracing, monkeypatch):
+    """Renderers ask the module's process, and never start one of their own."""
+    from viewcam_addon.blender.jobs import renderer
+
+    class Kept(Tracing):
+        ask = staticmethod(tracing.ask)
+
+    monkeypatch.setattr(renderer, "Tracing", Kept)

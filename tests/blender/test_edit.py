@@ -21,7 +21,7 @@ BY_BLENDER = {
     "_on_update",
     "on_frame_change",
     "_edit_of",
-}  # what Blender calls as it evaluates, and as a property is stored
+}  # called by Blender as it evaluates, and as a property is stored
 MOST = 28
 
 

@@ -17,7 +17,7 @@ from viewcam_addon.pinhole import Pinhole
 pytestmark = pytest.mark.slow
 
 
-TURN = findings.LARGEST_TURN  # what float32 storage makes of a rotation
+TURN = findings.LARGEST_TURN  # float32's rounding of a rotation
 UP = (0.0, 0.0, 1.0)
 
 
@@ -227,7 +227,7 @@ def test_undo_and_redo_bring_roll_and_camera_together(held_camera, over_the_top)
     assert after[0] != before[0]
     bpy.ops.ed.undo()
     assert state() == before
-    bpy.data.objects["Camera"].virtual_pinhole.eye = over_the_top(5, 3)  # the same step from the same pose
+    bpy.data.objects["Camera"].virtual_pinhole.eye = over_the_top(5, 3)  # one step, from one pose
     assert state() == after
     bpy.ops.ed.undo_push(message="again")
     bpy.ops.ed.undo()

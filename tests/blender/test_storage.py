@@ -311,7 +311,7 @@ def test_storing_moves_nothing(posed_camera):
 
 def test_what_is_restored_is_as_it_was_whatever_was_stored(posed_camera):
     group = posed_camera.virtual_pinhole
-    group.counted_in, group.exact = (1.5, -3, 0, 1e-30, 7), "nonsense"  # what is no picture and no number, either
+    group.counted_in, group.exact = (1.5, -3, 0, 1e-30, 7), "nonsense"  # no picture and no number, either
     with storage.restored(posed_camera, "keeps", "counted_in", "exact"):
         group.keeps, group.counted_in, group.exact = "FIELD_OF_VIEW", (1, 2, 3, 4, 5), "[]"
     assert (group.keeps, group.exact) == ("PIXELS", "nonsense")

@@ -532,7 +532,7 @@ def test_a_lens_that_moves_less_than_a_pixel_is_no_wrong_focal_length_where_the_
         views, middle = a_right_dataset(random)
         straight = points_in_pictures(random, views, middle, 0.0)
         in_plane = (straight.places - views.center[straight.which]) / views.focal[straight.which]
-        of_k1 = in_plane * (in_plane**2).sum(axis=1, keepdims=True) * views.focal[straight.which]  # what 1 of it moves them
+        of_k1 = in_plane * (in_plane**2).sum(axis=1, keepdims=True) * views.focal[straight.which]  # the shift by a k1 of 1
         k1 = -0.8 / np.percentile(np.hypot(*of_k1.T), 95)
         places = straight.places + k1 * of_k1 + 0.05 * random.normal(size=of_k1.shape)
         verdict = _audited(views, Tracks(straight.which, places, straight.points))

@@ -31,7 +31,7 @@ def opencv():
 RANDOM = np.random.default_rng(31)
 POINTS = RANDOM.uniform(-0.5, 0.5, (1000, 2))  # a field of view of 53°, twice the corners of most lenses
 OPENCV = [0.1, -0.05, 0.01, -0.02, 0.03, 0.05, 0.01, 0.02, 0.01, -0.02, 0.03, 0.01, 0.1, -0.2]
-ROUNDING = 64 * 2.0**-53  # of a polynomial of twenty terms, each below 1
+ROUNDING = 64 * 2.0**-53  # a polynomial's, of twenty terms, each below 1
 THEIR_INVERSE = 1e-9  # calibrated: where pycolmap's and OpenCV's own iterations end
 
 # Extra coefficients of each model of COLMAP, and how wide a view it is asked about, in half widths of POINTS.

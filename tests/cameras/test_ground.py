@@ -12,7 +12,7 @@ from viewcam_addon.cli import main
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 
-HEIGHT = 1.6  # of the cameras above the ground
+HEIGHT = 1.6  # the cameras', above the ground
 
 
 def room(random, noise=0.0):

@@ -651,6 +651,43 @@ def test_an_intrinsic_of_open3d_alone_has_its_columns_first():
     assert camera.pinhole.eye == (0, 0, 0) and camera.pinhole.basis()[1] == pytest.approx((0, -1, 0))
 
 
+def test_a_bare_list_of_frames_is_read_once_its_distance_and_size_are_said():
+    plane = Pinhole((0, 0, 0), (0, 1, 0), (0, 0, 1), 500, 640, 480).plane
+    pose = [[1.0, 0.0, 0.0, 2.0], [0.0, 1.0, 0.0, 3.0], [0.0, 0.0, 1.0, 4.0]]
+    exported = json.dumps([{"file_path": "a.png", "transform": pose}, {"file_path": "b.png", "transform": pose}])
+    matrices = exported.replace('"transform"', '"transform_matrix"')
+    for text in (exported, matrices):
+        first, _ = cameras.read(text, options=Options(size=(640, 480), view_plane=plane))
+        assert first.pinhole.eye == (2, 3, 4) and first.pinhole.distance == (500, 500) and first.image == "a.png"
+        with pytest.raises(InputError, match="--distance"):
+            cameras.read(text, options=VGA)
+
+
+OPEN3D_VIEW = {
+    "boundingbox_max": [1, 2, 3],
+    "boundingbox_min": [-1, -2, 1],
+    "field_of_view": 60.0,
+    "front": [0, -3, 4],  # any length
+    "lookat": [10, 20, 30],
+    "up": [0, 0, 1],
+    "zoom": 0.5,
+}
+
+
+def test_half_the_height_of_a_view_of_open3d_is_zoom_times_the_longest_side_of_its_box():
+    text = json.dumps({"class_name": "ViewTrajectory", "interval": 29, "trajectory": [OPEN3D_VIEW], "version_major": 1})
+    (camera,) = cameras.read(text, options=VGA)
+    pinhole, away = camera.pinhole, 0.5 * 4 / math.tan(math.radians(30))
+    assert pinhole.look_at == (10, 20, 30)
+    assert pinhole.eye == pytest.approx((10, 20 - 0.6 * away, 30 + 0.8 * away))
+    column, row, _ = pinhole.project([np.array(pinhole.look_at) + 0.5 * 4 * pinhole.basis()[1]])
+    assert (column[0], row[0]) == pytest.approx((320, 480))
+    with pytest.raises(InputError, match="--size"):
+        cameras.read(text)
+    with pytest.raises(InputError, match="orthographic, no pinhole: widen its field_of_view"):
+        cameras.read(text.replace("60.0", "5.0"), options=VGA)
+
+
 @pytest.mark.parametrize("data", [b"Kaydara FBX Binary  \0\x1a\0", b"; FBX 7.4.0 project file\n", b"Ogawa\xff\0\1"])
 def test_what_blenders_own_importers_read_is_sent_there(tmp_path, data):
     (tmp_path / "camera").write_bytes(data)

@@ -142,7 +142,7 @@ def test_earth_studios_published_frames_look_where_they_were_made_to(coordinate,
     read = cameras.read(json.dumps(earth_studio((10, 20, 30), coordinate, turn)))
     u, v, w = read[0].pinhole.axes()
     error = np.abs(np.column_stack([u, np.negative(v), np.negative(w)]) - heading_pitch(*angles)).max()
-    assert error < digits, f"{error}"  # what was published of heading and pitch has two decimals, of the first all
+    assert error < digits, f"{error}"  # published are two decimals of heading and pitch, and all digits of the first
     assert [camera.time for camera in read] == [0, 1 / 30, 2 / 30]
     assert read[0].pinhole.distance[1] == pytest.approx(540 / math.tan(math.radians(10)), rel=1e-14)
 
@@ -157,7 +157,7 @@ def test_earth_studios_origin_is_the_tracks_or_the_point_below_the_first_camera(
     (camera, *_) = cameras.read(json.dumps(earth_studio(local)))
     assert camera.pinhole.eye == pytest.approx((3, 4, 5), abs=1e-12)
     (camera, *_) = cameras.read(json.dumps(earth_studio((6_371_010 + altitude) * up)))
-    assert camera.pinhole.eye == pytest.approx((0, 0, altitude), abs=1e-8)  # of float64 of the Earth's radius, 1e-9
+    assert camera.pinhole.eye == pytest.approx((0, 0, altitude), abs=1e-8)  # float64 of the Earth's radius, 1e-9
     (camera, *_) = cameras.read(json.dumps(earth_studio(local)), options=Options(original_world=True))
     assert camera.pinhole.eye == pytest.approx(tuple(local), abs=1e-12)
     axes = rotation().from_euler("XYZ", PUBLISHED_FRAMES[1][2], degrees=True).as_matrix()

@@ -121,7 +121,7 @@ def test_fspys_principal_point_of_a_portrait_counts_in_halves_of_its_height():
 
 
 def metashape(known, lens="", label="left.jpg"):
-    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])  # of the chunk, with a scale of 2.5 and a move
+    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])  # the chunk's, with a scale of 2.5 and a move
     moved = np.array([1.0, 2.0, 3.0])
     local = np.eye(4)
     local[:3, :3] = turn.T @ known.opencv.T
@@ -505,7 +505,7 @@ def nerfstudio_path(*known, fov=None):
 @pytest.mark.parametrize("name", CENTERED)
 def test_nerfstudios_path_has_the_degrees_of_the_height(name):
     known = Known(name)
-    wide = 1 + known.f_y / known.height  # of a telephoto's angle less is kept
+    wide = 1 + known.f_y / known.height  # a telephoto's angle keeps fewer digits
     read = the_same(cameras.read(json.dumps(nerfstudio_path(known))), known, wide * 2.0**-50)
     assert any("world that nerfstudio trains in" in note for note in read.notes)
 
@@ -550,7 +550,7 @@ def instant_ngp(known, scale=0.33, offset=0.5):
 def test_instant_ngps_path_is_taken_out_of_its_unit_cube(tmp_path, name):
     known = Known(name)
     options = Options(size=(known.width, known.height))
-    unit = (1 + known.f_y / known.height) * 2.0**-48  # of a telephoto's angle less is kept
+    unit = (1 + known.f_y / known.height) * 2.0**-48  # a telephoto's angle keeps fewer digits
     read = the_same(cameras.read(json.dumps({"path": [instant_ngp(known)], "time": 0.0}), options=options), known, unit)
     assert any("unit cube" in note for note in read.notes)
     offset = np.array([0.1, 0.2, -0.3])
@@ -596,7 +596,7 @@ def test_kubrics_sensor_is_as_wide_as_the_picture_also_of_a_portrait(name):
     assert (read.name, read.image, read.time) == ("00000", "rgba_00000.png", 0)
 
 
-KUBRIC_PUBLISHED = {  # of examples/lts, whose R and image_positions say it twice more
+KUBRIC_PUBLISHED = {  # from examples/lts, whose R and image_positions say it twice more
     "camera": {
         "field_of_view": 0.6911111611634243,
         "focal_length": 50.0,
@@ -979,13 +979,13 @@ def test_realitycaptures_table_turns_a_camera_that_looks_down(name, head):
 def test_realitycaptures_table_and_its_xmp_of_one_photograph_are_one_rotation():
     """Both as the program wrote them: "Different rotation of cameras in XMP and CSV", forum of RealityCapture."""
     table = f"{RC_HEADS[0]}\na.jpg,1,2,3,163.736597399311,83.4154313461628,174.386496244756,30{',0' * 8}\n"
-    xmp = (  # of the last number there were three digits
+    xmp = (  # three digits of the last number were published
         '<x xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#" xcr:FocalLength35mm="30"><xcr:Rotation>0.982594073038806 '
         "0.185426733553445 -0.0112166890261935 -0.032113633044729 0.11008102707942 -0.993403685341366 -0.18296885582437 "
         "0.976472781986697 0.114</xcr:Rotation><xcr:Position>1 2 3</xcr:Position></x>"
     )
     (of_table,), (of_xmp,) = (cameras.read(text, options=Options(size=(640, 480))) for text in (table, xmp))
-    assert np.abs(np.array(of_table.pinhole.axes()) - of_xmp.pinhole.axes()).max() < 2e-4  # of those three digits
+    assert np.abs(np.array(of_table.pinhole.axes()) - of_xmp.pinhole.axes()).max() < 2e-4  # three digits
     row = [0.982594073038806, 0.185426733553445, -0.0112166890261935]
     assert np.abs(np.array(of_table.pinhole.axes())[0] - row).max() < 3 * np.radians(5e-13) + 1e-15  # the digits of both
 
@@ -1029,7 +1029,7 @@ def test_degrees_of_longitude_in_realitycaptures_table_are_refused():
 
 def visualsfm(known, kind="NVM_V3", term=0.0):
     x, y, z, w = known.quaternion()
-    pose = [w, -x, -y, -z, *known.e]  # of the way back
+    pose = [w, -x, -y, -z, *known.e]  # the way back
     if kind == "NVM_V3_R9T":
         pose = [*known.opencv.ravel(), *(-known.opencv @ known.e)]
     calibration = f"FixedK {known.f_x!r} {known.c_x!r} {known.f_y!r} {known.c_y!r}"
@@ -1149,7 +1149,7 @@ def test_neus_has_one_matrix_for_k_and_the_pose(tmp_path, name, scale):
 
 def test_neus_matrices_are_those_that_opencv_takes_apart(tmp_path):
     cv2 = pytest.importorskip("cv2")
-    world = np.array(  # of DTU's scan 114, as its data set has it: float32
+    world = np.array(  # DTU's scan 114, as its data set has it: float32
         [
             [-646.67957, -2440.9016, 1633.1099, -517707.4],
             [677.9055, 1317.4757, 2549.6375, -1194084.2],

@@ -21,7 +21,7 @@ from .conftest import CAMERAS, numbers_alone, points_before
 
 pytestmark = pytest.mark.usefixtures("openusd_in_this_process")
 
-FEW = settings().max_examples // 4  # of the profile's, since there are dozens of formats
+FEW = settings().max_examples // 4  # a fourth of the profile's, since there are dozens of formats
 SETTINGS = settings(max_examples=FEW, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 FLOAT64, FLOAT32 = 2.0**-53, 2.0**-24
 

@@ -862,7 +862,7 @@ def seen_by_vtk(text, points):
     u = np.cross(up, w)
     u /= np.linalg.norm(u)
     v = np.cross(w, u)
-    half = math.tan(math.radians(parsed["ViewAngle"][0]) / 2)  # of the height, at the distance 1
+    half = math.tan(math.radians(parsed["ViewAngle"][0]) / 2)  # half the height, at the distance 1
     (center_x, center_y), across = parsed["WindowCenter"], half * width / height
     left, right = (center_x - 1) * across, (center_x + 1) * across
     bottom, top = (center_y - 1) * half, (center_y + 1) * half

@@ -14,7 +14,7 @@ from viewcam_addon.commands.demo import SCENE as DEMO_SCENE
 
 ROOT = Path(__file__).parents[2]
 CORNELL = DEMO_SCENE.with_name("cornell.blend")
-CAMERA = "Virtual Pinhole"  # what the sample scenes call theirs
+CAMERA = "Virtual Pinhole"  # the sample scenes' name for theirs
 SMALL = ("--size", "16x16", "--samples", "1")
 
 HEADER = "name,eye_x,eye_y,eye_z,look_at,up,d,camera,width,height,frame,engine,samples,level"

@@ -205,7 +205,7 @@ json.dump([answers[0], entered, upward], sys.stdout)
 
 def test_the_walk_of_a_check_enters_each_station_once_and_never_calls_upward(monkeypatch):
     """The walk is that of CONTRIBUTING: commands, Blender, jobs, tracer, comparison."""
-    from viewcam_addon.jobs.render_client import BLENDER
+    from viewcam_addon.jobs.served_renderer import BLENDER
     from viewcam_addon.jobs.tracing import Tracing
 
     monkeypatch.delenv(BLENDER, raising=False)

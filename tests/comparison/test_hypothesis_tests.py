@@ -208,7 +208,7 @@ def test_a_pixels_own_noise_is_not_in_its_weight():
     """Else what is noise alone would look softer than its reference: by a standard error for each of √960 pixels, near 30."""
     rng = np.random.default_rng(10)
     result = [run(sides_of(gray, rng, 256, 32, 8), 256, 8)[3].errors[0, 0, 0] for _ in range(100)]
-    assert abs(np.mean(result)) < 0.4 and 0.5 < np.std(result) < 1.2  # of 100 draws the mean is off by 0.1, times four
+    assert abs(np.mean(result)) < 0.4 and 0.5 < np.std(result) < 1.2  # the mean of 100 draws is off by 0.1, times four
     sides = sides_of(gray, rng, 256, 32, 8)
     assert run(replace(sides, shared=sides.variance), 256, 8)[3].is_open, "neighbors that share noise have no such weights"
 

@@ -29,7 +29,7 @@ def read_transforms(text):
         matrix = np.array(values["transform_matrix"])
         assert matrix.shape == (4, 4) and matrix[3].tolist() == [0, 0, 0, 1]
         assert isinstance(values["w"], int) and isinstance(values["h"], int)
-        for side, axis in (("w", "x"), ("h", "y")):  # what readers without fl_x make of the angle
+        for side, axis in (("w", "x"), ("h", "y")):  # the angle, for readers without fl_x
             focal = values[side] / 2 / np.tan(values[f"camera_angle_{axis}"] / 2)
             assert abs(focal / values[f"fl_{axis}"] - 1) < 1e-9, (
                 f"camera_angle_{axis} is for {focal}, not {values[f'fl_{axis}']}"

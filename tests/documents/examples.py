@@ -5,7 +5,7 @@ and `blender` are the ones under test, and the files that the pages speak of are
 example as a whole: programs are run, lists of shots and scenes rendered.
 
 A page is a test, for what stands further down in it needs what was done above. Pages of `blender`'s commands are followed in
-the real Blender (tests/real_blender/test_documents.py), all others with a wheel (test_examples.py): each page once.
+the real Blender (tests/real_blender/test_suite.py), all others with a wheel (test_examples.py): each page once.
 """
 
 import json

@@ -11,7 +11,7 @@ if __name__ == "__main__":
     blend, program = sys.argv[-2:]
     bpy.ops.wm.open_mainfile(filepath=os.path.abspath(blend))
     scene, status = bpy.context.scene, 0
-    scene.render.resolution_x, scene.render.resolution_y = 1920, 1080  # what the README's camera is for
+    scene.render.resolution_x, scene.render.resolution_y = 1920, 1080  # the README's camera is for this size
     try:
         runpy.run_path(program, {"scene": scene, "camera_object": scene.camera})
     except BaseException:

@@ -33,7 +33,7 @@ SMALL_SECONDS, SMALL_MEMORY = 5.0, 2**30
 """For a file of cameras, labels or a scene; of computing, and beyond what this process has to begin with."""
 
 LONGEST = 1500  # characters of a sentence, which may name files
-CORNERS = np.array([[x, y] for x in (-0.5, 0.0, 0.5) for y in (-0.3, 0.0, 0.3)])  # of a picture, in the plane at distance 1
+CORNERS = np.array([[x, y] for x in (-0.5, 0.0, 0.5) for y in (-0.3, 0.0, 0.3)])  # the picture's, in the plane at distance 1
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 14, "width": 16, "height": 12}
 IDENTITY = np.eye(4).tolist()

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 STAND_IN = """#!{python}
 import errno, hashlib, json, os, signal, sys, time
 sys.path[:0] = {path}
-from viewcam_addon.jobs import render_server
+from viewcam_addon.jobs import served_renderer
 from viewcam_addon.errors import InputError
 
 FOLDER = {folder}
@@ -75,7 +75,7 @@ class Renderer:
 
 words = sys.argv[sys.argv.index("--command") + 1 :]  # -b FILE --command viewcam batch …, or -b --command viewcam serve HANDLE
 if words[:2] == ["viewcam", "serve"]:
-    render_server.serve(words[2], Renderer)
+    served_renderer.serve(words[2], Renderer)
 else:
     from viewcam_addon import cli
     file = next(word for word in sys.argv if word.endswith(".blend"))

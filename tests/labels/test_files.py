@@ -198,7 +198,7 @@ def test_pycocotools_loads_it_and_finds_every_mask(pictures, tmp_path, kind):
     stated = [(each["area"], each["bbox"]) for each in dataset.loadAnns(dataset.getAnnIds())]
     assert [*zip(coco_masks.area(runs).tolist(), coco_masks.toBbox(runs).tolist(), strict=True)] == stated
     results = json.loads((tmp_path / "all.json").read_text())["annotations"]
-    kept = ("image_id", "category_id", "segmentation")  # of results that are masks: with a box it would be of boxes
+    kept = ("image_id", "category_id", "segmentation")  # a result with a box would be one of boxes, not of masks
     again = dataset.loadRes([{name: each[name] for name in kept} | {"score": 1.0} for each in results])
     assert [(each["area"], [*each["bbox"]]) for each in again.loadAnns(again.getAnnIds())] == stated
     hidden = [each for each in actual["c"].instances if each["name"] == "Ball"]

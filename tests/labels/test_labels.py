@@ -347,7 +347,7 @@ def test_a_ball_that_grows_carries_its_points_outwards(scene):
     )
     upper = np.abs(np.linalg.norm(local - BALL.centers[1], axis=1) - 0.4) < 1e-6
     expected = 0.2 * (local - BALL.centers[upper.astype(int)]) + [0.1, 0, 0]
-    np.testing.assert_allclose(motion, expected, atol=1e-6)  # of coordinates below 2 in float32
+    np.testing.assert_allclose(motion, expected, atol=1e-6)  # coordinates below 2 in float32
 
 
 @settings(max_examples=10)
@@ -369,7 +369,7 @@ def test_a_point_is_hidden_where_the_other_frame_shows_another_one(x, y, z):
     sure = np.abs(np.abs(nearer) - 1e-4) > 0.9e-4
     assert sure.mean() > 0.97
     wrong = sure & (hidden[inside] != (nearer > 1e-4))
-    assert wrong.mean() < 0.003, f"{wrong.sum()} of {len(wrong)} points"  # those within 1e-6 of an outline, but for a few none
+    assert wrong.mean() < 0.003, f"{wrong.sum()} of {len(wrong)} points"  # points within 1e-6 of an outline, but for a few none
 
 
 def test_what_is_not_in_the_other_frame_is_named_and_has_no_flow(scene):
@@ -442,7 +442,7 @@ def discrepancy():
     points = np.stack([(i + 0.5) * STEP, (i * coverage._STEP % coverage.SAMPLES + 0.5) * STEP])
     edges = np.append(np.append(0.0, (i + 0.5) * STEP), 1.0)
     table = np.histogram2d(*points, bins=[np.append(i * STEP, 1.0)] * 2)[0]
-    sums = np.pad(table.cumsum(0).cumsum(1), ((1, 0), (1, 0)))  # of the places below each pair of edges
+    sums = np.pad(table.cumsum(0).cumsum(1), ((1, 0), (1, 0)))  # over the places below each pair of edges
     worst = 0.0
     for a in range(len(i) + 1):
         for b in range(a, len(i) + 1):

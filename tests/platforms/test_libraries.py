@@ -1,7 +1,7 @@
 """The core's library of every platform, as its loader reads it: what it exports, what it asks of the system, how it computes.
 
 `make test-zips`; of this machine, `make test`. What runs nowhere here (macOS, Windows on arm64) is proven as far as that goes;
-test_arm64.py and test_windows.py run the others. Which processor each is for, and what it needs of the system, is asked of all
+test_emulated.py runs the others. Which processor each is for, and what it needs of the system, is asked of all
 libraries in the zips alike: test_zips.py.
 """
 

@@ -132,7 +132,7 @@ def import_fspy():
     (FOLDER / "cube.fspy").write_bytes(b"fspy" + struct.pack("<III", 1, len(document), len(image)) + document + image)
     push_undo("before fSpy")
     before = state()
-    call(bpy.ops.viewcam.import_cameras, filepath=str(FOLDER / "cube.fspy"))  # what a drop does
+    call(bpy.ops.viewcam.import_cameras, filepath=str(FOLDER / "cube.fspy"))  # as a drop does
     yield from settle()
     press("RET", *NOWHERE)  # the options as they are
     yield from until(lambda: len(bpy.data.cameras) == len(before["cameras"]) + 1, "the import")

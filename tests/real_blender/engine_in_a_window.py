@@ -28,7 +28,7 @@ PART, FILE, OUT = sys.argv[sys.argv.index("--") + 1 :]
 TRACED_FOR = 2.0  # seconds that a heavy render goes on before it is canceled
 TIMES_CANCELED = 6  # times
 KINDS = ("images", "objects", "scenes", "meshes", "materials", "texts", "cameras", "node_groups")
-TURNS = 20  # of the view
+TURNS = 20  # the view's
 PATIENCE = 600  # seconds for all of them, on a busy machine
 
 messages, ended = [], []

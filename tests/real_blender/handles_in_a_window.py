@@ -24,7 +24,7 @@ NAMES = ("eye", "look_at", "up")
 # float32, in which Blender keeps its view and the handle's place: a few roundings of lengths below 40.
 CLOSE = 8 * 40 * 2**-24
 SHARP = 0.01  # pixels: float32 costs Blender's view 0.002
-CORNER = (1.0, -1.0, 1.0)  # of the cube
+CORNER = (1.0, -1.0, 1.0)  # the cube's
 
 
 def room(name):

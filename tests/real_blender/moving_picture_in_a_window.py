@@ -17,7 +17,7 @@ import tour_step
 from hands import VIEWPORT, begin, call, find, move, on_screen, photograph, region, show_the_panel, start, window
 
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
-WIDTH = 1310  # of the viewport and its sidebar
+WIDTH = 1310  # the viewport's and its sidebar's
 
 _taken = []
 _mouse = [500, 250]

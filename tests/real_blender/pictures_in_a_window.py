@@ -39,7 +39,7 @@ from tour_step import room
 FOLDER, PHOTO, *PARTS = sys.argv[sys.argv.index("--") + 1 :]
 FOLDER, PHOTO = Path(FOLDER), Path(PHOTO)
 STUDIO = Path(__file__).resolve().parent.parent.parent / "sample_scenes" / "studio.blend"
-SAMPLES, PATIENCE = 8, 3000  # of light, and seconds until it is there
+SAMPLES, PATIENCE = 8, 3000  # light's, and seconds until it is there
 EDGE, LEGEND = 24, 70  # pixels around the pictures of a proof, and below them
 # (axis, start, end) of edges of the room, world space.
 EDGES = (

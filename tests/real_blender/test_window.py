@@ -39,7 +39,7 @@ def go_through(real_blender, name, *arguments, expected="", attempts=ATTEMPTS, *
         print(outcome.stdout + outcome.stderr)  # so that it is seen of each attempt which step has failed
     output = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0 and expected in output, output
-    assert "Traceback" not in output, output  # what fails in a panel, a drawing or a handle is only printed
+    assert "Traceback" not in output, output  # a failure in a panel, a drawing or a handle is only printed
     return output
 
 
@@ -63,7 +63,7 @@ def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_
         for name, eye in eyes.items()
     ]
     cameras.save(around, tmp_path / "sparse", "colmap")
-    for camera in around:  # what is not found would be told in a popup, which takes the keys
+    for camera in around:  # a missing one would be told in a popup, which takes the keys
         (tmp_path / "sparse" / camera.image).write_bytes(PNG)
     (tmp_path / "cameras_of_colmap.json").write_text(json.dumps(eyes))
     go_through(real_blender, "cameras", tmp_path, *PICTURES, expected="done: paste_pbrt")

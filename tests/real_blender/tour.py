@@ -270,7 +270,7 @@ class _Move(Step):
     """By hand a button of the panel, by script its operator with the same properties."""
 
     operator, properties = "", {}
-    button = None  # how the button's call begins, where the operator has several
+    button = None  # the beginning of its call, where the operator has several
 
     def by_hand(self):
         yield from unfold(f"viewcam.{self.operator}(")

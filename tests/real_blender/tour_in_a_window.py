@@ -42,7 +42,7 @@ BEFORE, AFTER = (Path(tempfile.gettempdir(), f"{name}.png") for name in ("before
 MOUSE_AWAY = (200, 700)
 BELOW_BUTTONS = 45  # pixels below the lowest button of a panel that a picture of it shows
 
-_bottoms = {}  # of the pictures of the panel, window coordinates, by whether the camera is in use
+_bottoms = {}  # bottoms of the panel's pictures, window coordinates, by whether the camera is in use
 
 
 def draw_finely():

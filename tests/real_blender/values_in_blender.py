@@ -11,7 +11,7 @@ import bpy
 
 EXTENSION = "bl_ext.user_default.virtual_pinhole"
 CAMERA = {"eye": (4.5, -3.25, 2.125), "look_at": (0.3, 0.1, -0.5), "up": (0.0, 0.5, 2.0), "distance": 15.25}
-EXACT = [4.5, -3.25, 2.125, 0.3, 0.1, -0.5, 0.0, 0.5, 2.0, 15.25]  # of which float32 can't hold all
+EXACT = [4.5, -3.25, 2.125, 0.3, 0.1, -0.5, 0.0, 0.5, 2.0, 15.25]  # float32 can't hold all of them
 
 
 def make(file, json_file):

@@ -13,11 +13,10 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import render as render_module
 from viewcam_addon.tracer.native import CoreScene
 from viewcam_addon.tracer.render import PASSES, Keeper, Tracer, render
-from viewcam_addon.tracer.scene import Mesh, Object, Scene
+from viewcam_addon.tracer.scene import Mesh, Object, Scene, same, same_things
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Point, Sun
 from viewcam_addon.tracer.scene.materials import Color, sum_of
-from viewcam_addon.tracer.scene.sameness import same, same_things
 
 SEEDS = st.integers(0, 2**32 - 1)
 FLOAT32 = 2.0**-24

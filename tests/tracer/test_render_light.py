@@ -20,7 +20,7 @@ from viewcam_addon.tracer.scene.shader_nodes import node
 
 PASSES = {*image.LIGHT_PASSES, "Depth", "Object Index"}
 FLOAT32 = 2.0**-24
-SEED = 3  # of a scene between whose things there is some of the world to see
+SEED = 3  # gives a scene between whose things there is some of the world to see
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,7 @@ def met(mesh, x, y):
 def test_depth_and_barycentric_coordinates_agree_with_rational_arithmetic(make_mesh, make_scene, seed, log_distance):
     rng = np.random.default_rng(seed)
     corners = rng.uniform(-1, 1, (3, 3)) - (0, 0, 2.0 * 10**log_distance)
-    uvs = np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]])  # what is shown of them are the second and third coordinates
+    uvs = np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]])  # shown are the second and third coordinates
     weights = rng.dirichlet((1, 1, 1))
     point = weights @ (corners * (1, 1, -1))
     x, y = point[:2] / point[2]

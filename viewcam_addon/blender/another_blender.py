@@ -17,10 +17,7 @@ from ..files import temporary_folder
 def run(statements: str, timeout: float) -> subprocess.CompletedProcess[bytes]:
     """Let it run these statements of Python; scripts of files that it opens are off. timeout : seconds.
 
-    Raises
-    ------
-    OSError, subprocess.TimeoutExpired
-        if it can't be started, or is not done in time.
+    Raises OSError or subprocess.TimeoutExpired if it can't be started, or is not done in time.
     """
     if bpy.app.binary_path:
         command = [bpy.app.binary_path, "--background", "--factory-startup", "--disable-autoexec"]

@@ -157,10 +157,7 @@ class CameraSync:
         names : the names of the values that count where Blender has moved the camera since its last update; the others follow
             it.
 
-        Raises
-        ------
-        InputError
-            as `stated` and `apply` do. Nothing has changed then.
+        Raises InputError as `stated` and `apply` do. Nothing has changed then.
         """
         camera_object = self.camera_object
         with self._being_set():
@@ -184,10 +181,7 @@ class CameraSync:
     def resized(self, scene: bpy.types.Scene) -> None:
         """Set the lens anew, which the values ask for in the picture as the scene renders it now; the pose stays as it is.
 
-        Raises
-        ------
-        InputError
-            as `edited` does. Nothing has changed then.
+        Raises InputError as `edited` does. Nothing has changed then.
         """
         frame = datablocks.frame_of(scene)
         distances = targets.values(self.camera_object).distances(frame, self.camera_object.data.sensor_fit)
@@ -236,7 +230,7 @@ class CameraSync:
         is_driven = bool(camera_object.animation_data) and datablocks.has_driven_values(camera_object)
         is_moved = False
         if self.is_untouched(by_values=is_driven):
-            self._is_moving = False  # what moves it next is another move
+            self._is_moving = False  # the next move is another
         else:
             with contextlib.suppress(InputError):  # the panel finds the same error and shows it
                 is_moved = self._adopt_move(scene, depsgraph)
@@ -399,10 +393,7 @@ class CameraSync:
 
         In a render's dependency graph nothing is stored but the camera itself, which is tagged with its animation (TIME).
 
-        Raises
-        ------
-        InputError
-            if the values make no camera, or the camera is no pinhole.
+        Raises InputError if the values make no camera, or the camera is no pinhole.
         """
         camera_object, is_render = self.camera_object, depsgraph.mode == "RENDER"
         names = datablocks.animated_values(camera_object)
@@ -489,10 +480,7 @@ class CameraSync:
 
         Returns whether there was anything to adopt.
 
-        Raises
-        ------
-        InputError
-            as `read` and `stated` do. Nothing has changed then.
+        Raises InputError as `read` and `stated` do. Nothing has changed then.
         """
         camera_object = self.camera_object
         frame, state = datablocks.frame_of(scene), conversion.state_of(camera_object)
@@ -606,11 +594,8 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
 
     Returns what a reader should know, one sentence each: why the camera is not where it was put, or will not stay.
 
-    Raises
-    ------
-    InputError
-        if the object is no perspective camera, if the pinhole has another size or pixel aspect than the scene renders, or if
-        a number is too large for Blender. Nothing has changed then.
+    Raises InputError if the object is no perspective camera, if the pinhole has another size or pixel aspect than the scene
+    renders, or if a number is too large for Blender. Nothing has changed then.
     """
     return [finding.sentence for finding in CameraSync.of(camera_object).apply(pinhole, scene)]
 
@@ -623,10 +608,7 @@ def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
     focus (that of the focus object, if it stands before the camera, or the focus distance, 10 m in a new camera). Up is the
     world's Z where this gives the same picture, else v.
 
-    Raises
-    ------
-    InputError
-        as `read` does.
+    Raises InputError as `read` does.
     """
     CameraSync.of(camera_object).adopt(scene)
 
@@ -649,10 +631,7 @@ def stated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole |
     The principal point is that of the camera's own shift, and mirroring that of its scale: the values do not speak of them.
     Where the roll is held, up is turned by it. The evaluated object of another depsgraph may be given as well.
 
-    Raises
-    ------
-    InputError
-        if the values make no camera: eye = look-at, up = 0, distance ≤ 0, a number that is not finite.
+    Raises InputError if the values make no camera: eye = look-at, up = 0, distance ≤ 0, a number that is not finite.
     """
     if not storage.is_enabled(camera_object):
         return None
@@ -725,10 +704,7 @@ def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use
 
     in_use : true to put the look-at point as far from the eye as the values say, if they say anything.
 
-    Raises
-    ------
-    InputError
-        as `read` does.
+    Raises InputError as `read` does.
     """
     pinhole = read(camera_object, scene)
     _, v, w = pinhole.basis()

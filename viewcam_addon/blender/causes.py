@@ -104,7 +104,7 @@ def _constraints(camera_object: bpy.types.Object) -> Iterator[Cause]:
     is_carried = pose.is_carried_by_constraints(camera_object)
     for constraint in pose.active_constraints(camera_object):
         name, camera = repr(constraint.name), repr(camera_object.name)
-        if is_carried:  # what is set now takes it into account
+        if is_carried:  # values set now take it into account
             remedy = "apply the values again, or animate them"
             yield Cause(f"The constraint {name} has carried {camera} along", POSE, remedy, mended_by=Button.APPLY_AGAIN)
         else:

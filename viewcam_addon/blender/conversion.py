@@ -47,11 +47,8 @@ def place(
     parts : the PARTS to set; the others stay as they are.
     parent : `parent_matrix`, where that is known.
 
-    Raises
-    ------
-    InputError
-        if the pinhole has another size or pixel aspect than the scene renders, if a number is too large for Blender, or if what
-        carries the camera is scaled to zero. Nothing has changed then.
+    Raises InputError if the pinhole has another size or pixel aspect than the scene renders, if a number is too large for
+    Blender, or if what carries the camera is scaled to zero. Nothing has changed then.
     """
     camera, frame = camera_object.data, datablocks.frame_of(scene)
     if parent is None:
@@ -90,10 +87,7 @@ def place_lens(camera_object: bpy.types.Object, distance: tuple[float, float], s
 
     distance : (d_x, d_y), pixels of the picture, its percentage included.
 
-    Raises
-    ------
-    InputError
-        as `place` does. Nothing has changed then.
+    Raises InputError as `place` does. Nothing has changed then.
     """
     camera, frame = camera_object.data, datablocks.frame_of(scene)
     plane = datablocks.view_plane(datablocks.camera_data_of(camera_object), frame)
@@ -133,10 +127,7 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
 
     The look-at point is any point on the view axis, up is v. The evaluated object of another depsgraph may be given as well.
 
-    Raises
-    ------
-    InputError
-        if the object is no perspective camera, or takes no part in the scene, is sheared or scaled to zero.
+    Raises InputError if the object is no perspective camera, or takes no part in the scene, is sheared or scaled to zero.
     """
     datablocks.check_perspective(camera_object)
     camera = evaluated(camera_object, scene)

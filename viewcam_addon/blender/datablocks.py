@@ -123,10 +123,7 @@ def frame_of(scene: bpy.types.Scene) -> intrinsics.Frame:
 def camera_data_of(camera_object: bpy.types.Object) -> intrinsics.CameraData:
     """The intrinsics of a camera as plain numbers; those of the evaluated object are what Cycles renders.
 
-    Raises
-    ------
-    InputError
-        if the object is no perspective camera, or if a script has stored what is no number of a camera.
+    Raises InputError if the object is no perspective camera, or if a script has stored what is no number of a camera.
     """
     if camera_object.type != "CAMERA" or camera_object.data.type != "PERSP":
         raise _no_perspective(camera_object)

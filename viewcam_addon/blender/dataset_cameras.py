@@ -31,10 +31,7 @@ def of_file(
     name : the name of the camera at these frames; None for the one that Blender would render there.
     trust : see `opened`.
 
-    Raises
-    ------
-    InputError
-        if there is none; as `opened` and `read` do.
+    Raises InputError if there is none; as `opened` and `read` do.
     """
     with opened(blend, trust) as (_, notes):
         scene = bpy.context.scene
@@ -59,10 +56,7 @@ def of_frames(
     shots : (name, frame) of each.
     camera_object : None for the one that Blender would render there.
 
-    Raises
-    ------
-    InputError
-        if there is none at one of the frames; as `read` does.
+    Raises InputError if there is none at one of the frames; as `read` does.
     """
     before, result = (scene.frame_current, scene.frame_subframe), []
     try:
@@ -83,10 +77,8 @@ def of_pictures(names: Iterable[str], blend: str | os.PathLike[str], trust: bool
     names : the pictures' names, without folder and suffix.
     trust : see `opened`.
 
-    Raises
-    ------
-    InputError
-        if there is none for any, or one that stands still for pictures of several frames; as `opened` and `read` do.
+    Raises InputError if there is none for any, or one that stands still for pictures of several frames; as `opened` and `read`
+    do.
     """
     names = list(dict.fromkeys(names))
     with opened(blend, trust) as (_, notes):

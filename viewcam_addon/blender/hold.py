@@ -38,10 +38,7 @@ def roll(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.types
 
     The evaluated object of any depsgraph may be given as well, with its values.
 
-    Raises
-    ------
-    InputError
-        if the values make no camera.
+    Raises InputError if the values make no camera.
     """
     if values.pole != HOLD:
         return 0.0

@@ -45,11 +45,8 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
 
     Gives a Overrides, and a sentence for each thing that is off and might be seen, or that Blender could not read.
 
-    Raises
-    ------
-    InputError
-        if there is no such file, if Blender can't read it at all, if a pipe or a device stands where it reads a file, or if it
-        is trusted and was opened without its scripts.
+    Raises InputError if there is no such file, if Blender can't read it at all, if a pipe or a device stands where it reads a
+    file, or if it is trusted and was opened without its scripts.
     """
     ensure_registered()
     with overridden() as overrides:

@@ -92,7 +92,7 @@ def _of_group(group: OwnPicture) -> dict[str, float]:
 
 def _copy(numbers: dict[str, float], group: OwnPicture) -> None:
     for name, value in numbers.items():
-        if getattr(group, name) != value:  # what is set is evaluated again
+        if getattr(group, name) != value:  # setting a value makes Blender evaluate again
             setattr(group, name, value)
 
 

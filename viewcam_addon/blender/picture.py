@@ -15,16 +15,13 @@ from .temporary_settings import Overrides
 
 _LARGEST, _LEAST = 65536, 4  # Blender's own limits
 _LARGEST_ASPECT = 200
-_SAME_ASPECT = 2.0**-20  # of a size that was rounded, or of float32
+_SAME_ASPECT = 2.0**-20  # relative: a size that was rounded, or float32
 
 
 def settings_of(pinhole: Pinhole) -> dict[str, Any]:
     """The render settings of the picture that a pinhole is for.
 
-    Raises
-    ------
-    InputError
-        if Blender has no pictures or pixels like that.
+    Raises InputError if Blender has no pictures or pixels like that.
     """
     size, aspect = (pinhole.width, pinhole.height), pinhole.distance[1] / pinhole.distance[0]
     if min(size) < _LEAST or max(size) > _LARGEST:

@@ -106,10 +106,7 @@ def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgrap
 
     It is that of the parent and of the constraints, as long as all of these carry the camera as a parent does.
 
-    Raises
-    ------
-    InputError
-        if it is singular, or can't be told, since the camera or what carries it is scaled to zero.
+    Raises InputError if it is singular, or can't be told, since the camera or what carries it is scaled to zero.
     """
     parent = camera_object.parent
     inverse = float64(camera_object.matrix_parent_inverse)

@@ -29,7 +29,7 @@ from . import datablocks, versions
 Raw = tuple[tuple[float, ...], str, tuple[float | None, ...]]
 _View = tuple[Triple, Triple, Triple]  # eye, look-at and up
 
-EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
+EXACT = frozenset({"eye", "look_at", "up", "distance"})  # `exact` has their digits
 _VECTORS = ("eye", "look_at", "up")
 # Values that are no property of their own, or not as they are; each other one is held by the property of its name.
 _NOT_PLAIN = EXACT | {"counted_in", "set_for", "view_when_set", "precision", "follows", "asked"}

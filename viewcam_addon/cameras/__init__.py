@@ -202,10 +202,7 @@ def read(content: str | Path, *, format: str | None = None, options: Options | N
     content : a text, or the Path of a file or folder.
     format : one of `readable()`; None to recognize it by its content.
 
-    Raises
-    ------
-    InputError
-        if there is no camera in it, or one that is no pinhole, lacks something, or is not what it should be.
+    Raises InputError if there is no camera in it, or one that is no pinhole, lacks something, or is not what it should be.
     """
     options = options or Options()
     source = Source(content)
@@ -299,13 +296,7 @@ _READ_BY_BLENDER = (b"Kaydara FBX Binary", b"; FBX ", b"Ogawa")
 
 
 def recognized(source: str | Path | Source) -> str:
-    """The name of the format.
-
-    Raises
-    ------
-    InputError
-        if it is none that can be read.
-    """
+    """The name of the format. Raises InputError if it is none that can be read."""
     source = source if isinstance(source, Source) else Source(source)
     if source.path is None and not source.text.strip():
         raise InputError("there is no text: copy a camera first")
@@ -331,10 +322,7 @@ def recognized(source: str | Path | Source) -> str:
 def write(cameras: Iterable[Camera], format: str, options: Options | None = None) -> str | dict[str, str | bytes]:
     """The cameras as a text, or as files: relative name → content.
 
-    Raises
-    ------
-    InputError
-        if there is none, or the format can't say what one of them is.
+    Raises InputError if there is none, or the format can't say what one of them is.
     """
     options = options or Options()
     cameras = [moved_back(camera, options) for camera in cameras]
@@ -350,11 +338,8 @@ def write(cameras: Iterable[Camera], format: str, options: Options | None = None
 def save(cameras: Iterable[Camera], path: str | os.PathLike[str], format: str, options: Options | None = None) -> list[Path]:
     """Write the cameras: a text to the file `path`, several files into the folder `path`. Returns what was written.
 
-    Raises
-    ------
-    InputError
-        as `write` does, or if a file can't be written or would be read with others of its folder; FullDiskError if the disk
-        is full.
+    Raises InputError as `write` does, or if a file can't be written or would be read with others of its folder; FullDiskError
+    if the disk is full.
     """
     content = write(cameras, format, options)
     check_no_other_model(path, format)

@@ -35,7 +35,7 @@ _SURE, _TIED = 14.0, 10.0
 _FEWEST = 40  # observations
 _LEFT_OUT = 2.0  # pixels: less may be anything's,
 _SEEN = 4.0  # but for a lens that moves pictures by so many times what is left over with it
-_ROUNDS = 10  # of weighing outliers
+_ROUNDS = 10  # times that outliers are weighed anew
 _LENS_FITS = 1.0  # pixels: a lens that was left out explains the evidence to this, or is none
 _FITTED_LENSES = (  # projection, terms and whether the focal length is fitted, too: the simpler ones first
     ("pinhole", 2, False),
@@ -44,11 +44,11 @@ _FITTED_LENSES = (  # projection, terms and whether the focal length is fitted, 
     ("pinhole", 5, True),
     ("equidistant", 5, True),
 )
-_BETTER = 0.95  # of a simpler lens's error: what a further term has to bring
+_BETTER = 0.95  # a further term's error must be below this share of the simpler lens's
 _FITTED_TO = 20_000  # observations, about: more tell no more of a few numbers
-_FACTORS, _STEPS, _FINEST = (1 / 8, 8.0), 25, 1e-5  # of depth maps: what is tried first, and how fine it is told
-_K1 = (-0.4, 0.4, 21, 1e-3)  # of depth maps: from where to where, how many are tried first, and how finely it is told
-_EXPLAINED = 1e-4  # of the depth: steps of millimeters at ten meters; what fits so needs no lens
+_FACTORS, _STEPS, _FINEST = (1 / 8, 8.0), 25, 1e-5  # depth maps' factors: tried first, and how fine they are told
+_K1 = (-0.4, 0.4, 21, 1e-3)  # depth maps' k1: from where to where, how many are tried first, and how finely it is told
+_EXPLAINED = 1e-4  # share of the depth: steps of millimeters at ten meters; a fit as good needs no lens
 _COUNTED = 2000  # at most: a systematic error repeats in each, so more of them add no certainty
 _FARTHEST = 1e6  # times the usual error: what is behind the camera counts as that
 _Y_TO_Z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -534,7 +534,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     known = (as_is, *(each for each, mistake in zip(errors, tried, strict=True) if not mistake.is_fitted))
     if isinstance(evidence, Depths):
         lenses = _lenses_of_depths(views, evidence) if min(_usual(each, evidence) for each in known) > _EXPLAINED else []
-    else:  # what a lens moves aside is seen in the largest errors but for outliers
+    else:  # a lens's shift is seen in the largest errors but for outliers
         nearest = min(float(np.sort(each)[int(0.95 * (len(each) - 1))]) for each in known)
         lenses = _lens_of_tracks(views, evidence) if nearest > _SEEN / 2 * evidence.floor else []
     tried += lenses
@@ -676,10 +676,10 @@ def _lens_of_tracks(views: Views, evidence: Tracks) -> list[Mistake]:
     there = there[:: max(1, len(there) // _FITTED_TO)]
     which = evidence.which[there]
     center, focal = (each[(which + views.shifted) % len(views.eye)] for each in (views.center, views.focal))
-    points, taken = (places[there] - center) / focal, (evidence.places[there] - center) / focal
+    points, measured = (places[there] - center) / focal, (evidence.places[there] - center) / focal
     best: tuple[Lens, float, float] | None = None
     for projection, terms, of_focal in _FITTED_LENSES:
-        fit = _fitted(points, taken, focal, projection, terms, of_focal, evidence.floor)
+        fit = _fitted(points, measured, focal, projection, terms, of_focal, evidence.floor)
         if fit is not None and (best is None or fit[2] < _BETTER * best[2]):
             best = fit
     if best is None:

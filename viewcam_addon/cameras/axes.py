@@ -37,7 +37,7 @@ _TURNS: dict[str, tuple[Callable[[Triple], Triple] | None, Callable[[Triple], Tr
     "y_up": (lambda p: (p[0], -p[2], p[1]), lambda p: (p[0], p[2], -p[1])),
     "y_down": (lambda p: (p[0], p[2], -p[1]), lambda p: (p[0], -p[2], p[1])),
 }
-_NO_MEAN = 1e-6  # of the length of a mean of unit vectors
+_NO_MEAN = 1e-6  # length of a mean of unit vectors, below which it has no direction
 # The errors that a rotation in a file may have, whose numbers have few digits: without a note, and as a rotation at all.
 _NOTED, _NO_ROTATION, _NO_QUATERNION = 1e-5, 2e-3, 1e-2
 _SCALED = 1e-3
@@ -59,10 +59,7 @@ def world_to_camera(pinhole: Pinhole) -> Rows:
     Its rows are u, −v and −w (u negated where the pinhole is mirrored), each with its part of the translation −R e, which is
     within 3 · 2⁻⁵³ |e| of exact arithmetic on these axes.
 
-    Raises
-    ------
-    InputError
-        if the translation is beyond float64.
+    Raises InputError if the translation is beyond float64.
     """
     u, v, w = _axes(pinhole)
     rotation = [u, tuple(-a for a in v), tuple(-a for a in w)]
@@ -96,10 +93,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
     The look-at point, which no matrix says, lies as far before the eye as the eye from the origin, at least 1: so its rounding
     does not turn the view by more than 2⁻⁵².
 
-    Raises
-    ------
-    InputError
-        if it is no rotation and translation: transposed, sheared, or scaled differently along its axes.
+    Raises InputError if it is no rotation and translation: transposed, sheared, or scaled differently along its axes.
     """
     matrix = checks.array(f"the matrix of {what}", matrix)
     if matrix.shape not in ((3, 4), (4, 4)):
@@ -161,10 +155,7 @@ def rotation(rows: Sequence[Sequence[float]], what: str, scaled: bool = False) -
 
     scaled : see `pinhole`.
 
-    Raises
-    ------
-    InputError
-        if the columns are not perpendicular or of different lengths.
+    Raises InputError if the columns are not perpendicular or of different lengths.
     """
     columns = [checks.vector(f"the rotation of {what}", column, 3) for column in zip(*rows, strict=True)]
     lengths = [math.hypot(*column) for column in columns]
@@ -210,10 +201,7 @@ def from_world_to_camera(turn: ArrayLike, translation: Sequence[float], what: st
 
     The eye is −R⁻¹ t: where R has few digits, that is what R and t project from.
 
-    Raises
-    ------
-    InputError
-        if R is no rotation, or t no three numbers.
+    Raises InputError if R is no rotation, or t no three numbers.
     """
     translation = checks.vector(f"the translation of {what}", translation, 3)
     turn = checks.array(f"the rotation of {what}", turn)
@@ -240,10 +228,7 @@ def from_worlds_to_cameras(turns: np.ndarray, translations: np.ndarray, whats: S
 def rotation_of(quaternion: Sequence[float], what: str) -> np.ndarray:
     """(3, 3) of a quaternion (w, x, y, z), Hamilton's, of length 1 but for its few digits.
 
-    Raises
-    ------
-    InputError
-        if it has another length: then these four numbers are something else, as angles and a field of view.
+    Raises InputError if it has another length: then these four numbers are something else, as angles and a field of view.
     """
     numbers = checks.vector(f"the quaternion of {what}", quaternion, 4)
     length = math.hypot(*numbers)
@@ -309,10 +294,7 @@ def moved_back(camera: Camera, options: Options) -> Camera:
 def leveled(cameras: Sequence[Camera]) -> list[Camera]:
     """The cameras in a world that is turned by the least angle after which the mean of their up, v, is z; each says so.
 
-    Raises
-    ------
-    InputError
-        if there is no such mean, as of cameras that stand upright and upside down.
+    Raises InputError if there is no such mean, as of cameras that stand upright and upside down.
     """
     up = np.mean([camera.pinhole.picture_axes()[1] for camera in cameras], axis=0)
     length = math.hypot(*up)
@@ -329,7 +311,7 @@ def turned_up(cameras: Sequence[Camera], up: Sequence[float], what: str, rise: f
     rise : the distance along z by which they move.
     """
     x, y, z = up
-    rows = np.diag([1.0, -1.0, -1.0])  # of the world that is upside down
+    rows = np.diag([1.0, -1.0, -1.0])  # for a world that is upside down
     if z > 0 or (x, y) != (0, 0):  # about up × z, by the angle between them: 1 + K + K² / (1 + cos)
         cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
         rows = np.identity(3) + cross + cross @ cross * (1 / (1 + z) if z > 0 else (1 - z) / (x * x + y * y))

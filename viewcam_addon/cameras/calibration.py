@@ -61,10 +61,7 @@ class Calibration:
     def cover(self) -> ViewPlane:
         """The view plane of a pinhole's picture with square pixels that has all that the calibrated camera shows.
 
-        Raises
-        ------
-        InputError
-            if the model folds within the picture or shows what no pinhole does, or if the picture were too large.
+        Raises InputError if the model folds within the picture or shows what no pinhole does, or if the picture were too large.
         """
         plane = self.plane
         top = plane.height - plane.principal_point[1]
@@ -136,10 +133,7 @@ class Rig:
     def of(self, *names: str | None) -> Calibration:
         """The calibration of the camera that has the first of the names that one has, or else that all cameras share.
 
-        Raises
-        ------
-        InputError
-            if no camera is called so and they share none, or if no pinhole's picture covers it.
+        Raises InputError if no camera is called so and they share none, or if no pinhole's picture covers it.
         """
         called = next((name for name in names if name in self.by_name), None)
         if called is None and len(self._firsts) > 1:
@@ -163,10 +157,7 @@ def of_cameras(read: Sequence[Camera], source: str, name: str | None = None) -> 
     source : the file, as a sentence names it.
     name : the name of the only one wanted.
 
-    Raises
-    ------
-    InputError
-        if no camera has a lens, or the named one has none.
+    Raises InputError if no camera has a lens, or the named one has none.
     """
     chosen = [*read] if name is None else [choose([*read], name)]
     bent = {camera.name: Calibration(camera.pinhole.plane, camera.lens) for camera in chosen if camera.lens is not None}

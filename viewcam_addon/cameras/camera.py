@@ -86,10 +86,7 @@ class Options:
         it is the picture's own.
     up_from : one of UPS, by what the world is turned upright, once axes and scale are applied; None to leave it so.
 
-    Raises
-    ------
-    InputError
-        if a value is not one of these.
+    Raises InputError if a value is not one of these.
     """
 
     axes: str = "as_is"
@@ -130,10 +127,7 @@ class Options:
 
         what : the thing that lacks a size, as a sentence names it.
 
-        Raises
-        ------
-        InputError
-            if none was given.
+        Raises InputError if none was given.
         """
         if self.size:
             return self.size
@@ -144,13 +138,7 @@ class Options:
         raise InputError(f"{what} does not say how many pixels its picture has: give the size, as in --size 1920x1080")
 
     def plane_or_refuse(self, what: str) -> ViewPlane:
-        """The intrinsics to take where a file says none.
-
-        Raises
-        ------
-        InputError
-            if none were given.
-        """
+        """The intrinsics to take where a file says none. Raises InputError if none were given."""
         if self.view_plane:
             return self.view_plane
         if self.base:
@@ -161,10 +149,7 @@ class Options:
 def choose(cameras: list[Camera], name: str | None = None) -> Camera:
     """The one camera, or the one of that name.
 
-    Raises
-    ------
-    InputError
-        if there are several and none is named, or none is called so; it has their names.
+    Raises InputError if there are several and none is named, or none is called so; it has their names.
     """
     names = ", ".join(checks.quoted(camera.name) for camera in cameras[:_NAMED]) + (" …" if len(cameras) > _NAMED else "")
     chosen = [camera for camera in cameras if name is None or camera.name == name]
@@ -213,10 +198,7 @@ class LeftOut:
     def with_notes(self, cameras: Sequence[Camera]) -> list[Camera]:
         """The cameras, which know and tell those that were left out.
 
-        Raises
-        ------
-        InputError
-            if all of the file's cameras were left out.
+        Raises InputError if all of the file's cameras were left out.
         """
         if not self._sentences:
             return [*cameras]

@@ -38,10 +38,7 @@ def of(source: Source) -> np.ndarray | None:
     source : its folder or file of cameras. Of a COLMAP model they are its points3D, of a transforms.json the `ply_file_path`
     that it names, else a PLY beside the cameras, called as these programs call theirs.
 
-    Raises
-    ------
-    InputError
-        if they are damaged.
+    Raises InputError if they are damaged.
     """
     if source.path is None:
         return None
@@ -59,13 +56,7 @@ def of(source: Source) -> np.ndarray | None:
 
 
 def of_colmap(path: Path) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """The number and place of each point of a points3D.txt or .bin.
-
-    Raises
-    ------
-    InputError
-        if it is damaged.
-    """
+    """The number and place of each point of a points3D.txt or .bin. Raises InputError if it is damaged."""
     return _of_binary(path) if path.suffix == ".bin" else _of_text(path)
 
 
@@ -93,13 +84,7 @@ def _of_binary(path: Path) -> Iterator[tuple[int, tuple[float, ...]]]:
 
 
 def of_ply(path: Path) -> np.ndarray:
-    """(n, 3) the places of a PLY's vertices, which stand first in it.
-
-    Raises
-    ------
-    InputError
-        if it is no PLY, or ends too early.
-    """
+    """(n, 3) the places of a PLY's vertices, which stand first in it. Raises InputError if it is no PLY, or ends too early."""
     data = read_bytes(path)
     head, end, body = data[:_LONGEST_HEAD].partition(b"end_header")
     lines = [line.split() for line in head.decode("ascii", errors="replace").splitlines()]

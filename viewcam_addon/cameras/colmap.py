@@ -77,7 +77,7 @@ _SAME_POSE = 1e-5  # relative: what two poses of one image may differ by for the
 TEXTS = ("images.txt", "cameras.txt", "points3D.txt")
 RIG_CONFIG = "rig_config.json"
 _MOMENT = re.compile(r"(?P<prefix>.*?)(?P<moment>[0-9]+[^0-9]*)", re.DOTALL)
-_ROUNDINGS = 16 * 2.0**-24  # of float32 in two of Blender's matrices and those of their parents, relative to the farthest eye
+_ROUNDINGS = 16 * 2.0**-24  # float32 in two of Blender's matrices and those of their parents, relative to the farthest eye
 """The files of a model that is written."""
 NOTES = "virtual_pinhole.txt"
 FORMS_OF_RIGS = tuple(f"{name}{suffix}" for name in _RIGS for suffix in (".txt", ".bin"))
@@ -424,10 +424,7 @@ def texts(cameras: Iterable[Camera], tracks: Tracks | None = None) -> dict[str, 
 
     tracks : the points of the cameras' pictures, in the cameras' order; without them there are none.
 
-    Raises
-    ------
-    InputError
-        if there is no camera, two have one picture, one is mirrored, or the name of a picture holds a space.
+    Raises InputError if there is no camera, two have one picture, one is mirrored, or the name of a picture holds a space.
     """
     cameras = naming.checked(cameras, "a COLMAP model")
     check_names(map(naming.image_of, cameras))
@@ -528,13 +525,7 @@ def comments(cameras: Iterable[Camera]) -> str:
 
 
 def intrinsics_of(pinhole: Pinhole, lens: distortion.Lens | None = None) -> _Intrinsics:
-    """The entry of cameras.txt about a camera.
-
-    Raises
-    ------
-    InputError
-        if its lens is none of COLMAP's.
-    """
+    """The entry of cameras.txt about a camera. Raises InputError if its lens is none of COLMAP's."""
     (f_x, _, c_x), (_, f_y, c_y), _ = intrinsics(pinhole)
     model, bent = ("PINHOLE", ()) if lens is None else _model_of(lens)
     return _Intrinsics(model, pinhole.width, pinhole.height, (f_x, f_y, c_x, c_y, *bent))

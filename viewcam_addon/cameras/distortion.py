@@ -23,10 +23,10 @@ from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
 
 _UNSEEN = 1e-3  # pixels: what this project calls the same camera
-_STEPS = 100  # of Newton's method, which takes five or so where there is an answer
+_STEPS = 100  # Newton's method takes five or so where there is an answer
 _SAME = 1e-13  # in the plane at distance 1: a step that is none any more
-_INVERSE = 1e-9  # what distorts to the place by more than this is not its point
-_STEP = 1e-6  # of the differences that make its Jacobian: they are right to 1e-10, and so is each step
+_INVERSE = 1e-9  # largest distance between a place and its distorted answer
+_STEP = 1e-6  # the differences that make its Jacobian are right to 1e-10, and so is each step
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from .source import Record, Source
 
 _DEPTH_KEYS = ("depth_file_path", "depth_path")
 _NO_POINT = 2**64 - 1
-_MOST_PIXELS = 2**25  # of a depth map: those of 8K
+_MOST_PIXELS = 2**25  # a depth map's, at 8K
 
 
 def tracks(path: Path, cameras: Sequence[Camera]) -> Tracks | None:
@@ -139,7 +139,7 @@ def _pixels(data: bytes, path: Path) -> np.ndarray:
     from PIL import Image
 
     try:
-        with warnings.catch_warnings():  # of a picture that may be a bomb
+        with warnings.catch_warnings():  # a picture may be a bomb
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(data)) as picture:
                 if picture.width * picture.height > _MOST_PIXELS:
@@ -149,5 +149,5 @@ def _pixels(data: bytes, path: Path) -> np.ndarray:
         raise
     except Image.DecompressionBombError:
         raise InputError(f"{path} has far too many pixels: give depth in the pictures' size") from None
-    except Exception as error:  # of each decoder its own
+    except Exception as error:  # each decoder has its own
         raise ValueError(error) from error

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from . import texts, tokens
 
 _DEEPEST = 30
-_MOST_STEPS = 100_000  # of all values of a text
+_MOST_STEPS = 100_000  # all values of a text together
 
 _TEMPLATE = re.compile(r"<[\w\s,:*]{0,200}>(?=\s*\()")
 _UNIT = re.compile(r"\s*(?:(°|deg(?:rees?)?\b)|(rad(?:ians?)?\b))")

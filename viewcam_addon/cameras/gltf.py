@@ -27,7 +27,7 @@ TITLE = "glTF and GLB"
 SUFFIX = ".gltf"
 
 _Y_UP = "glTF's y points up: the numbers stay as they are unless the axes Y up → Z up are chosen"
-_NEAR = 0.01  # of what is written; glTF asks for one
+_NEAR = 0.01  # written where glTF asks for one
 
 
 def recognizes(source: Source) -> bool:

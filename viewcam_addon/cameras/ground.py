@@ -21,10 +21,10 @@ from .source import Source
 
 _PLANES, _SEED = 2000, 0
 _MOST_POINTS = 20_000  # to count by, drawn by the seed
-_NEAR = 0.01  # of the points' extent: how far from the plane a point of the ground is. Chosen, as those below
-_TILT = np.cos(np.radians(45))  # of the ground's normal against the cameras' up
+_NEAR = 0.01  # share of the points' extent: how far from the plane a point of the ground is. Chosen, as those below
+_TILT = np.cos(np.radians(45))  # the ground's normal against the cameras' up
 _COMMON = 0.5  # length of the mean of the cameras' up from which on it is one
-_SHARE = 0.05  # of the points, which a plane needs for being the ground
+_SHARE = 0.05  # share of the points that a plane needs for being the ground
 
 
 def leveled(cameras: Sequence[Camera], source: Source, options: Options) -> list[Camera]:
@@ -32,10 +32,7 @@ def leveled(cameras: Sequence[Camera], source: Source, options: Options) -> list
 
     source : the data set, whose points are those of the world before `options.axes` and `options.scale`.
 
-    Raises
-    ------
-    InputError
-        if it has no points, or these no ground.
+    Raises InputError if it has no points, or these no ground.
     """
     if options.original_world:
         raise InputError("the ground is that of points in the file's world: leave --original-world or --ground out")
@@ -55,10 +52,7 @@ def plane(points: np.ndarray, cameras: Sequence[Camera]) -> tuple[np.ndarray, fl
 
     points : (n, 3) in the cameras' world.
 
-    Raises
-    ------
-    InputError
-        if no plane has cameras above and its share of the points.
+    Raises InputError if no plane has cameras above and its share of the points.
     """
     random = np.random.default_rng(_SEED)
     if len(points) > _MOST_POINTS:

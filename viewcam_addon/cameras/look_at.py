@@ -160,7 +160,7 @@ class _Scene:
     three: bool = False
     is_z_up: bool = False  # where no up is said
     is_height_first: bool = False  # in sizes, as in PyTorch3D's
-    controls: str | None = None  # of three.js, which turn the camera to their target
+    controls: str | None = None  # three.js' controls, which turn the camera to their target
 
 
 def recognizes(source: Source) -> bool:
@@ -574,7 +574,7 @@ class _Code:
         if before and before[0] != value and not _is_unknown(value) and not _is_unknown(before[0]):
             line = self.text.count("\n", 0, before[1]) + 1
             texts.fail(self.text, at, f"{role} is something else in line {line}, copy one camera")
-        if before is None or _is_unknown(value):  # of what is known once and computed once nobody knows which counts
+        if before is None or _is_unknown(value):  # a value known once and computed once: nobody knows which counts
             scene.values[role] = (value, at)
 
     def _plain(self, scene: _Scene, role: str, parts: list[str], sign: str, at: int, start: int) -> None:
@@ -977,10 +977,7 @@ def _size(values: dict, aspect: float | None) -> tuple[int, int] | None:
 def write(cameras: Sequence[Camera], options: Options) -> str:
     """gluLookAt and glFrustum of each camera: exact, whatever its principal point and pixels.
 
-    Raises
-    ------
-    InputError
-        if one is mirrored, which these can't say.
+    Raises InputError if one is mirrored, which these can't say.
     """
     return "\n".join(map(_written, cameras))
 

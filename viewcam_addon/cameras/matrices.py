@@ -53,7 +53,7 @@ _SIZE = re.compile(
 )
 _NUMBER = re.compile(r"[\s,;|()\[\]{}<>]*([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)[fFd]?(?![\w.])")
 _MOST = 100
-_ROUNDED = 1e-4  # what digits leave of a zero, relative to the largest number
+_ROUNDED = 1e-4  # a zero's rest after rounding to digits, relative to the largest number
 
 
 def recognizes(source: Source) -> bool:

@@ -46,7 +46,7 @@ _HARMLESS = {
     *("nearclip", "farclip", "shutteropen", "shutterclose", "focusdistance", "type", "id", "film", "sampler", "toworld"),
     *("fov", "fovaxis", "focallength", "principalpointoffsetx", "principalpointoffsety", "medium", "srf", "samplecount"),
 }
-_SCALED = 1e-3  # of squared lengths, as Mitsuba's has_scale
+_SCALED = 1e-3  # squared lengths, as Mitsuba's has_scale
 
 
 class _Sensor:
@@ -494,13 +494,7 @@ def _rows(value: object) -> np.ndarray | None:
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
-    """A scene with a sensor for each camera.
-
-    Raises
-    ------
-    InputError
-        if the pixels of one are not square, which Mitsuba can't say.
-    """
+    """A scene with a sensor for each camera. Raises InputError if the pixels of one are not square, which Mitsuba can't say."""
     return "\n".join(['<scene version="3.0.0">', *map(_written, cameras), "</scene>", ""])
 
 

@@ -98,10 +98,7 @@ def in_order(folder: Path | None, places: Sequence[str], count: int) -> list[str
 def check_image(file: object) -> None:
     """Refuse a path by which no dataset can name a picture.
 
-    Raises
-    ------
-    InputError
-        if it leaves its folder, or is no line of text.
+    Raises InputError if it leaves its folder, or is no line of text.
     """
     if not isinstance(file, str) or any(map(_is_unseen, file)) or "\\" in file or {"", ".", ".."} & set(file.split("/")):
         raise InputError(
@@ -114,11 +111,8 @@ def checked(cameras: Iterable[Camera], written: str) -> tuple[Camera, ...]:
 
     written : the dataset, as a sentence names it.
 
-    Raises
-    ------
-    InputError
-        if there are none, if two have one picture or one has none that can be named, or if a camera is mirrored, since a
-        rotation can't say that.
+    Raises InputError if there are none, if two have one picture or one has none that can be named, or if a camera is mirrored,
+    since a rotation can't say that.
     """
     cameras = tuple(cameras)
     if not cameras:
@@ -143,10 +137,7 @@ def refuse_taken(names: Sequence[str]) -> None:
 def a_file_each(cameras: Sequence[Camera], suffix: str, text: Callable[[Camera], str]) -> str | dict[str, str]:
     """The result of `write` in a format whose files have one camera: its text, or of several the files, called as the cameras.
 
-    Raises
-    ------
-    InputError
-        as `refuse_taken` does.
+    Raises InputError as `refuse_taken` does.
     """
     if len(cameras) == 1:
         return text(cameras[0])

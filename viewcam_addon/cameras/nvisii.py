@@ -43,15 +43,15 @@ def read(source: Source, options: Options) -> list[Camera]:
     if matrix[3].tolist() != _LAST or matrix[:, 3].tolist() == _LAST:
         matrix = matrix.T
     forward = _forward(source, data, matrix[2, :3])
-    taken: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
     if forward == 0:
         forward = 1.0 if options.pose == "w2c_opencv" else -1.0
-        taken = () if options.pose in ("w2c_opencv", "w2c_opengl") else (_TAKEN,)
+        assumptions = () if options.pose in ("w2c_opencv", "w2c_opengl") else (_TAKEN,)
     rows = matrix[:3] * [[1.0], [forward], [forward]]
     pose = axes.from_world_to_camera(rows[:, :3], rows[:, 3].tolist(), "camera_data")
     pinhole, notes = axes.pinhole(pose, plane, "camera_data")
     name = Path(source.name).stem if source.path else "camera"
-    return [Camera(name, pinhole, stated, (*taken, *notes), f"{name}.png" if source.path else None)]
+    return [Camera(name, pinhole, stated, (*assumptions, *notes), f"{name}.png" if source.path else None)]
 
 
 def _forward(source: Source, data: Record, z: np.ndarray) -> float:

@@ -45,7 +45,7 @@ _SAYS_K = re.compile(r"(?:[km][12lr]?|matrix_?\w{0,5}|intrinsics?|mtx|fx)[\s_$\"
 _PARTS_OF_K = (("fx",), ("fy",), ("cx", "ppx", "u0", "px"), ("cy", "ppy", "v0", "py"))
 _OF_CAMERA = re.compile(r"^camera1?(?=(?:[fc][xy]|[kp]\d|width|height|type)$)")  # ORB-SLAM's
 _INNER = ("projectionparameters", "distortionparameters", "distortion", *_K)
-_LISTS = ("cameras", "Cameras", "views")  # of CMU Panoptic's calibrations, and of many programs' own
+_LISTS = ("cameras", "Cameras", "views")  # CMU Panoptic's calibrations, and many programs' own
 _STEREO = (("1", "2"), ("left", "right"), ("l", "r"))
 _OF_ONE = ("m", *_K)
 _BESIDE = "extrinsics.yml", "extrinsics.yaml", "extrinsics.xml"
@@ -222,7 +222,7 @@ def _cameras_in(source: Source) -> Iterator[tuple[str, dict[str, Any]]]:
     if pair := _stereo(by_name, source):
         yield from pair
         return
-    if _is_camera(by_name) or "mirrorparameters" in by_name:  # of VINS' MEI, which is refused by its name
+    if _is_camera(by_name) or "mirrorparameters" in by_name:  # VINS' MEI is refused by its name
         yield from _of_pictures(source.path.stem if source.path else "camera", by_name)
         return
     shared = {name: value for name, value in by_name.items() if not isinstance(value, dict)}
@@ -398,10 +398,7 @@ def _numbers(name: str, value: Any) -> tuple[float, ...]:
 def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float, float]:
     """(fx, fy, cx, cy) of nine numbers, row after row, of the twelve of a 3 × 4, or of these four themselves.
 
-    Raises
-    ------
-    InputError
-        if it has no last row 0 0 1, or a focal length that is not above 0; NoPinholeError if it has skew.
+    Raises InputError if it has no last row 0 0 1, or a focal length that is not above 0; NoPinholeError if it has skew.
     """
     if len(values) == 4:
         f_x, f_y, c_x, c_y = values
@@ -428,10 +425,7 @@ def plane_of_k(values: Sequence[float], size: tuple[int, int], half: float, what
 
     half : the amount to add to its principal point.
 
-    Raises
-    ------
-    InputError
-        as `matrix_of_k` does, or if K can't count in pixels.
+    Raises InputError as `matrix_of_k` does, or if K can't count in pixels.
     """
     f_x, f_y, c_x, c_y = matrix_of_k(values, what)
     refuse_widths(f_x, f_y, c_x, c_y, size, what)
@@ -473,13 +467,7 @@ def of_window(plane: ViewPlane, values: Mapping[str, Any], what: str) -> tuple[V
 
 
 def coefficients(numbers: Sequence[float], what: str) -> dict[str, float]:
-    """OpenCV's distortion coefficients by name.
-
-    Raises
-    ------
-    InputError
-        if they are more than OpenCV has.
-    """
+    """OpenCV's distortion coefficients by name. Raises InputError if they are more than OpenCV has."""
     if len(numbers) not in (0, 1, 2, 3, 4, 5, 8, 12, 14):
         raise InputError(f"{what} has {len(numbers)} distortion coefficients: OpenCV has 4, 5, 8, 12 or 14")
     return dict(zip(NAMES, numbers, strict=False))
@@ -492,10 +480,7 @@ def settled(
 
     is_fisheye : true if they are those of `cv2.fisheye`, k1 … k4.
 
-    Raises
-    ------
-    InputError
-        if there are more than the model has.
+    Raises InputError if there are more than the model has.
     """
     if not isinstance(numbers, dict):
         numbers = dict(zip(("k1", "k2", "k3", "k4"), numbers, strict=False)) if is_fisheye else coefficients(numbers, what)
@@ -508,10 +493,7 @@ def settled(
 def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     """The camera of values by their plain names; without K it sees as the options say.
 
-    Raises
-    ------
-    InputError
-        if they are no camera, or leave open what it is.
+    Raises InputError if they are no camera, or leave open what it is.
     """
     what = f"camera {checks.quoted(name)}"
     is_fisheye = says_fisheye(values, what)
@@ -552,10 +534,7 @@ def _of_infinigen(name: str, values: Mapping[str, Any], what: str, options: Opti
 def says_fisheye(values: Mapping[str, Any], what: str) -> bool:
     """True if a model that the values name is OpenCV's fisheye.
 
-    Raises
-    ------
-    InputError
-        if one of them is none that is known, whatever its coefficients are.
+    Raises InputError if one of them is none that is known, whatever its coefficients are.
     """
     models = [
         value
@@ -576,13 +555,7 @@ def refuse_unknown_distortion(values: Mapping[str, Any], what: str) -> None:
 
 
 def _coefficients(values: Mapping[str, Any], what: str, is_fisheye: bool) -> Sequence[float] | dict[str, float]:
-    """The distortion, in a list or as keys of their own.
-
-    Raises
-    ------
-    InputError
-        if there is one in words that nobody knows.
-    """
+    """The distortion, in a list or as keys of their own. Raises InputError if there is one in words that nobody knows."""
     stated = _first(values, _DISTORTION)
     listed = _numbers("the distortion", stated) if stated is not None else ()
     if is_fisheye and len(listed) > 4:
@@ -623,7 +596,7 @@ def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.nd
     """Camera to world, 4 × 4 with columns u, v, w and the eye; and notes."""
     whole = next((name for name in (*_EXTRINSIC, *_OTHER_POSE, *_T) if _is_whole(name, values)), None)
     turn, vector, translation = (_first(values, names) for names in (_R, _RVEC, _T))
-    if turn is not None and translation is None and "p" in values:  # of ROS: how a stereo pair is rectified
+    if turn is not None and translation is None and "p" in values:  # ROS: a stereo pair's rectification
         turn = None
     if whole is not None and (whole not in _EXTRINSIC or (turn is None and vector is None)):
         way = options.pose or ("w2c_opencv" if whole in _EXTRINSIC else "c2w_opengl" if whole in _BLENDERS else None)

@@ -148,7 +148,7 @@ def parts(text: str) -> list[tuple[str, str]]:
     """The name and the code of each camera of a text, split where `beginning` stands; none if it stands nowhere."""
     starts = [*_BEGINNINGS.finditer(text)]
     ends = [*(match.start() for match in starts[1:]), len(text)]
-    whole = [0, *(match.start() for match in starts[1:])]  # what stands before the first is the first one's
+    whole = [0, *(match.start() for match in starts[1:])]  # text before the first is the first one's
     return [
         (str(json.loads(match[1], strict=False)), text[start:end])
         for match, start, end in zip(starts, whole, ends, strict=False)
@@ -167,10 +167,7 @@ def pinholes_in(text: str) -> list[Pinhole]:
 def camera(values: Values, options: Options, what: str) -> Camera:
     """The camera of what a text says, completed by the options.
 
-    Raises
-    ------
-    InputError
-        if it contradicts itself, or lacks something that the options do not say either.
+    Raises InputError if it contradicts itself, or lacks something that the options do not say either.
     """
     if not values.keys() & {*VECTORS, *_LENS}:
         raise InputError("the text says neither eye, look-at, up nor distance of a camera: copy one, or write eye=1,2,3")
@@ -303,10 +300,7 @@ def _checked(key: str, name: str, value: object) -> object:
 def pairs(text: str) -> Values:
     """Keys and their values, with or without = and : between them, and any brackets and separators around them.
 
-    Raises
-    ------
-    InputError
-        at the first word that is no key.
+    Raises InputError at the first word that is no key.
     """
     values: Values = {}
     at = 0

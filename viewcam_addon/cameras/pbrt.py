@@ -260,7 +260,7 @@ def _statements(text: str) -> Iterator[tuple[str, int, list, _Parameters]]:
     word, at = "", 0
     arguments: list = []
     parameters: _Parameters = {}
-    values: list | None = None  # of the parameter that is being read
+    values: list | None = None  # values of the parameter that is being read
     is_open = False
     for match in _WORDS.finditer(text):
         string, name, number, bracket, stray = match.groups()

@@ -36,7 +36,7 @@ SUFFIX = ".txt"
 SEVERAL = "a folder"
 
 _OF_NEUS = ("cameras_sphere.npz", "cameras.npz")
-_MOST_BYTES = 2**12  # of a 4 × 4
+_MOST_BYTES = 2**12  # for a 4 × 4
 _PICTURES = ("image", "images", "rgb")
 _KITTI = re.compile(r"^(P(?:\d|_rect_\d\d)):[ \t]([-+\d.eE \t]+)$", re.MULTILINE)
 _KITTI_SIZE = re.compile(r"^S_rect_(\d\d):[ \t]([-+\d.eE]+)[ \t]+([-+\d.eE]+)[ \t]*$", re.MULTILINE)

@@ -37,7 +37,7 @@ _LENS = ("k1", "k2", "k3", "k4", "t1", "t2")
 _NAMES = {"yaw": "heading", "z": "alt", "f_35mm": "f", "px_norm": "px", "py_norm": "py"}
 _TURN = tuple(f"r{row}{column}" for row in range(3) for column in range(3))
 _POSES = (("x", "y", "alt", "heading", "pitch", "roll"), ("tx", "ty", "tz", *_TURN))
-_SPOT = 1e-3  # of its distance from where the degrees begin, which 100 km are nearly anywhere
+_SPOT = 1e-3  # share of its distance from where the degrees begin, which 100 km are nearly anywhere
 _LONGEST = 2000  # characters before the names of columns end
 
 

@@ -41,10 +41,7 @@ def record(pinhole: Pinhole, camera_data: CameraData | None = None, lens: Lens |
     and `worldToCamera` (4 × 4), `K` (3 × 3), `convention` (what these mean, see axes.py), and `blender` (the fields of
     `CameraData`) and `lens` (those of `Lens`) if these are given.
 
-    Raises
-    ------
-    InputError
-        if the translation from the world's origin to the camera is beyond float64.
+    Raises InputError if the translation from the world's origin to the camera is beyond float64.
     """
     camera = {key: list(value) if isinstance(value, tuple) else value for key, value in dataclasses.asdict(pinhole).items()}
     return {

@@ -69,13 +69,7 @@ class Source:
 
     @cached_property
     def data(self) -> bytes:
-        """The bytes; none of a folder.
-
-        Raises
-        ------
-        InputError
-            if the file can't be read.
-        """
+        """The bytes; none of a folder. Raises InputError if the file can't be read."""
         if self.is_folder:
             return b""
         if self.path is None:
@@ -153,13 +147,7 @@ class Source:
 
     @property
     def json(self) -> Any:
-        """The JSON value, or None if this is no JSON.
-
-        Raises
-        ------
-        InputError
-            if a key is there twice, or a number is none.
-        """
+        """The JSON value, or None if this is no JSON. Raises InputError if a key is there twice, or a number is none."""
         return self._json[0]
 
     @property
@@ -176,10 +164,7 @@ class Source:
     def xml(self) -> ElementTree.Element | None:
         """The XML's first element, or None if this is no XML.
 
-        Raises
-        ------
-        InputError
-            if it has a document type or entities of its own, is nested too deeply, or is not written as it says.
+        Raises InputError if it has a document type or entities of its own, is nested too deeply, or is not written as it says.
         """
         if not self.text.lstrip().startswith("<"):
             return None
@@ -345,10 +330,7 @@ def table(name: str, lines: Sequence[tuple[int, str]]) -> np.ndarray:
 
     name : the file's. At once, which is twenty times as fast as one by one, unless one is to be told of.
 
-    Raises
-    ------
-    InputError
-        of the first line that is none.
+    Raises InputError of the first line that is none.
     """
     try:
         result = (

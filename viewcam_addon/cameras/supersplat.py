@@ -27,7 +27,7 @@ TITLE = "SuperSplat (project, settings.json of its viewer)"
 
 _VIEWS = ("cameras", "camera")
 _FILE = "document.json"
-_MOST_BYTES = 2**24  # of it in a project
+_MOST_BYTES = 2**24  # for this part of a project
 _FOV, _RATE = 60.0, 30.0  # SuperSplat's, where a file says none
 _FOVS = 1e-6, 180 - 1e-6  # degrees from which on and up to which it is one
 _TURNED = "SuperSplat shows a splat turned by 180° about z, and its y is up: the original world is that of the .ply"

@@ -139,10 +139,7 @@ def film(
     aspect : the picture's width over its height, if it says no more than that; the height is kept then.
     default : the program's own size.
 
-    Raises
-    ------
-    InputError
-        if nobody knows the size.
+    Raises InputError if nobody knows the size.
     """
     if size:
         width, height = (checks.whole(name, number) for name, number in zip(("width", "height"), size, strict=True))
@@ -171,10 +168,7 @@ def posed(
 
     may_be_singular : true if the program knows the canonical axes of a view along up, as ours does.
 
-    Raises
-    ------
-    InputError
-        if it looks along its up: other programs have no picture then, or each its own.
+    Raises InputError if it looks along its up: other programs have no picture then, or each its own.
     """
     pinhole = Pinhole(eye, look_at, up, plane.distance, plane.width, plane.height, plane.principal_point, mirrored)
     if pinhole.is_singular and not may_be_singular:
@@ -193,10 +187,7 @@ def projected(matrix: np.ndarray, eye: Triple, size: tuple[int, int], what: str)
     matrix : (3, 3), from a direction in world space to (column, row, 1) · depth: pixels from the left and the **top**, and a
     depth that is positive in front of the eye. It may scale, mirror and shift, not shear.
 
-    Raises
-    ------
-    InputError
-        if the picture's sides are not perpendicular, or the matrix is flat.
+    Raises InputError if the picture's sides are not perpendicular, or the matrix is flat.
     """
     checks.finite(f"the projection of {what}", np.asarray(matrix))
     across, down, forward = (np.asarray(row, dtype=np.float64) for row in matrix)
@@ -216,7 +207,7 @@ def projected(matrix: np.ndarray, eye: Triple, size: tuple[int, int], what: str)
     notes = (
         (f"The axes of {what} are {askew:.1g} from perpendicular: it has no more digits than that",) if askew > _NOTED else ()
     )
-    if abs(d_x / d_y - 1) < 2.0**-20:  # of one number, rounded twice
+    if abs(d_x / d_y - 1) < 2.0**-20:  # one number, rounded twice
         d_x = d_y = math.sqrt(d_x * d_y)
     matrix = np.column_stack([across / math.hypot(*across), -down / math.hypot(*down), -forward, eye])
     pinhole, _ = axes.pinhole(matrix, axes.view_plane(d_x, d_y, c_x, c_top, size), what)
@@ -239,10 +230,7 @@ def mirroring(camera: Camera, program: str) -> Camera:
 def angle_of(value: float, name: str, options: Options) -> float:
     """Radians of an angle whose unit nobody says: degrees from π on, below that what the options say.
 
-    Raises
-    ------
-    InputError
-        if it may be either.
+    Raises InputError if it may be either.
     """
     value = checks.number(name, value)
     if value <= 0:

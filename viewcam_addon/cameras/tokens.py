@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 _TOKEN = re.compile(
     r"\s*(?:((?:[^\W\d]|\$)[\w$]*)"  # a name
-    r"|(0[xX][\dA-Za-z_.]*|\.?\d(?:[eE][-+](?=\d)|[\dA-Za-z_.])*)"  # what begins as a number
+    r"|(0[xX][\dA-Za-z_.]*|\.?\d(?:[eE][-+](?=\d)|[\dA-Za-z_.])*)"  # anything that begins as a number
     r"|(->|::|==|\S))?"
 )
 _VALUE = re.compile(r"(?:0[xX]([\da-fA-F]+)|((?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?))[fFlLuU]?")

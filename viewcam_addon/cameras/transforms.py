@@ -11,15 +11,19 @@ fl_x), for readers that know nothing else, is the field of view if the principal
 granted: it isn't `Pinhole.field_of_view` where the camera is shifted. The original NeRF shoots its rays through the pixels'
 corners (bmild/nerf #24), which no file can mend; its files have no size either, which is then that of the picture beside it.
 
+A bare list of frames, as nerfstudio's `ns-export cameras` writes it with `transform` in each, says no distance and no size:
+both are asked for.
+
 `virtual_pinhole`, which others pass over, has the values of which the matrix was made: so the camera comes back to the bit.
 
 **Where they stand.** At the top if all pictures have the same, else in every frame, and always together: nerfstudio takes what
 is at the top before it looks into a frame, and instant-ngp reads cx and w from the same object. Where both say something and
 not the same, these two would take different cameras, so it is refused.
 
-Sources: nerfstudio's docs/quickstart/data_conventions.md, nerfstudio/data/dataparsers/nerfstudio_dataparser.py and
-cameras/cameras.py (get_image_coords, _generate_rays_from_coords); instant-ngp's docs/nerf_dataset_tips.md, src/nerf_loader.cu
-(read_lens, read_focal_length) and include/neural-graphics-primitives/common_device.cuh (pixel_to_ray_pinhole).
+Sources: nerfstudio's docs/quickstart/data_conventions.md, nerfstudio/data/dataparsers/nerfstudio_dataparser.py,
+cameras/cameras.py (get_image_coords, _generate_rays_from_coords) and scripts/exporter.py (ExportCameraPoses); instant-ngp's
+docs/nerf_dataset_tips.md, src/nerf_loader.cu (read_lens, read_focal_length) and
+include/neural-graphics-primitives/common_device.cuh (pixel_to_ray_pinhole).
 """
 
 import json
@@ -91,11 +95,8 @@ def document(
     more : further keys at the top.
     of_frames : further keys of each frame.
 
-    Raises
-    ------
-    InputError
-        if there is no camera, two have one picture, one is mirrored or some but not all have a fisheye, or if the scale is not
-        one that instant-ngp takes.
+    Raises InputError if there is no camera, two have one picture, one is mirrored or some but not all have a fisheye, or if the
+    scale is not one that instant-ngp takes.
     """
     cameras = naming.checked(cameras, FILE)
     if aabb_scale is not None and checks.whole("aabb_scale", aabb_scale) not in AABB_SCALES:
@@ -178,13 +179,26 @@ def _files(source: Source) -> list[Source]:
     return [file for file in files if _is_ours(file)]
 
 
+def _document(source: Source) -> Mapping[str, Any]:
+    """The JSON object; of a list of frames, as nerfstudio's `ns-export cameras` writes it, one with these."""
+    if not isinstance(source.json, list):
+        return source.document
+    exported = {"transform": "transform_matrix"}
+    return {
+        "frames": [
+            {exported.get(key, key): value for key, value in frame.items()} if isinstance(frame, dict) else frame
+            for frame in source.json
+        ]
+    }
+
+
 def _is_ours(source: Source) -> bool:
-    frames = source.document.get("frames")
+    frames = _document(source).get("frames")
     return isinstance(frames, list) and bool(frames) and isinstance(frames[0], dict) and any(key in frames[0] for key in _POSES)
 
 
 def _cameras(source: Source, options: Options) -> list[Camera]:
-    top = Record(source.document, source.name)
+    top = Record(_document(source), source.name)
     frames = top.records("frames", "frame")
     paths = [frame.text("file_path", f"frame {i}").replace("\\", "/") for i, frame in enumerate(frames)]
     undone = _applied(top) if options.original_world else None
@@ -257,9 +271,7 @@ def _plane(
     focal = {along: _focal(both, along, side) for along, side in zip("xy", size, strict=True)}
     f_x, f_y = focal["x"] or focal["y"], focal["y"] or focal["x"]
     if not f_x or not f_y:
-        if options.view_plane or options.base:
-            return options.plane_or_refuse(both.place), False, None, ()
-        raise InputError(f"{both.place} has neither fl_x nor camera_angle_x: it can't be a camera without")
+        return options.plane_or_refuse(both.place), False, None, ()
     plane = axes.view_plane(f_x, f_y, both.number("cx", size[0] / 2), both.number("cy", size[1] / 2), size)
     numbers = {key: both.number(key, 0.0) for key in _LENS}
     if "distortion_params" in both:

@@ -32,9 +32,9 @@ from .distortion import Lens
 from .source import Source
 
 FORMS = ("transforms", "colmap")
-_SCALES = (0.2, 2.0)  # of the picture's sides, at least and at most: COLMAP's
+_SCALES = (0.2, 2.0)  # shares of the picture's sides, at least and at most: COLMAP's
 _BAND = 2**20  # pixels that are computed at a time
-_IN_CACHE = 2**13  # of them, where each is computed again and again: twice as fast
+_IN_CACHE = 2**13  # places that are computed again and again at once: twice as fast
 _FOLDERS = {"mask_path": "masks", "depth_file_path": "depths"}  # by the keys of a frame
 
 
@@ -45,10 +45,7 @@ def undistorted(lens: Lens, plane: ViewPlane, blank: float = 0.0) -> ViewPlane:
     plane : the photograph's view plane.
     blank : 0 to leave no pixel empty, 1 to cut off none of the photograph's; between them some of both.
 
-    Raises
-    ------
-    InputError
-        if the photograph's border shows nothing that lies before the camera.
+    Raises InputError if the photograph's border shows nothing that lies before the camera.
     """
     (d_x, d_y), (c_x, c_yb), width, height = plane.distance, plane.principal_point, plane.width, plane.height
     c_y = height - c_yb
@@ -239,10 +236,8 @@ def save(cameras: Sequence[Camera], dataset: Path, out: Path, form: str, blank: 
     out : a folder, new or empty.
     form : one of FORMS: transforms.json with masks and depth maps, or sparse/0 with COLMAP's points, beside images/.
 
-    Raises
-    ------
-    InputError
-        if OpenCV is missing, a picture is not there or of another size than its camera, or the folder is not empty.
+    Raises InputError if OpenCV is missing, a picture is not there or of another size than its camera, or the folder is not
+    empty.
     """
     if importlib.util.find_spec("cv2") is None:
         raise InputError("pictures are read and written by OpenCV: pip install opencv-python-headless")

@@ -22,10 +22,7 @@ _CENTIMETERS = 100.0
 def write(cameras: Sequence[Camera], options: Options) -> str:
     """The cameras' poses, as Unreal has them.
 
-    Raises
-    ------
-    InputError
-        if a camera is shifted, mirrored or has pixels that are not square: then no field of view says it.
+    Raises InputError if a camera is shifted, mirrored or has pixels that are not square: then no field of view says it.
     """
     lines, before = [], (1.0, 0.0, 0.0, 0.0)
     for camera in cameras:
@@ -56,10 +53,7 @@ def _line(camera: Camera, quaternion: axes.Quaternion) -> str:
 def centered_field_of_view(camera: Camera, engine: str) -> tuple[float, float]:
     """Degrees of the width and of the height.
 
-    Raises
-    ------
-    InputError
-        if no field of view says the camera: it is shifted, mirrored or has pixels that are not square.
+    Raises InputError if no field of view says the camera: it is shifted, mirrored or has pixels that are not square.
     """
     pinhole = camera.pinhole
     (d_x, d_y), (width, height) = pinhole.distance, (pinhole.width, pinhole.height)

@@ -116,13 +116,10 @@ def _value(text: str) -> Any:
 def _flow(text: str) -> Any:
     """The value of what stands in brackets, [a, b] or {a: b}, which may be nested.
 
-    Raises
-    ------
-    ValueError
-        if the brackets do not fit together, or are nested too deeply.
+    Raises ValueError if the brackets do not fit together, or are nested too deeply.
     """
     opened: list[list | dict] = []
-    keys: list[str | None] = []  # of each object, the one whose value comes next
+    keys: list[str | None] = []  # for each object, the one whose value comes next
     whole: Any = None
     for token in _FLOW.findall(text):
         if whole is not None or (not opened and token not in ("[", "{")) or len(opened) > _DEEPEST:

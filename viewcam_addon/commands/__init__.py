@@ -29,13 +29,7 @@ def summary(name: str) -> str:
 
 
 def blender_room(name: str) -> ModuleType:
-    """The module of blender/ with this name.
-
-    Raises
-    ------
-    InputError
-        where there is no Blender.
-    """
+    """The module of blender/ with this name. Raises InputError where there is no Blender."""
     if importlib.util.find_spec("bpy") is None:
         raise InputError(
             "this needs Blender: install it as a module (pip install bpy), or run blender -b FILE.blend --command viewcam"

@@ -16,7 +16,7 @@ from .. import argument_types as types
 from .. import crashes
 from ..errors import InputError
 from ..events import Events
-from ..jobs import cluster, dataset, one, render_client
+from ..jobs import cluster, dataset, one, served_renderer
 from ..jobs import run as running
 from ..jobs.folder import Folder, settings_hash
 from ..jobs.interruption import Interruption
@@ -77,10 +77,7 @@ def carry_out(
     complete : gives each what it does not say itself.
     source : the list that they are from.
 
-    Raises
-    ------
-    InputError
-        if the file can't be opened or the folder not be written; ShotsError with all that is wrong with the jobs.
+    Raises InputError if the file can't be opened or the folder not be written; ShotsError with all that is wrong with the jobs.
     """
     on_signal = functools.partial(events.tell, "stopping")
     with silent_libraries(), Interruption(on_signal, crashes.passed_on) as interruption, contextlib.ExitStack() as stack:
@@ -128,9 +125,9 @@ def opened(plan: Plan, events: Events) -> contextlib.AbstractContextManager:
 
     The bpy module puts folders on sys.path in which a worker's children, who get that path, would find half a bpy.
     """
-    apart = os.environ.get(render_client.BLENDER) or plan.is_on_cluster or plan.time_limit
+    apart = os.environ.get(served_renderer.BLENDER) or plan.is_on_cluster or plan.time_limit
     if plan.blend is not None and apart:
-        return render_client.ServedRenderer(plan.blend, plan.trust, plan.time_limit, events)
+        return served_renderer.ServedRenderer(plan.blend, plan.trust, plan.time_limit, events)
     if plan.time_limit and not plan.is_on_cluster:
         raise InputError("--time-limit ends the Blender of a shot, and here that is this one: give --workers 1 as well")
     return blender_room("jobs.renderer").BlenderRenderer(plan.blend, plan.trust, events)

@@ -114,12 +114,9 @@ def in_another_blender(options: argparse.Namespace) -> int | None:
 
     None where none is named, or this is a Blender that has a file open.
 
-    Raises
-    ------
-    InputError
-        if it can't be started, or ends otherwise than the command does.
+    Raises InputError if it can't be started, or ends otherwise than the command does.
     """
-    from ..jobs.render_client import BLENDER
+    from ..jobs.served_renderer import BLENDER
 
     program = os.environ.get(BLENDER)
     if not program or options.blend is None:
@@ -143,7 +140,7 @@ def in_another_blender(options: argparse.Namespace) -> int | None:
 
 def say_level(scene: Any) -> dict[str, str]:
     """Print the least level that models all of a scene's light, and why; both as --json has them."""
-    from ..tracer.scene.levels import least_level
+    from ..tracer.scene import least_level
 
     level, reason = least_level(scene)
     say(f"level {level} is enough. {reason}")

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from ..jobs import plan, render_server
+from ..jobs import plan, served_renderer
 from . import Result, blender_room, check
 from ._carry_out import carry_out
 
@@ -20,7 +20,7 @@ def run(options: argparse.Namespace) -> Result:
     they are carried out, as jobs.plan.write has written it.
     """
     if options.what.isdecimal():
-        render_server.serve(options.what, blender_room("jobs.renderer").BlenderRenderer)
+        served_renderer.serve(options.what, blender_room("jobs.renderer").BlenderRenderer)
         return 0, {}
     jobs, how, files = plan.read(Path(options.what))
     if how is None:

@@ -32,10 +32,7 @@ _NOTHING = np.full((1, 3), 64, np.uint8)
 def write(comparison: GeometryComparison | RadianceComparison, path: str | os.PathLike[str]) -> dict[str, Any]:
     """Write the PNG; returns its path, what its colors say, and the ends and unit of their scale, as plain JSON values.
 
-    Raises
-    ------
-    InputError
-        if the file can't be written.
+    Raises InputError if the file can't be written.
     """
     picture, words, scale = _of_light(comparison) if isinstance(comparison, RadianceComparison) else _of_geometry(comparison)
     _write(picture, path)
@@ -54,10 +51,7 @@ def write_sides(
     Geometry is shaded, as PNG. Light is as it was rendered, as arrays of NumPy: (height, width, 3) float32, scene linear, rows
     from the bottom, for a view transform that only Blender has.
 
-    Raises
-    ------
-    InputError
-        if a file can't be written.
+    Raises InputError if a file can't be written.
     """
     light: dict[str, NDArray] = {} if everything is None else {"everything": everything["Combined"][..., :3]}
     if isinstance(comparison, RadianceComparison):

@@ -66,10 +66,7 @@ def compare(
 
     Whatever float32 can hold may stand in the pictures: what can't be computed with is not within tolerance.
 
-    Raises
-    ------
-    InputError
-        if the sizes differ, a pass is missing, or the reference is not what `surfaces_at` sees.
+    Raises InputError if the sizes differ, a pass is missing, or the reference is not what `surfaces_at` sees.
     """
     measured = set(test.passes) | ({"Depth"} if "Distance" in test.passes else set())
     expected, seen = _passes(reference, test, pinhole, partial)

@@ -64,10 +64,7 @@ def compare(
 
     Whatever float32 can hold may stand in the pictures: what is no number is told as broken.
 
-    Raises
-    ------
-    InputError
-        if the sizes differ, a pass is missing, or there is no test picture.
+    Raises InputError if the sizes differ, a pass is missing, or there is no test picture.
     """
     compared = compare_quantities(reference, tests, pinhole, test_samples, false_alarms=false_alarms)
     combined, rest, taken_out = compared.combined, None, TakenOut()

@@ -84,10 +84,7 @@ def write(folder: str | os.PathLike[str], template: str, values: Mapping[str, An
     template : report_geometry.html or report_light.html.
     values : values for the names in it, those of `common` among them.
 
-    Raises
-    ------
-    InputError
-        if the folder can't be written, or there is no Jinja2.
+    Raises InputError if the folder can't be written, or there is no Jinja2.
     """
     path = Path(folder) / "index.html"
     if path.parent.exists() and not path.parent.is_dir():
@@ -229,10 +226,7 @@ def write_geometry(
     ledger : the scene's entries, with `object`, `status` and `reason`.
     command : the command that repeats the comparison.
 
-    Raises
-    ------
-    InputError
-        if the folder can't be written, or there is no Jinja2.
+    Raises InputError if the folder can't be written, or there is no Jinja2.
     """
     shades = difference.on_screen(comparison, reference, [test])
     far = comparison.far_from_origin
@@ -301,10 +295,7 @@ def write_light(
     tests : the pictures that were compared, in any number.
     ledger, command : see common.
 
-    Raises
-    ------
-    InputError
-        if the folder can't be written, or there is no Jinja2.
+    Raises InputError if the folder can't be written, or there is no Jinja2.
     """
     on_screen = difference.on_screen(comparison, reference, tests)
     mean_of = f" Cycles' is the mean of {len(tests)} pictures with other seeds." if len(tests) > 1 else ""
@@ -364,8 +355,8 @@ def _maker(image: Image) -> str:
 
 
 def _light_crops(comparison: RadianceComparison, on_screen: tuple) -> list[Crop]:
-    asked = [(row, test) for row in comparison.rows for test in row.hypothesis_tests]
-    failed = [(row, test) for row, test in asked if not test.ok and test.size not in (CONTOURS, WHOLE)]
+    tested = [(row, test) for row in comparison.rows for test in row.hypothesis_tests]
+    failed = [(row, test) for row, test in tested if not test.ok and test.size not in (CONTOURS, WHOLE)]
     return [_crop(comparison, on_screen, row, test) for row, test in failed[:_MOST_CROPS]]
 
 

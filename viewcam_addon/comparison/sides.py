@@ -90,10 +90,7 @@ def all_sides(reference: Image, tests: Sequence[Image], anew: Sequence[Image] = 
 
     anew : the reference with several other seeds, whose mean and spread count in place of its own.
 
-    Raises
-    ------
-    InputError
-        if there is no test picture, if their sizes differ, or if one has no Combined.
+    Raises InputError if there is no test picture, if their sizes differ, or if one has no Combined.
     """
     if not tests:
         raise InputError("there is nothing to compare with the reference: give at least one test picture")

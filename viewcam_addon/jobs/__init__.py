@@ -18,7 +18,7 @@ Doing it, many shots of one file, each with a sidecar
 
 On child processes (../child_process.py)
     tracing                         renders the reference, compares, writes reports and labels
-    render_server, render_client    a renderer in a process of its own
+    served_renderer                 a renderer in a process of its own
     cluster, worker                 shots on several workers, each of which keeps such a process
 
 **Nothing lost.** A file appears whole or not at all (files.py), and a shot's sidecar is written last and taken away first: a

@@ -12,7 +12,7 @@ from .. import argument_types
 from ..comparison.answer import exit_status
 from ..errors import InputError
 from .job import Job
-from .render_client import ServedRenderer
+from .served_renderer import ServedRenderer
 from .tracing import Tracing, Written
 
 File = str | os.PathLike[str]
@@ -50,8 +50,6 @@ def check(
 ) -> Check:
     """Check that Cycles renders what a .blend file says: `check("shot.blend", camera="Camera", frame=24, level="direct")`.
 
-    Parameters
-    ----------
     blend : the file.
     words : words of the command line, as "--camera", "Camera". Deprecated: give keywords.
     size : (width, height) in pixels, or "320x180"; the scene's where None.
@@ -60,10 +58,7 @@ def check(
     options : fields of Job: camera, frame, level, samples, find, seed, error, engine, device, clay, recenter, strict, trust,
         threads, scene.
 
-    Raises
-    ------
-    InputError
-        as the command does: no Blender, no such file or camera, no such option.
+    Raises InputError as the command does: no Blender, no such file or camera, no such option.
     """
     if words:
         warnings.warn("viewcam_addon.check takes keywords, as camera='Camera'", DeprecationWarning, stacklevel=2)
@@ -103,10 +98,7 @@ def compare(
     difference : a PNG.
     strict : true to fail pictures that are the same but for what is not modeled.
 
-    Raises
-    ------
-    InputError
-        as `viewcam compare` does.
+    Raises InputError as `viewcam compare` does.
     """
     named = channels if isinstance(channels, Mapping) else None
     if channels and named is None:

@@ -29,7 +29,7 @@ from typing import Any
 from .. import machine
 from ..errors import FullDiskError, InputError, bug
 from ..files import temporary_folder
-from . import render_client
+from . import served_renderer
 from .folder import Folder, Outputs
 from .job import Job
 from .one import Outcome, Work
@@ -54,10 +54,7 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
     The processes of this machine talk by TLS with credentials that exist in their memory alone, so that nobody else on it can
     have them run anything. Rejected: Unix sockets, which Dask does not have.
 
-    Raises
-    ------
-    InputError
-        if Dask is not installed, or the scheduler does not answer or has no workers.
+    Raises InputError if Dask is not installed, or the scheduler does not answer or has no workers.
     """
     distributed = _distributed()
     import dask
@@ -65,7 +62,7 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
     ways = {
         "distributed.comm.timeouts.connect": f"{_ANSWER_WITHIN if scheduler else _WORKERS_WITHIN} s",
         "distributed.nanny.pre-spawn-environ": {},  # it would be this process's, too, and for good
-        "distributed.scheduler.allowed-failures": 1,  # of a shot's workers, until it is tried alone
+        "distributed.scheduler.allowed-failures": 1,  # a shot's workers, until it is tried alone
         "distributed.scheduler.worker-ttl": f"{_WORKERS_WITHIN} s",  # a worker that is stopped says nothing
         "distributed.scheduler.http.routes": [],  # pages of ours that others on this machine could read
         "distributed.worker.http.routes": [],
@@ -88,7 +85,7 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
                 local_directory=str(scratch),
                 silence_logs=logging.CRITICAL,
                 preload=[_WORKER],
-                env={render_client.BLENDER: os.environ.get(render_client.BLENDER) or blender or ""},
+                env={served_renderer.BLENDER: os.environ.get(served_renderer.BLENDER) or blender or ""},
             )
             with _ending(local), _ending(distributed.Client(local, set_as_default=False)) as client:
                 yield Cluster(client, max(1, machine.cores() // count))

@@ -80,11 +80,8 @@ def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suf
 
     Returns a sentence: that it is written, or which shots are missing.
 
-    Raises
-    ------
-    InputError
-        if a camera is mirrored or a name holds a space, which these formats can't say, or if the files can't be written;
-        FullDiskError if the disk is full.
+    Raises InputError if a camera is mirrored or a name holds a space, which these formats can't say, or if the files can't be
+    written; FullDiskError if the disk is full.
     """
     finished = {shot.name: folder.finished(shot.name, settings[shot.name]) for shot in shots}
     records = {name: record for name, record in finished.items() if record is not None}

@@ -49,10 +49,7 @@ class Folder:
 
     part : "2-of-8" for a shard, which has a summary and a contact sheet of its own.
 
-    Raises
-    ------
-    InputError
-        if the folder can't be made.
+    Raises InputError if the folder can't be made.
     """
 
     def __init__(self, path: Path, part: str = "") -> None:
@@ -118,7 +115,7 @@ class Folder:
         """The sidecar of the shot, whatever it was made from; None where it is missing, or somebody else's."""
         try:
             record = json.loads(read_bytes(self.sidecar(name)).decode("utf-8"))
-            _compact(record).encode("utf-8")  # what is infinite, or no text, no summary could hold
+            _compact(record).encode("utf-8")  # no summary could hold an infinite number, or bytes that are no text
         except (OSError, ValueError, RecursionError):
             return None
         return record if _is_sidecar(record, name) else None
@@ -201,10 +198,7 @@ def _is_file_name(text: str) -> bool:
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
     """Write a document whole or not at all, a key a line, and of a list of objects an object a line.
 
-    Raises
-    ------
-    InputError
-        if it can't be written; FullDiskError if the disk is full.
+    Raises InputError if it can't be written; FullDiskError if the disk is full.
     """
     with written_whole(path) as temporary:
         temporary.write_text(_text(document), encoding="utf-8", newline="\n")
@@ -237,10 +231,7 @@ def settings_hash(job: Job, made_from: Mapping[str, object]) -> str:
     left out: they decide nothing of the picture. Rejected: Python's hash (another in each process), pickle (another in each
     version), and floats of so many digits, of which two may be one.
 
-    Raises
-    ------
-    TypeError
-        if there is anything else among them, which could not be told apart for certain.
+    Raises TypeError if there is anything else among them, which could not be told apart for certain.
     """
     settings = {key: value for key, value in job.to_json().items() if key not in _DECIDE_NOTHING}
     document = {"format": _FORMAT, "shot": settings, "made_from": made_from}

@@ -63,8 +63,6 @@ def _option(words: str, default: Any = None, **how: Any) -> Any:
 class Job:
     """One picture, to be rendered, labeled or checked; immutable and validated.
 
-    Parameters
-    ----------
     name : the name of its files, without a suffix; a job alone needs none.
     eye, look_at, up : three floats, world space;
     d : view-plane distance in pixels, > 0. All four, or `camera`.
@@ -99,10 +97,7 @@ class Job:
 
     None stands for what the .blend or the command line says.
 
-    Raises
-    ------
-    InputError
-        if a value is not one of these, or beyond Blender's limits.
+    Raises InputError if a value is not one of these, or beyond Blender's limits.
     """
 
     name: str = ""

@@ -396,7 +396,7 @@ _READERS = {
     ".jsonl": read_lines,
     ".ndjson": read_lines,
 }
-_OTHER_ENCODINGS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, codecs.BOM_UTF32_BE)  # that of UTF-32 LE begins as UTF-16 LE's
+_OTHER_ENCODINGS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, codecs.BOM_UTF32_BE)  # UTF-32 LE begins as UTF-16 LE does
 
 
 def read(path: str | os.PathLike[str], cameras: Collection[str] | None = None) -> list[Job]:
@@ -404,12 +404,8 @@ def read(path: str | os.PathLike[str], cameras: Collection[str] | None = None) -
 
     cameras : the names of the .blend's cameras, where they are known, so that a shot of another is a problem.
 
-    Raises
-    ------
-    ShotsError
-        if anything is wrong with any of them; it has all that is.
-    InputError
-        if the file can't be read, or its suffix is none of a list of shots.
+    Raises ShotsError if anything is wrong with any of them; it has all that is. Raises InputError if the file can't be read, or
+    its suffix is none of a list of shots.
     """
     path = Path(path)
     reader = _READERS.get(path.suffix.lower())

@@ -36,10 +36,7 @@ class Claims:
 
     One at a time for each folder in a process: locks of this kind are the process's, and end with the first to be closed.
 
-    Raises
-    ------
-    InputError
-        if the file of the locks can't be written, or, on Windows, another batch is at work in the folder.
+    Raises InputError if the file of the locks can't be written, or, on Windows, another batch is at work in the folder.
     """
 
     def __init__(self, path: Path) -> None:

@@ -44,10 +44,7 @@ def orbit(pinhole: Pinhole, count: int) -> Sequence[Job]:
     The shots have the pinhole's size, principal point and mirroring and, as d, its distance in pixel widths; pixel aspect stays
     the scene's.
 
-    Raises
-    ------
-    InputError
-        if the count is not from 1 to a million.
+    Raises InputError if the count is not from 1 to a million.
     """
     count = _count(checks.whole("orbit's number of shots", count))
     middle = (pinhole.width / 2, pinhole.height / 2)
@@ -71,10 +68,7 @@ def frames(text: str, camera: str | None = None) -> Sequence[Job]:
 
     camera : its name; the scene's own at each frame where None, which markers may bind.
 
-    Raises
-    ------
-    InputError
-        if the text is none, runs backwards or beyond Blender's frames, or has more than a million.
+    Raises InputError if the text is none, runs backwards or beyond Blender's frames, or has more than a million.
     """
     match = _RANGE.fullmatch(text.strip())
     if not match:
@@ -100,12 +94,8 @@ def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> l
 
     spaces : true to keep spaces in the shots' names; else each becomes an underscore.
 
-    Raises
-    ------
-    ShotsError
-        if such a camera's name can't be a file's, or two would be one file; it has all of them.
-    InputError
-        if no name fits.
+    Raises ShotsError if such a camera's name can't be a file's, or two would be one file; it has all of them. Raises InputError
+    if no name fits.
     """
     cameras = sorted(cameras)
     chosen = [name for name in cameras if fnmatch.fnmatchcase(name, pattern)]
@@ -134,10 +124,7 @@ def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Job]:
 
     Names that can't be a file's are made so: what may not stand in them is an underscore.
 
-    Raises
-    ------
-    ShotsError
-        if two would be one file, or a camera is beyond Blender's limits; it has all of them.
+    Raises ShotsError if two would be one file, or a camera is beyond Blender's limits; it has all of them.
     """
     problems = Problems("the cameras")
     files: dict[str, str] = {}

@@ -36,10 +36,7 @@ def check(place: str, name: str) -> None:
 
     place : the name's place, as the sentence calls it.
 
-    Raises
-    ------
-    InputError
-        that says why.
+    Raises InputError that says why.
     """
     if problem := _problem(name):
         raise InputError(f"{place} is {checks.quoted(name)}, which {problem}")

@@ -90,10 +90,8 @@ def render_one(shot: Job, folder: Folder, renderer: Renderer, settings: str, out
     outputs : the files that are wanted. A picture and labels that stand there and were made from the same settings stay: labels
         may come to a picture that was rendered before, and a picture to labels.
 
-    Raises
-    ------
-    InputError
-        if the shot can't be rendered, labeled or checked, or the files not be written; FullDiskError if the disk is full.
+    Raises InputError if the shot can't be rendered, labeled or checked, or the files not be written; FullDiskError if the disk
+    is full.
     """
     started = time.monotonic()
     image, preview, sidecar = folder.image(shot.name), folder.preview(shot.name), folder.sidecar(shot.name)

@@ -21,8 +21,6 @@ from .job import Job
 class Plan:
     """The plan by which the jobs of one file are carried out.
 
-    Parameters
-    ----------
     out : the folder for all files.
     outputs : the files that are made of each job.
     blend, trust : the file, see Job.
@@ -75,10 +73,7 @@ def write(path: Path, jobs: Sequence[Job], plan: Plan | None = None, files: Mapp
     plan : the plan of how the jobs are carried out. Without it there is one job, which is checked, with these files (Written)
         beside its result, for which `result_of` has the place.
 
-    Raises
-    ------
-    InputError
-        if it can't be written.
+    Raises InputError if it can't be written.
     """
     document = {"jobs": [job.to_json() for job in jobs], "plan": plan and plan.to_json(), "files": dict(files or {})}
     with written_whole(path) as temporary:
@@ -108,10 +103,7 @@ def shard(items: Sequence[Item], text: str) -> list[Item]:
 
     Neighbors go to different shards, since neighbors cost alike. A shard may be empty.
 
-    Raises
-    ------
-    InputError
-        if the text is none with 1 ≤ I ≤ N.
+    Raises InputError if the text is none with 1 ≤ I ≤ N.
     """
     match = _SHARD.fullmatch(text.strip())
     if not match or not 1 <= int(match[1]) <= int(match[2]):

@@ -45,10 +45,7 @@ def run(
     shot_failed(shot, error), or shot_elsewhere(shot); batch_finished(done, kept, elsewhere, failed, left, seconds,
     exit_status).
 
-    Raises
-    ------
-    InputError
-        if some of these shots are there already and neither is said, or if the folder can't be written.
+    Raises InputError if some of these shots are there already and neither is said, or if the folder can't be written.
     """
     folder.refuse_what_is_in_the_way([shot.name for shot in shots], outputs or Outputs())
     batch = _Batch(shots, folder, settings, events, outputs or Outputs(), interruption)

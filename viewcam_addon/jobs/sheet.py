@@ -88,10 +88,7 @@ def _part(record: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 def write(path: Path, pictures: Sequence[str], counts: Mapping[str, int]) -> None:
     """Write the page of these pictures. counts : Summary.counts.
 
-    Raises
-    ------
-    InputError
-        if it can't be written or there is no Jinja2; FullDiskError if the disk is full.
+    Raises InputError if it can't be written or there is no Jinja2; FullDiskError if the disk is full.
     """
     page = html_page.filled(
         "jobs/sheet.html",

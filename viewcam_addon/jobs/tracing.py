@@ -92,8 +92,6 @@ class Tracing(child_process.ServerOnDemand):
     ) -> dict[str, Any]:
         """The comparison of an engine's pictures with what the tracer makes of a scene.
 
-        Parameters
-        ----------
         scene : a scene file; the same path is the same scene, and is not read again.
         tests : the pictures of geometry, or of light with several seeds.
         job : level (none but the levels of film.py), samples, error, find, seed, threads.
@@ -114,10 +112,8 @@ class Tracing(child_process.ServerOnDemand):
         `undecided` has `expected` and `following` of light_verdict.Search; then a report's folder gets the pictures of all
         rounds.
 
-        Raises
-        ------
-        InputError
-            if scene or pictures can't be read or are not of the same size, there is no OpenEXR, or the process ended first.
+        Raises InputError if scene or pictures can't be read or are not of the same size, there is no OpenEXR, or the process
+        ended first.
         """
         request = {
             "scene": str(scene),
@@ -164,10 +160,7 @@ class Tracing(child_process.ServerOnDemand):
         lens : the lens that bends the picture, whose own view plane all cameras have.
         annotations : see `label` in labels/scene_labels.py.
 
-        Raises
-        ------
-        InputError
-            if scenes can't be read or labels not be written, there is no OpenEXR, or the process ended first.
+        Raises InputError if scenes can't be read or labels not be written, there is no OpenEXR, or the process ended first.
         """
         request = {"frames": dict(frames), "picture": str(picture), "kinds": list(kinds), "depth_steps": depth_steps}
         more = {"threads": threads, "lens": lens and lens.to_json(), "annotations": dict(annotations or {})}
@@ -176,10 +169,7 @@ class Tracing(child_process.ServerOnDemand):
     def distort(self, image: Path, preview: Path, calibration: Calibration, cut: ViewPlane) -> None:
         """Put a lens on a picture's two files, EXR and PNG. cut : the view plane of the pinhole that they show.
 
-        Raises
-        ------
-        InputError
-            if they can't be read or written, there is no OpenEXR, or the process ended first.
+        Raises InputError if they can't be read or written, there is no OpenEXR, or the process ended first.
         """
         files = {"image": str(image), "preview": str(preview)}
         self.ask({"distort": {**files, "calibration": calibration.to_json(), "cut": dataclasses.asdict(cut)}})
@@ -195,8 +185,6 @@ def compare_files(
 ) -> dict[str, Any]:
     """The comparison of EXRs of one camera, as `viewcam compare` makes it.
 
-    Parameters
-    ----------
     reference : the tracer's picture.
     tests : one, or several of different seeds.
     scene : the reference's scene file: explains silhouettes, brings the ledger.

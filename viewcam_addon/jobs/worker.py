@@ -15,7 +15,7 @@ from ..errors import FullDiskError, InputError, message_of
 from .folder import Folder, Outputs
 from .job import Job
 from .one import render_one
-from .render_client import ServedRenderer
+from .served_renderer import ServedRenderer
 
 
 class _Blender:

@@ -59,10 +59,7 @@ def write(
 
     Returns how many images, instances and objects there are, and how many of the images have a picture in rgb.
 
-    Raises
-    ------
-    InputError
-        if there are no label files, one lacks something or can't be read, or the folder can't be written.
+    Raises InputError if there are no label files, one lacks something or can't be read, or the folder can't be written.
     """
     progress(0.0)
     pictures, _ = read_pictures(folder)

@@ -111,10 +111,7 @@ def _keypoints(instance: Document, names: Sequence[str]) -> Document:
 def read_pictures(folder: Path) -> tuple[list[tuple[Path, Document]], dict[str, int]]:
     """The label files of a folder in the order of their names, and the categories, numbered from 1 in the order of theirs.
 
-    Raises
-    ------
-    InputError
-        if there is none, or one can't be read.
+    Raises InputError if there is none, or one can't be read.
     """
     paths = sorted(folder.glob("*.labels.json"))
     if not paths:

@@ -42,11 +42,8 @@ def write(folder: Path, output: Path, points: int = POINTS, overwrite: bool = Fa
 
     Returns how many images, points and observations there are.
 
-    Raises
-    ------
-    InputError
-        if there are no label files, one lacks something or can't be read, a camera or picture is none that COLMAP can name, or
-        the folder can't be written.
+    Raises InputError if there are no label files, one lacks something or can't be read, a camera or picture is none that COLMAP
+    can name, or the folder can't be written.
     """
     pictures, _ = read_pictures(folder)
 

@@ -57,10 +57,7 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
 
     Returns the files, the JSON last.
 
-    Raises
-    ------
-    InputError
-        if they can't be written.
+    Raises InputError if they can't be written.
     """
     if not is_replaced(path):
         raise InputError(f"{path} is no file beside which labels could stand: give the name of one")
@@ -98,10 +95,7 @@ def _content(ending: str, values: NDArray[np.float32], depth_steps: float) -> by
 def read(path: Path) -> dict[str, Any]:
     """The content of a label file, with the keys that docs/labels.md names.
 
-    Raises
-    ------
-    InputError
-        if it can't be read, or is no such file.
+    Raises InputError if it can't be read, or is no such file.
     """
     try:
         result = json.loads(read_bytes(path), parse_constant=_refused)
@@ -200,13 +194,7 @@ def camera(path: Path, document: dict[str, Any]) -> Camera:
 
 
 def photograph(path: Path, document: dict[str, Any]) -> Path | None:
-    """The PNG or JPEG of what a label file tells of, if one stands beside it.
-
-    Raises
-    ------
-    InputError
-        if it has another size.
-    """
+    """The PNG or JPEG of what a label file tells of, if one stands beside it. Raises InputError if it has another size."""
     candidates = (path.with_name(f"{name(path)}{suffix}") for suffix in (".png", ".jpg", ".jpeg"))
     for picture, size in ((each, image_size(each)) for each in candidates):
         if size == (document["camera"]["width"], document["camera"]["height"]):
@@ -224,10 +212,7 @@ def picture(path: Path, document: dict[str, Any]) -> str:
 def passes(path: Path, document: dict[str, Any], wanted: Sequence[str]) -> dict[str, NDArray[np.float32]]:
     """The passes of a label file's EXR that it has, of those wanted: (height, width, channels), rows from the **top**.
 
-    Raises
-    ------
-    InputError
-        if they can't be read, or are of another picture.
+    Raises InputError if they can't be read, or are of another picture.
     """
     chosen = [each for each in wanted if each in document.get("passes", ())]
     if not chosen:

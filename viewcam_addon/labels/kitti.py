@@ -45,10 +45,8 @@ def write(folder: Path, output: Path, overwrite: bool = False, words: stereo.Wor
 
     Returns how many pictures have which.
 
-    Raises
-    ------
-    InputError
-        if there are no label files, one has neither, or can't be read, the folder can't be written, or as `stereo.pairs` does.
+    Raises InputError if there are no label files, one has neither, or can't be read, the folder can't be written, or as
+    `stereo.pairs` does.
     """
     pictures, _ = read_pictures(folder)
     counts = {"depth": 0, "flow": 0}

@@ -104,6 +104,6 @@ def _described(
     rests = (height * width - ends[last]).tolist()
     rows = zip(owners[first].tolist(), areas, boxes, rests, first.tolist(), last.tolist(), strict=True)
     for owner, area, box, rest, begin, end in rows:
-        runs = counts[2 * begin : 2 * end + 2] + [rest] * (rest > 0)  # of zeros first: 0 where the first pixel is set
+        runs = counts[2 * begin : 2 * end + 2] + [rest] * (rest > 0)  # runs of zeros first: 0 where the first pixel is set
         result[owner] = {"area": area, "bbox": box, "segmentation": {"size": [height, width], "counts": runs}}
     return result

@@ -43,10 +43,7 @@ def motion(here: Surfaces, there: Surfaces) -> Motion:
     The point is the same of the same primitive: of a triangle by its barycentric coordinates, of a sphere by its direction from
     the center. So rigid bodies, deforming meshes and moving cameras are one formula, and no flow is interpolated or searched.
 
-    Raises
-    ------
-    InputError
-        if their sizes differ.
+    Raises InputError if their sizes differ.
     """
     if (here.camera.width, here.camera.height) != (there.camera.width, there.camera.height):
         raise InputError(

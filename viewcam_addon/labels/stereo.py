@@ -83,10 +83,8 @@ def pairs(folder: Path, words: Words = WORDS) -> Iterator[Pair]:
 
     words : two words: a left picture's name has the first one where the right picture's has the second; case does not count.
 
-    Raises
-    ------
-    InputError
-        if there is no pair, a picture has no partner, or a pair is not rectified, is mirrored, or goes through a lens.
+    Raises InputError if there is no pair, a picture has no partner, or a pair is not rectified, is mirrored, or goes through a
+    lens.
     """
     pictures, _ = read_pictures(folder)
     left, right = (word.casefold() for word in words)
@@ -162,10 +160,7 @@ def write(folder: Path, output: Path, overwrite: bool = False, words: Words = WO
 
     Returns how many pairs there are.
 
-    Raises
-    ------
-    InputError
-        as `pairs` does, or if the folder can't be written.
+    Raises InputError as `pairs` does, or if the folder can't be written.
     """
     count = 0
 

@@ -16,8 +16,7 @@ from ..errors import InputError
 from ..pinhole import Pinhole
 from ..tracer import render
 from ..tracer.native import CoreScene
-from ..tracer.scene import Mesh, Object, Scene, Spheres
-from ..tracer.scene.sameness import same_things
+from ..tracer.scene import Mesh, Object, Scene, Spheres, same_things
 from ..tracer.tiles import Passes, over_threads
 from .masks import Window
 

@@ -37,10 +37,8 @@ def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
 
     Returns how many pictures and points there are, and how often a picture shows one.
 
-    Raises
-    ------
-    InputError
-        if there are no label files, one lacks something or can't be read, is seen through a lens, or the file can't be written.
+    Raises InputError if there are no label files, one lacks something or can't be read, is seen through a lens, or the file
+    can't be written.
     """
     pictures, _ = read_pictures(folder)
     share = -(-points // len(pictures))

@@ -29,10 +29,8 @@ def write(folder: Path, output: Path, overwrite: bool = False) -> dict[str, int]
 
     Returns how many there are.
 
-    Raises
-    ------
-    InputError
-        if there are no label files, one has no masks, no picture or can't be read, or the folder can't be written.
+    Raises InputError if there are no label files, one has no masks, no picture or can't be read, or the folder can't be
+    written.
     """
     pictures, categories = read_pictures(folder)
     points = list(dict.fromkeys(name for names in keypoint_names(pictures).values() for name in names))

@@ -24,12 +24,11 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..image import GEOMETRY_PASSES, LIGHT_PASSES
 from ..pinhole import Pinhole
-from .scene import Mesh, Object, Scene, Spheres, fields, ies
+from .scene import Mesh, Object, Scene, Spheres, fields, ies, same_things
 from .scene.colors import TEXELS, WHITE
 from .scene.film import FILTERS
 from .scene.lamps import RAYS, Lamp, World
 from .scene.materials import PLAIN, Color, Material
-from .scene.sameness import same_things
 from .scene.shader_nodes import KINDS, Closure, Node
 from .scene.value_nodes import IES, OWN
 from .tiles import Passes
@@ -200,10 +199,7 @@ class _Core(Structure):
 def core(name: str | None = None) -> _Core:
     """The core for an instruction set, "v2", "v3", "v4" or "base"; the best that this processor runs if it is None.
 
-    Raises
-    ------
-    InputError
-        if there is none of that name, or none for this system.
+    Raises InputError if there is none of that name, or none for this system.
     """
     library = _library()
     library.viewcam_core.restype, library.viewcam_core.argtypes = POINTER(_Core), [c_char_p]
@@ -285,7 +281,7 @@ class CoreScene:
         self.handle = self.core.scene_create()
         if not self.handle:
             raise MemoryError
-        self._kept: list[NDArray] = []  # what the core reads in place
+        self._kept: list[NDArray] = []  # arrays that the core reads in place
         self._links = _Links.of(scene)
         self.origin = _origin(scene)
         numbers = {name: number for number, name in enumerate(scene.geometries)}

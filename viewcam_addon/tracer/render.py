@@ -371,12 +371,7 @@ def render(
     steps : the numbers of samples, ascending and the last of them `samples`, at which the watcher is shown the whole picture;
         none to show each band of rows once. The picture has the same bits either way. Not with an error.
 
-    Raises
-    ------
-    InputError
-        if there is no such level or error, or not enough memory.
-    Stopped
-        when the watcher says so.
+    Raises InputError if there is no such level or error, or not enough memory. Raises Stopped when the watcher says so.
     """
     if level not in LEVELS:
         raise InputError(f"the level is {level!r}: give one of {', '.join(LEVELS)}")

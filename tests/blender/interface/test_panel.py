@@ -373,7 +373,7 @@ def test_in_the_narrowest_sidebar_no_name_stands_beside_its_field(posed_camera, 
     fields = [[each[1] for each in widgets if each[0].startswith("prop")] for widgets in (wide, narrow)]
     assert sorted(fields[0]) == sorted(fields[1]), "a field is missing"
     assert ("label", "Roll") in [each[:2] for each in wide]
-    lacking = {"ENUM", "POINTER", "STRING"}  # what has no room for its name inside
+    lacking = {"ENUM", "POINTER", "STRING"}  # without room for a name inside
     for before, (kind, name, look, layout, _) in itertools.pairwise(narrow):
         if not kind.startswith("prop") or name == "name":
             continue

@@ -152,7 +152,7 @@ def test_the_four_values_are_the_camera_to_float32(stage, shoot):
     assert (pinhole.width, pinhole.height) == (32, 18)
     assert pinhole.eye == pytest.approx(stated.eye, abs=4 * 2**-24)  # coordinates below 8, each rounded to float32 once
     for actual, expected in zip(pinhole.basis(), stated.basis(), strict=True):
-        assert actual == pytest.approx(expected, abs=1.6e-7)  # of a matrix entry: blender/camera.py
+        assert actual == pytest.approx(expected, abs=1.6e-7)  # a matrix entry's rounding: blender/camera.py
     assert pinhole.distance == pytest.approx(stated.distance, rel=2**-22)  # lens, sensor and their quotient in float32
     json.dumps(record, allow_nan=False)
 

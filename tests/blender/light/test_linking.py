@@ -1,4 +1,7 @@
-"""Light and shadow linking: what Blender's collections mean, and that Cycles shows the same, without noise."""
+"""Light and shadow linking: what Blender's collections mean, and that Cycles shows the same.
+
+Lamps without noise; surfaces that shine in mirrors and from afar without it, and near by within it.
+"""
 
 from dataclasses import replace
 
@@ -8,6 +11,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.blender.scenes import linking
+from viewcam_addon.comparison import radiance
+from viewcam_addon.image import Image
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.render import render
 
@@ -79,7 +85,7 @@ def test_cycles_shows_the_same_of_linked_lights(pictures, add_lamp, link, what, 
             replace(each.exported, lamps=(replace(exported, receivers=None, blockers=None),)), "direct", 1, threads=2
         )
         differs += (np.abs(plain["Combined"][..., :3] - cycles) > 1e-3 * cycles.max()).mean() > 0.01
-    assert differs >= 2  # what is linked is seen: without, it is found
+    assert differs >= 2  # linking is seen: without it, the difference is found
 
 
 def test_a_light_that_is_linked_to_instances_is_named(lamp, link, scene):
@@ -90,3 +96,173 @@ def test_a_light_that_is_linked_to_instances_is_named(lamp, link, scene):
     assert "Lamp" not in linked()[2]
     link(lamp, receiver_collection={"Monkey": "INCLUDE"})
     assert "linked to instances" in linked()[2]["Lamp"]
+
+
+EVERYTHING = {"Monkey", "Floor", "Panel"}
+LOSES = "Cycles would lose light"
+
+
+@pytest.fixture
+def panel(add, mesh_from, painted):
+    """panel(size, height, strength) → a square that shines, above the stage."""
+
+    def make(size, height, strength):
+        block = add(mesh_from("plane", size=size), "Panel", (0.0, 0.0, height))
+        block.data.materials.append(painted("ShaderNodeEmission", {"Color": (1.0, 0.8, 0.6, 1), "Strength": strength}))
+        return block
+
+    return make
+
+
+def unlinked(exported):
+    return replace(exported, objects=tuple(replace(placed, receivers=None, blockers=None) for placed in exported.objects))
+
+
+def links_of(exported):
+    return next((placed.receivers, placed.blockers) for placed in exported.objects if placed.name == "Panel")
+
+
+def reasons(exported):
+    return {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
+
+
+def off(exported, traced, cycles):
+    """The part of pixels lit on one side only, and the median and the 99th percentile of the relative error of all others."""
+    traced_values, cycles_values = (passes["Combined"][..., :3].astype(np.float64) for passes in (traced, cycles))
+    lit = (traced_values > 0) & (cycles_values > 0)
+    error = np.abs(traced_values - cycles_values)[lit] / cycles_values[lit]
+    return ((traced_values > 0) != (cycles_values > 0)).mean(), *(
+        np.percentile(error, [50, 99]) if lit.any() else (np.inf, np.inf)
+    )
+
+
+LINKS = [
+    {"receiver_collection": {"Monkey": "INCLUDE"}},
+    {"receiver_collection": {"Monkey": "EXCLUDE"}},
+    {"blocker_collection": {"Monkey": "EXCLUDE"}},
+    {"blocker_collection": {"Floor": "INCLUDE"}},
+    {"receiver_collection": {"Floor": "INCLUDE"}, "blocker_collection": {"Floor": "EXCLUDE"}},
+]
+
+
+@pytest.mark.parametrize("links", LINKS)
+@pytest.mark.parametrize("mirrors", [True, False], ids=["mirrors", "matte"])
+def test_cycles_shows_the_same_of_linked_surfaces(pictures, panel, painted, link, links, mirrors):
+    """In mirrors rays find all of the light, and on what is matte samples of a square so far away that it is a point."""
+    block = panel(60, 6, 5.0) if mirrors else panel(0.02, 50, 1e8)
+    link(block, **links)
+    for name in ("Monkey", "Floor") if mirrors else ():
+        bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": 0.0})
+    # A matte surface sees another point of the square than in the tracer: an angle of 0.02/50 off, at slopes up to a thousand.
+    most, p50, p99 = (1e-3, 1e-6, 2e-5) if mirrors else (1e-3, 0.02 / 50, 0.02)
+    differs = 0
+    for sides in pictures(scenes=3):
+        assert bool(reasons(sides.exported)) == ("INCLUDE" in links.get("blocker_collection", {}).values())
+        hits = off(sides.exported, sides.traced, sides.cycles[0])
+        assert (np.array(hits) <= (most, p50, p99)).all(), hits
+        plain = render(unlinked(sides.exported), "direct", 1, threads=2)
+        differs += any(np.array(off(sides.exported, plain, sides.cycles[0])) > (10 * most, p50, p99))
+    assert differs >= 2  # linking is seen: without it, the difference is found
+
+
+def test_of_a_collection_that_includes_blockers_cycles_loses_light_behind_all_others(
+    pictures, panel, painted, link, monkeypatch
+):
+    """So it is told, and given a collection that excludes all others; without that, it would be found."""
+    monkeypatch.setattr(linking, "_exclude", lambda *_: None)
+    link(panel(60, 6, 5.0), blocker_collection={"Floor": "INCLUDE"})
+    for name in ("Monkey", "Floor"):
+        bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": 0.0})
+    (sides,) = pictures(scenes=1)
+    assert LOSES in reasons(sides.exported)["Panel"]
+    assert off(sides.exported, sides.traced, sides.cycles[0])[0] > 0.01
+
+
+@pytest.mark.parametrize(
+    ("links", "loses"),
+    [({"Floor": "EXCLUDE"}, True), ({"Floor": "INCLUDE", "Monkey": "INCLUDE"}, True), ({"Monkey": "EXCLUDE"}, False)],
+)
+def test_what_is_hidden_from_shadow_rays_stands_in_no_light_that_has_blockers(pictures, panel, painted, link, links, loses):
+    bpy.data.objects["Monkey"].visible_shadow = False
+    block = panel(60, 6, 5.0)
+    link(block, blocker_collection=links)
+    for name in ("Monkey", "Floor"):
+        bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": 0.0})
+    (sides,) = pictures(scenes=1)
+    assert bool(reasons(sides.exported)) == loses
+    assert [block.light_linking.blocker_collection] == list(bpy.data.collections)  # Cycles' own collections are gone
+    assert (np.array(off(sides.exported, sides.traced, sides.cycles[0])) <= (1e-3, 1e-6, 2e-5)).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("links", LINKS[1:4])
+def test_near_by_samples_of_light_and_scattered_rays_make_the_same_as_in_cycles(
+    pictures, panel, painted, add, mesh_from, link, links
+):
+    """A square close over a rough Suzanne and a matte floor, a pane between, with bounces."""
+    link(panel(3, 2.5, 5.0), **links)
+    bpy.data.objects["Monkey"].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": 0.3})
+    add(mesh_from("plane", size=2), "Pane", (0.3, -0.6, 1.9)).data.materials.append(
+        painted("ShaderNodeBsdfTransparent", {"Color": (0.7, 0.5, 0.9, 1)})
+    )
+    (sides,) = pictures(samples=64, count=4, scenes=1, level="path")
+    reference = Image(sides.traced, sides.exported.camera, {"samples": "256", "albedo tables": "yes"})
+    tests = [Image(passes, sides.exported.camera) for passes in sides.cycles]
+    comparison = radiance.compare(reference, tests, sides.exported.camera, 64)
+    assert comparison.passed, comparison.sentence
+    wrong = replace(reference, passes=render(unlinked(sides.exported), "path", 256, threads=2))
+    assert not radiance.compare(wrong, tests, sides.exported.camera, 64).passed, "and without links, it would differ"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["SUN", "POINT", "AREA"])
+def test_scattered_rays_find_a_lamp_past_what_is_no_blocker_as_in_cycles(pictures, painted, add_lamp, link, kind):
+    size = {"SUN": {"angle": 0.5}, "AREA": {"size": 1.0}}.get(kind, {"shadow_soft_size": 0.5})
+    lamp = add_lamp(kind, (0, 3, 3), (-0.8, 0, 0), energy=3.0 if kind == "SUN" else 500.0, **size)
+    for name, roughness in (("Monkey", 0.3), ("Floor", 0.0)):
+        bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": roughness})
+    link(lamp, blocker_collection={"Monkey": "EXCLUDE"})
+    (sides,) = pictures(samples=64, count=4, scenes=1, level="path")
+    reference = Image(sides.traced, sides.exported.camera, {"samples": "256", "albedo tables": "yes"})
+    tests = [Image(passes, sides.exported.camera) for passes in sides.cycles]
+    comparison = radiance.compare(reference, tests, sides.exported.camera, 64)
+    assert comparison.passed and not reasons(sides.exported), comparison.sentence
+    other = replace(sides.exported, lamps=tuple(replace(each, blockers=None) for each in sides.exported.lamps))
+    wrong = replace(reference, passes=render(other, "path", 256, threads=2))
+    assert not radiance.compare(wrong, tests, sides.exported.camera, 64).passed
+
+
+def test_only_surfaces_that_shine_are_linked(stage, panel, link):
+    stage(np.random.default_rng(0))
+    link(panel(3, 3, 5.0), receiver_collection={"Monkey": "INCLUDE"}, blocker_collection={"Floor": "EXCLUDE"})
+    link(bpy.data.objects["Floor"], receiver_collection={"Monkey": "EXCLUDE"})
+    exported = jobs.export(Job(level="direct"))
+    assert links_of(exported) == ({"Monkey"}, {"Monkey", "Panel"}) and not reasons(exported)
+    assert unlinked(exported).objects[1:] != exported.objects[1:]
+    assert [placed.receivers for placed in exported.objects if placed.name != "Panel"] == [None, None]
+    geometry = jobs.export(Job(level="geometry"))
+    assert links_of(geometry) == (None, None) and not reasons(geometry)
+
+
+def test_an_instance_shines_for_what_its_object_shines(pictures, panel, painted, scene, link):
+    """And not for what its Empty is linked to."""
+    block = panel(60, 6, 5.0)
+    bpy.data.collections.new("Placed").objects.link(block)
+    scene.collection.objects.unlink(block)
+    empty = bpy.data.objects.new("Instance", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", bpy.data.collections["Placed"]
+    scene.collection.objects.link(empty)
+    link(block, receiver_collection={"Monkey": "EXCLUDE"})
+    link(empty, receiver_collection={"Floor": "EXCLUDE"})
+    for name in ("Monkey", "Floor"):
+        bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": 0.0})
+    (sides,) = pictures(scenes=1)
+    assert links_of(sides.exported) == ({"Floor", "Panel"}, None)
+    assert (np.array(off(sides.exported, sides.traced, sides.cycles[0])) <= (1e-3, 1e-6, 2e-5)).all()
+
+
+def test_a_recentered_scene_has_no_links_and_they_are_told(stage, panel, link):
+    stage(np.random.default_rng(0))
+    link(panel(3, 3, 5.0), receiver_collection={"Monkey": "INCLUDE"})
+    exported = jobs.export(Job(level="direct", recenter=True))
+    assert links_of(exported) == (None, None) and reasons(exported)["Panel"] == "light linking is off on both sides"

@@ -15,7 +15,7 @@ from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
 
-FLOAT32 = 1e-6  # of the light: colors are multiplied in float32, as often as there are panes, and cosines rounded
+FLOAT32 = 1e-6  # relative: colors are multiplied in float32, as often as there are panes, and cosines rounded
 MOST = 4.0  # standard errors
 PANES = 4
 TINT = (0.9, 0.8, 0.6, 1)

@@ -22,7 +22,7 @@ from viewcam_addon.tracer.scene.shader_nodes import KINDS
 MOST, TYPICAL = 2e-5, 2e-6  # calibrated: float32 of UV up to 2, at images of 4 pixels, and 4.2 has another luminance by 1e-5
 BYTES = 10 if bpy.app.version >= (5, 2) else 1  # calibrated: from 5.1 on Cycles has corners' colors of bytes in half floats
 GLOW = 25 if bpy.app.version >= (5, 2) else 1  # calibrated: Cycles' red of 5.2 is another by up to 1e-4 than that of 4.2 to 5.0
-JUMPS = 0.04  # of the pixels
+JUMPS = 0.04  # share of the pixels
 PARTS = 3  # in which the nodes are shown, so that each has pixels enough
 
 

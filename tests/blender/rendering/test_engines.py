@@ -541,7 +541,7 @@ def test_a_file_cut_short_is_not(picture):
 def test_a_chunk_that_was_never_written_is_missed(picture):
     """OpenEXR leaves such a chunk behind on a full disk: its offset in the table is 0."""
     content = bytearray(picture.read_bytes())
-    chunks = read(picture).size[1]  # of one row each, as RLE has them
+    chunks = read(picture).size[1]  # one row each, as RLE has them
     # The table ends where the first chunk begins, and its first entry says so.
     table = next(at for at in range(len(content)) if int.from_bytes(content[at : at + 8], "little") == at + 8 * chunks)
     content[table : table + 8] = bytes(8)

@@ -247,7 +247,7 @@ def test_excluded_hidden_and_indirect_collections(add, scene, both_sides, mesh_f
         add(cube, name, location=(i - 2, 0, 0), collection=collection)
         layers[name] = bpy.context.view_layer.layer_collection.children[name]
     layers["Excluded"].exclude = True
-    layers["Hidden"].hide_viewport = True  # of the window only
+    layers["Hidden"].hide_viewport = True  # in the window only
     bpy.data.collections["Disabled"].hide_render = True
     layers["Indirect"].indirect_only = True
     sides = both_sides()

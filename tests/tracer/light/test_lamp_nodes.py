@@ -23,7 +23,7 @@ SQUARED = node("math", operation="multiply", a=WAY, b=WAY)
 # A picture is a mean of float64, rounded once.
 EXACT = 4 * 2.0**-24
 
-CANDELA = 1 / 0.0706650768394  # of 1 W of a lamp: 177.83 / 4π
+CANDELA = 1 / 0.0706650768394  # candela of a lamp's watt: 177.83 / 4π
 
 
 def ies_text(across, up, values, kind=1, factor=1.0):
@@ -146,7 +146,7 @@ def test_a_panel_that_is_half_dark_is_half_a_panel(make_mesh, make_lit):
     rendered = render(make_lit(DOWN, floor, lamps=(panel,)), "direct", 256, threads=1)
     error = np.sqrt(rendered["Variance"][..., :3].astype(np.float64).sum()) / rendered["Variance"][..., :3].size
     assert error < 0.002 * expected
-    assert abs(rendered["Combined"][..., :3].mean() - expected) < 4 * error  # of both sides, of which the other has less
+    assert abs(rendered["Combined"][..., :3].mean() - expected) < 4 * error  # both sides' error, of which the other has less
 
 
 def test_a_panel_shows_what_lights(make_mesh, make_lit):

@@ -285,7 +285,7 @@ WALLS = {
 }
 BACK, CEILING = list(WALLS).index("back"), list(WALLS).index("ceiling")
 RADIANCE = 10.0
-HALF = 0.25  # of the square lamp, in the middle of the ceiling
+HALF = 0.25  # half the square lamp, in the middle of the ceiling
 # Looks at the back wall, which fills the picture: a pixel is an equal part of it.
 CAMERA = Pinhole((0, -0.5, 0), (0, 1, 0), (0, 0, 1), 18, 24, 24)
 

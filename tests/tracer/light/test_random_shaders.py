@@ -110,7 +110,7 @@ def test_a_picture_of_any_shaders_is_finite(random_squares, seed):
         scene = random_squares(each)
         for level in ("direct", "path"):
             passes = render(scene, level, 4, each)
-            for name in passes.keys() - {"Depth", "Variance"}:  # of nothing, and of squares that are beyond float32
+            for name in passes.keys() - {"Depth", "Variance"}:  # the depth of nothing, and squares beyond float32
                 assert np.isfinite(passes[name]).all(), f"seed {each}, {level}, {name}"
 
 

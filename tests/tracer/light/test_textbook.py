@@ -111,7 +111,7 @@ def traced(make_lit, make_mesh):
 def off_by(actual, expected):
     """Standard errors between two pictures: (height, width, 3), and of their means."""
     (mean, variance), (other_mean, other_variance) = actual, expected
-    rounding = 2.0**-23 * np.abs(other_mean)  # of pixels without noise
+    rounding = 2.0**-23 * np.abs(other_mean)  # pixels without noise differ by rounding
     apart, error = mean - other_mean, np.sqrt(variance + other_variance + rounding**2)
     return apart / error, apart.sum() / np.sqrt((error**2).sum())
 

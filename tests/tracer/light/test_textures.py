@@ -18,7 +18,7 @@ from viewcam_addon.tracer.scene.materials import PLAIN_COLOR, Color, Picture, su
 CAMERA = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 10, 8, 8)
 SEEDS = st.integers(0, 2**32 - 1)
 COUNTS = st.integers(1, 9)
-BLENDED = 4e-7  # of pixels up to 3: some roundings of float32
+BLENDED = 4e-7  # some roundings of float32, in pixels up to 3
 RED, GREEN = Color((0.8, 0.0, 0.0)), Color((0.0, 0.5, 0.0))
 
 

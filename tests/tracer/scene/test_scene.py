@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
+from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres, least_level
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import RAYS, Area, Point, Spot, Sun, World
-from viewcam_addon.tracer.scene.levels import least_level
 from viewcam_addon.tracer.scene.materials import Color, simplified, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import node
 

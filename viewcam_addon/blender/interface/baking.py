@@ -83,10 +83,7 @@ def bake(
     The scene is at its frame again afterwards. As with Blender's own Bake Action, animated values that were edited and not
     keyed are as the animation has them then.
 
-    Raises
-    ------
-    InputError
-        if a camera can't be baked, or its values make no camera somewhere in the range. Nothing has changed then.
+    Raises InputError if a camera can't be baked, or its values make no camera somewhere in the range. Nothing has changed then.
     """
     if last < first:
         raise InputError(f"the last frame {last} is before the first frame {first}: give the range in its order")

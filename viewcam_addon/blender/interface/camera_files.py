@@ -132,10 +132,7 @@ def read(
 
     distance : the view plane's distance in pixels, where the file says none; 0 for that of the scene's camera.
 
-    Raises
-    ------
-    InputError
-        as `cameras.read` does.
+    Raises InputError as `cameras.read` does.
     """
     frame, notes, plane = datablocks.frame_of(scene), [], None
     width, height = size = (frame.resolution_x, frame.resolution_y)

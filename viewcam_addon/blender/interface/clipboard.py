@@ -148,7 +148,7 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
         for i, line in enumerate(lines):
             layout.label(text=line, icon="BLANK1" if i else "QUESTION", translate=False)
         layout.use_property_split = True
-        names = ("set_size", *READING)
+        names: tuple[str, ...] = ("set_size", *READING)
         if self.question and self.asked:
             layout.prop(self, self.asked)
             layout.separator()
@@ -225,10 +225,7 @@ class VIEWCAM_OT_copy_readout(bpy.types.Operator):
 def camera_of(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> formats.Camera:
     """A camera in the picture at 100 %; where its values are not in use, those that `adopt` would state.
 
-    Raises
-    ------
-    InputError
-        if the values make no camera, or the object is no pinhole.
+    Raises InputError if the values make no camera, or the object is no pinhole.
     """
     frame = datablocks.frame_of(scene)
     stated = cameras.stated(camera_object, scene)
@@ -244,13 +241,7 @@ def camera_of(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> format
 def text_of(
     camera_object: bpy.types.Object, scene: bpy.types.Scene, format: str = OWN, options: formats.Options | None = None
 ) -> str:
-    """A camera as a program's text.
-
-    Raises
-    ------
-    InputError
-        as `camera_of` does, or if the format can't say what the camera is.
-    """
+    """A camera as a program's text. Raises InputError as `camera_of` does, or if the format can't say what the camera is."""
     text = formats.write([camera_of(camera_object, scene)], format, options)
     assert isinstance(text, str)  # the formats of the clipboard are no folders
     return text
@@ -263,10 +254,7 @@ def paste(
 
     Returns what a reader should know, one sentence each.
 
-    Raises
-    ------
-    InputError
-        as `apply` does. Nothing has changed then.
+    Raises InputError as `apply` does. Nothing has changed then.
     """
     frame = datablocks.frame_of(scene)
     if camera.pinhole.plane == picture.at_full_size(present, frame).plane:  # the text says none

@@ -112,10 +112,8 @@ class RunningComparison:
     keep_in : a folder that gets one for each report, named by file, camera, frame and time; by default the report is gone with
         Blender.
 
-    Raises
-    ------
-    InputError
-        if the camera is no pinhole or not in the scene, if the copy can't be written, or the child not be started.
+    Raises InputError if the camera is no pinhole or not in the scene, if the copy can't be written, or the child not be
+    started.
     """
 
     def __init__(
@@ -259,10 +257,7 @@ def _file_name() -> str:
 def save_copy(path: Path) -> None:
     """Save the file as it stands, unsaved edits included, and leave what is open as it is: name, unsaved state, paths, history.
 
-    Raises
-    ------
-    InputError
-        if Blender can't write it.
+    Raises InputError if Blender can't write it.
     """
     try:
         # Blender saves the artist's file the next time as it saved last.
@@ -369,10 +364,7 @@ def start(
     log : the file for all that it prints, its events among it; all else that it needs for a while lies beside this file.
     plan, files : see plan.write.
 
-    Raises
-    ------
-    OSError
-        if it can't be started; InputError if what it is to do can't be written.
+    Raises OSError if it can't be started; InputError if what it is to do can't be written.
     """
     if not bpy.app.binary_path:  # a module of Python, which opens the copy itself
         jobs = [dataclasses.replace(job, blend=str(copy)) for job in jobs]

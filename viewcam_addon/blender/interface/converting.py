@@ -19,7 +19,7 @@ from .. import causes, datablocks, findings, pose, preferences, storage, targets
 from . import baking
 from .operators import CameraOperator
 
-_LEAST_SINE = 0.1  # of the angle between view and up, below which the rounding of the look-at point rolls the picture visibly
+_LEAST_SINE = 0.1  # the angle between view and up: below, the look-at point's rounding rolls the picture visibly
 
 
 def convert_keyframes(camera_object: bpy.types.Object, scene: bpy.types.Scene, first: int, last: int) -> str:
@@ -28,11 +28,8 @@ def convert_keyframes(camera_object: bpy.types.Object, scene: bpy.types.Scene, f
     Where motion blur is on, a frame before and one behind are keyed too. The scene is at its frame again afterwards.
     Returns one sentence: what was done, and by how much the camera differs from what it was.
 
-    Raises
-    ------
-    InputError
-        if the camera has no keyframes of its own, if something else than these has a say, or if it is no pinhole at some
-        frame. Nothing has changed then.
+    Raises InputError if the camera has no keyframes of its own, if something else than these has a say, or if it is no pinhole
+    at some frame. Nothing has changed then.
     """
     keyed = _check_keyed(camera_object)
     if last < first:
@@ -152,10 +149,8 @@ def track_to_of(camera_object: bpy.types.Object) -> bpy.types.Constraint | None:
 def convert_track_to(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
     """Let the values look at what a Track To looks at, and remove it. What else places the camera stays.
 
-    Raises
-    ------
-    InputError
-        if there is none, or if it turns the camera otherwise than a look-at point and an upright picture. Nothing has changed.
+    Raises InputError if there is none, or if it turns the camera otherwise than a look-at point and an upright picture. Nothing
+    has changed.
     """
     track = track_to_of(camera_object)
     if track is None:

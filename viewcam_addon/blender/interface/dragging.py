@@ -20,7 +20,7 @@ from . import kept
 ORBIT, DOLLY, DOLLY_ZOOM, TRUCK = "ORBIT", "DOLLY", "DOLLY_ZOOM", "TRUCK"
 NAMES = {ORBIT: "Orbit", DOLLY: "Dolly", DOLLY_ZOOM: "Dolly Zoom", TRUCK: "Truck"}
 _TURN = math.radians(0.5)  # for a pixel of the mouse, as a viewport's turntable
-_CLOSER = 0.005  # of the distance to the look-at point, for a pixel
+_CLOSER = 0.005  # share of the distance to the look-at point, for a pixel
 _PRECISE = 0.1
 
 
@@ -30,10 +30,7 @@ def moved(pinhole: Pinhole, kind: str, amount: tuple[float, float]) -> Pinhole:
     amount : radians around and upwards for an orbit, world units to the right and upwards for a truck, else world units away
         from the look-at point, of which the first counts. A dolly zoom keeps the picture's size at the look-at point.
 
-    Raises
-    ------
-    InputError
-        if the eye would reach the look-at point, or a number is not finite.
+    Raises InputError if the eye would reach the look-at point, or a number is not finite.
     """
     if kind == ORBIT:
         return moves.orbited(pinhole, -amount[0] if pinhole.mirrored else amount[0], amount[1])
@@ -56,10 +53,7 @@ class Drag:
     text : the typed characters, which count instead of the mouse where they are a number; degrees for an orbit.
     findings : the last findings of `camera.apply`.
 
-    Raises
-    ------
-    InputError
-        if the camera is none, or what it follows would have to be given up.
+    Raises InputError if the camera is none, or what it follows would have to be given up.
     """
 
     def __init__(self, camera_object: bpy.types.Object, scene: bpy.types.Scene, kind: str) -> None:
@@ -101,7 +95,7 @@ class Drag:
 
     def _by_mouse(self) -> tuple[float, float]:
         x, y = self._mouse
-        if self._kind == ORBIT:  # what is under the mouse goes with it
+        if self._kind == ORBIT:  # the thing under the mouse goes with it
             return -_TURN * x, -_TURN * y
         reach = math.dist(self.start.eye, self.start.look_at)
         if self._kind == TRUCK:

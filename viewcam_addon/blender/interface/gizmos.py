@@ -47,7 +47,7 @@ class _Drag:
     camera_name: str
     name: str
     start: Triple  # as Blender has it, rounded to float32
-    length: float  # of up
+    length: float  # up's
     before: dict[str, object]  # `_state`
     window: bpy.types.Window
 
@@ -169,7 +169,7 @@ class VIEWCAM_GGT_handles(bpy.types.GizmoGroup):
             handle.draw_style = "CROSS_2D" if name == "look_at" else "RING_2D"
             handle.draw_options = {"ALIGN_VIEW", "FILL_SELECT"}
             handle.use_tooltip = handle.use_draw_modal = True
-            if is_halo:  # what the mouse takes keeps its width, or it would take what lies behind
+            if is_halo:  # the mouse's target keeps its width, or it would take the things behind
                 handle.hide_select, handle.line_width = True, _HALO_WIDTH
             handle.select_bias = _PRIORITY[name]
 

@@ -18,8 +18,7 @@ from ...jobs.names import made_fit
 from ...labels import DEPTH_STEPS, KINDS, PASSES, endings
 from .. import datablocks
 from . import panel_rows
-from .background import Background, Cancels, StartsForCamera
-from .background_batch import BackgroundBatch, shot
+from .background import Background, BackgroundBatch, Cancels, StartsForCamera, shot
 from .panel_rows import BelowProperties, BelowSidebar, SubPanel
 
 _SUMMARY = "summary.json"

@@ -29,11 +29,11 @@ from .panel_rows import BelowProperties, BelowSidebar, SubPanel
 
 _NAMES = ("u", "v", "w")
 _LETTER_SIZE = 16  # points
-_LETTER_AT = 1.1  # of the axis, beyond its tip
-_BESIDE = 1.2  # of a letter's size, from the eye or the look-at point to its letter
-_FAINT = 0.35  # of a line's opacity, for the grid
+_LETTER_AT = 1.1  # in lengths of the axis, beyond its tip
+_BESIDE = 1.2  # in a letter's size, from the eye or the look-at point to its letter
+_FAINT = 0.35  # share of a line's opacity, for the grid
 HALO, _HALO_WIDTH = (0.0, 0.0, 0.0, 0.45), 2.5  # its color, and by how many pixels it is wider than its line
-_OUTLINE = 6  # what blf.shadow calls so
+_OUTLINE = 6  # blf.shadow's number for it
 _MARK = (4.0, 9.0)  # pixels from the look-at point at which each of the mark's four strokes begins and ends
 
 _handlers: list[object] = []

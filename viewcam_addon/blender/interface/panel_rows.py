@@ -47,7 +47,7 @@ class BelowSidebar(InSidebar):
 
 
 _NARROW = 250  # pixels
-_LABEL = 0.4  # of a row, as Blender splits it
+_LABEL = 0.4  # share of a row, as Blender splits it
 _BESIDE_TEXT = 60  # pixels, of what stands left and right of a sentence
 
 

@@ -42,7 +42,7 @@ _HELP = {
 
 Place = tuple[float, float]  # in the picture, pixels
 
-_drawn = None  # what the viewport shows of the match that goes on
+_drawn = None  # shown by the viewport while a match goes on
 
 
 @dataclass
@@ -318,10 +318,7 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
 def begun(camera_object: bpy.types.Object | None, context: bpy.types.Context) -> Drawing:
     """A drawing on the picture of a camera, as the settings say.
 
-    Raises
-    ------
-    InputError
-        if there is no such camera, or its values can't be set, or its pixels are not square.
+    Raises InputError if there is no such camera, or its values can't be set, or its pixels are not square.
     """
     scene, settings = context.scene, context.window_manager.virtual_pinhole_match
     if camera_object is None:

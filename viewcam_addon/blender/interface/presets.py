@@ -51,7 +51,7 @@ class VIEWCAM_PT_presets(PresetPanel, bpy.types.Panel):
         for name in SHIPPED:
             column.operator(VIEWCAM_OT_execute_preset.bl_idname, text=name).shipped = name
         self.path_menu(
-            iter(bpy.utils.preset_paths(FOLDER)),  # of a list of none Blender would say that paths are missing
+            iter(bpy.utils.preset_paths(FOLDER)),  # with a list of none Blender would say that paths are missing
             VIEWCAM_OT_execute_preset.bl_idname,
             filter_ext=lambda suffix: suffix == ".py",
             add_operator=VIEWCAM_OT_add_preset.bl_idname,

@@ -16,8 +16,7 @@ from ...jobs.job import Job
 from ...jobs.names import made_fit, one_file
 from .. import own_picture
 from . import scene_cameras
-from .background import Background, Cancels
-from .background_batch import BackgroundBatch, shot
+from .background import Background, BackgroundBatch, Cancels, shot
 
 _SHEET = "contact-sheet.html"
 
@@ -45,19 +44,16 @@ background = Background(0.5, _looked)
 def shots(scene: bpy.types.Scene, animation: bool) -> list[Job]:
     """The list of shots: each camera that is rendered, in its own picture; of an animation each frame of its range.
 
-    Raises
-    ------
-    InputError
-        if there is none, or one has pixels of another shape than the scene, which a batch can't give it.
+    Raises InputError if there is none, or one has pixels of another shape than the scene, which a batch can't give it.
     """
-    rows, taken = [], set()
+    rows, names = [], set()
     for camera_object in scene_cameras.of_scene(scene):
         if camera_object.hide_render:
             continue
         name = made_fit(camera_object.name)
-        while one_file(name) in taken:
+        while one_file(name) in names:
             name += "_"
-        taken.add(one_file(name))
+        names.add(one_file(name))
         picture = own_picture.of_camera(camera_object, scene)
         frames = range(int(picture["frame_start"]), int(picture["frame_end"]) + 1) if animation else (scene.frame_current,)
         rows += [shot(camera_object, scene, f"{name}_{frame:04d}" if animation else name, frame) for frame in frames]

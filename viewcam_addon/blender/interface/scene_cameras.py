@@ -18,7 +18,7 @@ from .panel_rows import BelowProperties, BelowSidebar, SubPanel
 
 _NAME = "Virtual Pinhole"
 _FROM = (7.0, -7.0, 5.0)  # a new camera's eye, from the point that it looks at
-_ROWS = 3  # of the list, at least
+_ROWS = 3  # the list's, at least
 
 
 def of_scene(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -37,10 +37,7 @@ def beside(camera_object: bpy.types.Object | None, scene: bpy.types.Scene, step:
 def choose(camera_object: bpy.types.Object, context: bpy.types.Context) -> None:
     """Make a camera the active object, and the only selected one where objects are selected.
 
-    Raises
-    ------
-    InputError
-        if the view layer does not have it.
+    Raises InputError if the view layer does not have it.
     """
     layer = context.view_layer
     if layer.objects.get(camera_object.name) != camera_object:

@@ -33,10 +33,7 @@ def objects(context: bpy.types.Context, camera_object: bpy.types.Object | None) 
 def points(context: bpy.types.Context, camera_object: bpy.types.Object) -> Array:
     """(n, 3) float64, world space, n ≥ 1, all finite: the points of the selection without the camera itself.
 
-    Raises
-    ------
-    InputError
-        if nothing is selected.
+    Raises InputError if nothing is selected.
     """
     blocks, depsgraph = objects(context, camera_object), context.evaluated_depsgraph_get()
     parts = _PARTS.get(context.mode)
@@ -45,7 +42,7 @@ def points(context: bpy.types.Context, camera_object: bpy.types.Object) -> Array
     else:
         placed = list(_points_of_objects(blocks, depsgraph))
     everything = np.concatenate([np.empty((0, 3)), *placed])
-    everything = everything[np.isfinite(everything).all(axis=1)]  # what is nowhere is drawn nowhere
+    everything = everything[np.isfinite(everything).all(axis=1)]  # a point that is nowhere is drawn nowhere
     if not len(everything):
         what = "no vertex, control point or bone" if parts else "nothing but the camera, or nothing at all,"
         raise InputError(f"{what} is selected: select what the camera shall look at")

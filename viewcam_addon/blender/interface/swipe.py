@@ -60,7 +60,7 @@ class _Swipe:
         self._shades = shades(scene)
         self._view_transform = _view_transform(scene)
         self._drawn: tuple | None = None  # the picture that is on the graphics card, and where
-        self._words = ""  # of it
+        self._words = ""  # shown over it
 
     def is_open(self) -> bool:
         """True while the viewport is there."""
@@ -196,7 +196,7 @@ def _name(context: bpy.types.Context) -> str:
     if item := settings.bl_rna.properties["engine"].enum_items.get(settings.engine):
         return item.name
     own = settings.engine.removeprefix("BLENDER_").capitalize()  # Workbench, which nothing names
-    classes = bpy.types.RenderEngine.__subclasses__()  # those of add-ons; one, Blender's base of Hydra's, has no bl_idname
+    classes = bpy.types.RenderEngine.__subclasses__()  # add-ons' classes; one, Blender's base of Hydra's, has no bl_idname
     return next((each.bl_label for each in classes if getattr(each, "bl_idname", "") == settings.engine), own)
 
 

@@ -32,10 +32,7 @@ def pinhole_of(area: bpy.types.Area, like: Pinhole, scene: bpy.types.Scene) -> P
     d is the largest with which the picture shows all that the viewport shows. Where the viewport looks through a camera, it is
     that camera's Pinhole, principal point and all.
 
-    Raises
-    ------
-    InputError
-        if the view is orthographic, or the camera that it looks through is none that `camera.read` can read.
+    Raises InputError if the view is orthographic, or the camera that it looks through is none that `camera.read` can read.
     """
     space = area.spaces.active
     view = space.region_3d

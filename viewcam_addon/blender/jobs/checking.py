@@ -29,9 +29,8 @@ from ...files import check_writable
 from ...jobs.job import Job
 from ...jobs.tracing import Tracing, Written
 from ...pinhole import Pinhole
-from ...tracer.scene import LedgerEntry, Scene, scene_file
+from ...tracer.scene import LedgerEntry, Scene, least_level, scene_file
 from ...tracer.scene.film import LEVELS, SAMPLES, seeds
-from ...tracer.scene.levels import least_level
 from .. import datablocks
 from ..rendering import cycles, displayed, exr
 from ..scenes import features
@@ -76,10 +75,7 @@ class Checker:
         Returns `passed`, `answer`, `verdict`, `not_modeled` and `figures` as Tracing.compare has them, and in `ledger` what
         both sides leave out or replace, a sentence for each of the first few.
 
-        Raises
-        ------
-        InputError
-            if the scene can't be exported or rendered by Cycles, or if the two can't be compared.
+        Raises InputError if the scene can't be exported or rendered by Cycles, or if the two can't be compared.
         """
         of = dataclasses.replace(
             job, engine="CYCLES", level=LEVELS[0], recenter=False, clay=False, device="CPU", error=None, **_AS_THE_SCENE_STANDS
@@ -120,10 +116,7 @@ class Checker:
         Returns as `check_picture` does, and `result`, all that --json has, `lines` for a terminal, `level`,
         with `reason` where it was chosen, and the `seconds` of both sides.
 
-        Raises
-        ------
-        InputError
-            as `check_picture` does.
+        Raises InputError as `check_picture` does.
         """
         job.refuse_unchecked()
         started = time.perf_counter()

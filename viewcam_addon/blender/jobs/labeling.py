@@ -51,10 +51,7 @@ class ShotLabels:
         kinds, depth_steps : see Renderer.label.
         job : the job; a camera of four values stands still.
 
-        Raises
-        ------
-        InputError
-            if the scene can't be exported, or the labels not be written.
+        Raises InputError if the scene can't be exported, or the labels not be written.
         """
         calibration = job.calibration
         annotations = _annotations(scene)

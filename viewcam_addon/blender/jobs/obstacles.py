@@ -70,10 +70,7 @@ def camera_of(
 ) -> bpy.types.Object:
     """The camera of the file that takes a shot without the four values. among : cameras_of(scene).
 
-    Raises
-    ------
-    InputError
-        if none is called so, if the scene has none of its own, or if it is no perspective camera.
+    Raises InputError if none is called so, if the scene has none of its own, or if it is no perspective camera.
     """
     name = settings.scene_camera(shot.frame) if shot.camera is None else shot.camera
     camera_object = None if name is None else among.get(name)

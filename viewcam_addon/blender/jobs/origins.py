@@ -50,10 +50,7 @@ def made_from() -> dict[str, Any]:
 
     `unknown` is there where something can't be known: a sentence for each (see `unknown`).
 
-    Raises
-    ------
-    InputError
-        if the open file was never saved, or can't be read any more.
+    Raises InputError if the open file was never saved, or can't be read any more.
     """
     if not bpy.data.filepath:
         raise InputError("the open file was never saved, so that nobody could render the same again: save it first")

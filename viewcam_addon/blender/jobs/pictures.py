@@ -31,12 +31,8 @@ def override_formats(overrides: Overrides, scene: bpy.types.Scene) -> None:
 def write(scene: bpy.types.Scene, image: Path, preview: Path) -> None:
     """Write what was rendered last to these two paths.
 
-    Raises
-    ------
-    InputError
-        if Blender reports why a file can't be written.
-    OSError
-        if the disk is full, or Blender did not finish a file and does not say why.
+    Raises InputError if Blender reports why a file can't be written. Raises OSError if the disk is full, or Blender did not
+    finish a file and does not say why.
     """
     settings = scene.render.image_settings
     versions.set_multilayer_file(settings)

@@ -52,10 +52,7 @@ class BlenderRenderer:
     trust : true if the file's scripts may run and write (opening.py); its File Output nodes never write.
     events : receives events that say how far a check is.
 
-    Raises
-    ------
-    InputError
-        on entering, if the file can't be opened.
+    Raises InputError on entering, if the file can't be opened.
     """
 
     def __init__(self, blend: str | os.PathLike[str] | None = None, trust: bool = False, events: Events | None = None) -> None:
@@ -105,10 +102,7 @@ class BlenderRenderer:
         name : the scene's own at the frame where None.
         size, frame : the file's where None. A border counts for nothing: the pinhole is that of the whole picture.
 
-        Raises
-        ------
-        InputError
-            if there is none of that name, or if it is no pinhole.
+        Raises InputError if there is none of that name, or if it is no pinhole.
         """
         width, height = size or (None, None)
         shot = Job("pinhole", camera=name, width=width, height=height, frame=frame)
@@ -122,10 +116,7 @@ class BlenderRenderer:
     def made_from(self) -> dict[str, Any]:
         """The origins of the pictures, beside the jobs: hashes of the .blend and of all that it links; versions.
 
-        Raises
-        ------
-        InputError
-            if the open file was never saved.
+        Raises InputError if the open file was never saved.
         """
         return origins.made_from()
 
@@ -136,12 +127,7 @@ class BlenderRenderer:
     def render(self, shot: Job, image: Path | None, preview: Path | None) -> dict[str, Any]:
         """Write the shot's picture and preview to these two paths, or nothing where they are None; what the sidecar says of it.
 
-        Raises
-        ------
-        InputError
-            if the camera can't be had, or if Blender can't render or write.
-        OSError
-            if the disk is full.
+        Raises InputError if the camera can't be had, or if Blender can't render or write. Raises OSError if the disk is full.
         """
         with overridden() as overrides:
             overrides.set(self.scene.render, "use_multiview", False)  # here alone: a check's ledger tells of stereoscopy
@@ -157,15 +143,15 @@ class BlenderRenderer:
             pictures.write(self.scene, image, preview)
         evaluated = self.scene.camera.evaluated_get(datablocks.depsgraph_of(self.scene))
         self._taken = cameras.read(evaluated, self.scene)
-        taken = record(self._taken, datablocks.camera_data_of(evaluated))
+        camera = record(self._taken, datablocks.camera_data_of(evaluated))
         rendered = self._settings.rendered(bool(image)) | ({"camera": self._of_shot(shot).name} if self._of_file else {})
         if calibration := shot.calibration:
             if image and preview:
                 self._tracing.distort(image, preview, calibration, self._taken.plane)
-            taken = {**record(calibration.at(self._taken), lens=calibration.lens), "pinhole": taken}
+            camera = {**record(calibration.at(self._taken), lens=calibration.lens), "pinhole": camera}
             rendered |= {"width": calibration.plane.width, "height": calibration.plane.height}
         return {
-            **taken,
+            **camera,
             **({"stated": record(self._stated)["camera"]} if self._stated else {}),
             "rendered": rendered,
             "warnings": [*self._settings.warnings, *warnings],
@@ -175,10 +161,7 @@ class BlenderRenderer:
     def label(self, shot: Job, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
         """Write the labels of the shot that was just rendered beside a picture; the names of their files (labeling.py).
 
-        Raises
-        ------
-        InputError
-            if the scene can't be exported, or the labels not be written.
+        Raises InputError if the scene can't be exported, or the labels not be written.
         """
         camera_object = self._of_shot(shot)
         names = self._labels.write(self.scene, camera_object, self._taken, picture, kinds, depth_steps, shot)
@@ -195,10 +178,7 @@ class BlenderRenderer:
             at the job's level.
         written, keep : see Checker.check; for the latter only.
 
-        Raises
-        ------
-        InputError
-            if the engine can't render the scene, or if the two can't be compared.
+        Raises InputError if the engine can't render the scene, or if the two can't be compared.
         """
         if has_picture:
             return self._checker.check_picture(job, self.scene, self.scene.camera, self._taken, self._stated)
@@ -208,12 +188,8 @@ class BlenderRenderer:
     def export(self, job: Job) -> Scene:
         """The tracer's scene of a job.
 
-        Raises
-        ------
-        InputError
-            if there is no such camera, or one that is no pinhole.
-        NotModeledError
-            if `strict` and anything is approximated or left out.
+        Raises InputError if there is no such camera, or one that is no pinhole. Raises NotModeledError if `strict` and anything
+        is approximated or left out.
         """
         self._set(job)
         with staged(job, self.scene, self.scene.camera, self._settings.off) as stage:

@@ -10,8 +10,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from ...files import temporary_folder
-from ...tracer.scene import Scene, scene_file
-from ...tracer.scene.sameness import same
+from ...tracer.scene import Scene, same, scene_file
 from .. import datablocks
 from ..scenes.export import export_scene
 from ..scenes.ledger import Ledger

@@ -27,8 +27,6 @@ from . import persistent_data
 class Stage:
     """A scene to be exported and rendered.
 
-    Parameters
-    ----------
     camera : the one that is seen through.
     is_chosen : true to make it Blender's camera; else Blender chooses its own once more, and another one is a difference.
     level : the level at which it is modeled, never "auto".

@@ -97,10 +97,7 @@ def render(
     everything : true to show hair, volumes and whatever else the tracer does not model.
     lasting : the overrides of all renders that share what remedies make.
 
-    Raises
-    ------
-    InputError
-        if Cycles is disabled or reports an error, or if the file can't be written.
+    Raises InputError if Cycles is disabled or reports an error, or if the file can't be written.
     """
     if not hasattr(scene, "cycles"):
         raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")

@@ -18,10 +18,7 @@ def write_png(scene: bpy.types.Scene, path: Path) -> None:
 
     path : the array's file, (height, width, 3) float32, scene linear, rows from the bottom.
 
-    Raises
-    ------
-    InputError
-        if the PNG can't be written.
+    Raises InputError if the PNG can't be written.
     """
     _write(scene, np.load(path, allow_pickle=False), path.with_suffix(".png"))
     path.unlink()

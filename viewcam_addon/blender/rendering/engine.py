@@ -32,9 +32,8 @@ from ... import errors
 from ...errors import InputError
 from ...image import CHANNELS, GEOMETRY_PASSES, SETTINGS
 from ...terminal import plain
-from ...tracer.scene import Scene
+from ...tracer.scene import Scene, least_level
 from ...tracer.scene.film import LEVELS, refinement
-from ...tracer.scene.levels import least_level
 from ...tracer.tiles import Passes
 from .. import datablocks, versions
 from ..scenes import export
@@ -91,10 +90,7 @@ def bands(
     is_canceled : asked in the caller's thread. When it says so, or when the caller takes no more, tracing ends at once.
     keeper, steps : see tracer.render.render; with steps, all rows come again at each.
 
-    Raises
-    ------
-    InputError
-        as tracer.render.render does.
+    Raises InputError as tracer.render.render does.
     """
     from ...tracer.render import render
 
@@ -135,7 +131,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
     level = _GEOMETRY
     warnings: tuple[str, ...] = ()
     _keeper = None
-    _read = None  # what it was read for, and the scene
+    _read = None  # true if light was read, and the scene
     # The tracer of a viewport, and what was drawn there last as a texture, with its picture.
     _live: LiveView | None = None
     _texture: tuple | None = None
@@ -210,7 +206,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         # Nobody looks at what comes before the last in a Blender without a window.
         steps = () if level == _GEOMETRY or bpy.app.background else refinement(settings.samples, width * height)
         taken = np.array([0, *(steps or [1])])  # samples after each step
-        started, step = time.perf_counter(), np.zeros(height, int)  # that the rows have come to
+        started, step = time.perf_counter(), np.zeros(height, int)  # steps that each row has come to
         for band, rows in self._bands(depsgraph, scene, level, steps):
             self._show(depsgraph, band, rows)
             step[rows.start : rows.stop] += 1

@@ -26,9 +26,8 @@ from ...errors import InputError
 from ...image import BACKGROUND_DEPTH
 from ...pinhole import Pinhole
 from ...rotation import float64
-from ...tracer.scene import Scene
+from ...tracer.scene import Scene, least_level
 from ...tracer.scene.film import LEVELS, refinement
-from ...tracer.scene.levels import least_level
 from ...tracer.tiles import Passes, Stopped
 from ..scenes import export
 from ..scenes.depsgraph import only_cameras_changed
@@ -64,7 +63,7 @@ class LiveView:
         self._pace = _PACE  # seconds that a pixel's surface took last
         self._is_begun = False  # the view that is under way has no picture yet
         self._steps: list[int] = []  # samples of the pictures of light that are still to come
-        self._rows = 0  # of the next one that are there
+        self._rows = 0  # rows of the next one that are there
         self._is_at_work = self._is_closed = False
         self._read: tuple[bool, Scene] | None = None  # true with light, and the scene
         self._followed: tuple | None = None  # view and settings
@@ -85,10 +84,7 @@ class LiveView:
     ) -> None:
         """Show what a viewport shows, with the settings of the reference, unless that is on its way already.
 
-        Raises
-        ------
-        InputError
-            if the view is orthographic, or the scene can't be read.
+        Raises InputError if the view is orthographic, or the scene can't be read.
         """
         settings, camera = depsgraph.scene_eval.virtual_pinhole_reference, camera_of(region, view)
         lit = settings.level != "GEOMETRY"
@@ -197,13 +193,7 @@ def lit_from_the_eye(passes: Passes) -> Picture:
 
 
 def camera_of(region: bpy.types.Region, view: bpy.types.RegionView3D) -> Pinhole:
-    """The pinhole with which a viewport is drawn, its picture the region.
-
-    Raises
-    ------
-    InputError
-        if the view is orthographic.
-    """
+    """The pinhole with which a viewport is drawn, its picture the region. Raises InputError if the view is orthographic."""
     if not view.is_perspective:
         raise InputError("the viewport is orthographic, no pinhole: switch it to perspective")
     to_picture, pose = float64(view.window_matrix), np.linalg.inv(float64(view.view_matrix))

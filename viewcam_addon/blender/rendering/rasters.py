@@ -82,11 +82,8 @@ def render(
     engine : "EEVEE" or "WORKBENCH".
     camera_object, remedies, threads : see cycles.render.
 
-    Raises
-    ------
-    InputError
-        if there is no graphics driver, if this EEVEE can't draw our material, if Blender reports an error, or if the file can't
-        be written.
+    Raises InputError if there is no graphics driver, if this EEVEE can't draw our material, if Blender reports an error, or if
+    the file can't be written.
     """
     if engine == "EEVEE" and not versions.EEVEE_OVERRIDES_MATERIALS:
         raise InputError(f"EEVEE of Blender {bpy.app.version_string} writes no geometry: check it with Blender 5.0 or newer")
@@ -158,7 +155,7 @@ def _write_parts(
 
 
 def _remove_output(view_layer: bpy.types.ViewLayer, name: str) -> None:
-    view_layer.aovs.remove(view_layer.aovs[name])  # what was added before may have moved in memory
+    view_layer.aovs.remove(view_layer.aovs[name])  # asked by name: those added before may have moved in memory
 
 
 def _vector_node(

@@ -86,13 +86,7 @@ def _is_of_camera(block: bpy.types.ID) -> bool:
 
 
 def render_still(scene: bpy.types.Scene, to_file: bool = False) -> None:
-    """Render the scene's current frame.
-
-    Raises
-    ------
-    InputError
-        with Blender's own reason, if it reports an error.
-    """
+    """Render the scene's current frame. Raises InputError with Blender's own reason, if it reports an error."""
     try:
         bpy.ops.render.render(scene=scene.name, write_still=to_file)
     except RuntimeError as error:

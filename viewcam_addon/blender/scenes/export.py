@@ -20,10 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...pinhole import Pinhole
-from ...tracer.scene import Mesh, Object, Scene, Spheres
+from ...tracer.scene import Mesh, Object, Scene, Spheres, level_of
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Lamp, World
-from ...tracer.scene.levels import level_of
 from ...tracer.scene.materials import PLAIN, Picture
 from .. import camera as cameras
 from .. import versions
@@ -97,10 +96,7 @@ def export_scene(
     ledger : receives what could not come; afterwards it holds the remedies for Cycles' side.
     lit : true to bring along materials, lamps, world, film and bounces, for the levels above geometry.
 
-    Raises
-    ------
-    InputError
-        if the camera is no pinhole (orthographic, panoramic, sheared), or if Blender can't render the scene.
+    Raises InputError if the camera is no pinhole (orthographic, panoramic, sheared), or if Blender can't render the scene.
     """
     features.note_render(scene, view_layer, camera_object, ledger, lit)
     return visit_still(scene, view_layer, camera_object, lambda depsgraph: scene_in(depsgraph, camera_object, ledger, lit))
@@ -124,7 +120,7 @@ def survey(
 
 
 def level_needed(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object) -> str:
-    """The least level (levels.py) that models all light of what `export_scene` gives, found without reading any geometry."""
+    """The least level (tracer/scene) that models all light of what `export_scene` gives, found without reading any geometry."""
 
     def look(depsgraph: bpy.types.Depsgraph) -> str:
         ledger, shading = Ledger(), Shading()
@@ -382,7 +378,7 @@ def _drawn(placed: list[Placement], ledger: Ledger) -> Iterator[Placement]:
     for source, matrices, _ in placed:
         users[source.key] += len(matrices)
     for source, matrices, random in placed:
-        with np.errstate(invalid="ignore"):  # what is not finite is not flat
+        with np.errstate(invalid="ignore"):  # an infinite matrix is not flat
             drawn = np.linalg.det(matrices[:, :3, :3]) != 0
         if not drawn.all() and (users[source.key] > 1 or not source.is_mesh):
             ledger.note(source.name, "exported", "flattened by its scale, and Cycles does not draw it")

@@ -73,10 +73,7 @@ def import_cameras(
     set_size : true to give the scene the size of the first one.
     as_flight : true to make one camera with a keyframe for each, at its time, or one a frame where the file says no times.
 
-    Raises
-    ------
-    InputError
-        if a camera, or the picture's size, is beyond Blender's numbers. Nothing has changed then.
+    Raises InputError if a camera, or the picture's size, is beyond Blender's numbers. Nothing has changed then.
     """
     with contextlib.ExitStack() as undo:
         imported = _CameraImport(name, scene, Overrides(undo)).run(cameras, folder, set_size, as_flight)
@@ -223,7 +220,7 @@ class _CameraImport:
         numbered = [match for path in paths if (match := _NUMBERED.fullmatch(str(path)))]
         alike = {(match["before"], len(match["number"]), match["after"]) for match in numbered}
         numbers = [int(match["number"]) for match in numbered]
-        frames = [round(frame, 3) for frame in at]  # of times, which are rounded
+        frames = [round(frame, 3) for frame in at]  # times, which are rounded
         ahead = {number - frame for number, frame in zip(numbers, frames, strict=False)}
         if len(numbered) < len(paths) or len(alike) > 1 or len(ahead) > 1 or frames[0] % 1:
             self._note(

@@ -29,7 +29,7 @@ class Links:
     """The links between lights and objects of a depsgraph, which is looked through only where there are any."""
 
     def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
-        self._objects: dict[str, set[bpy.types.Object]] = {}  # that are shown, and what places them
+        self._objects: dict[str, set[bpy.types.Object]] = {}  # shown objects, and those that place them
         self._instances: set[str] = set()  # and what places them
         self._shadowless: set[str] = set()  # hidden from shadow rays
         if any(is_linked(block) for block in depsgraph.objects):

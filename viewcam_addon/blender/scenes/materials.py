@@ -136,7 +136,7 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
         for name, theirs in row.words.items():
             choices: Any = KINDS[node.type].inputs[name]
             if node[name] == choices[0] and not hasattr(added, theirs):
-                continue  # what an older version does
+                continue  # the only choice of an older version
             _choose(added, theirs, row.word(node[name]))
         for name, theirs in row.flags.items():
             setattr(added, theirs, node[name])

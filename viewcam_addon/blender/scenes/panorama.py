@@ -19,7 +19,7 @@ Pixels = NDArray[np.float32]
 _SKIES_WITH_SUN = ("NISHITA", "SINGLE_SCATTERING", "MULTIPLE_SCATTERING")
 _DISC_WIDTH = 256
 _MARGIN = math.radians(0.01)  # beside a disc of no size to speak of
-_SAME_SIZE = 0.02  # of a disc's angle: what a circle of so many pixels may tell wrongly
+_SAME_SIZE = 0.02  # share of a disc's angle that a circle of so many pixels may tell wrongly
 
 
 def main(library: str, name: str, out: str, width: str, frame: str, subframe: str) -> None:

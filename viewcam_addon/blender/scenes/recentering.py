@@ -139,10 +139,7 @@ def recentered(
     ledger : receives what could not come, see `export.survey`.
     lit : true to bring along what only other rays than the camera's see, for the levels above geometry.
 
-    Raises
-    ------
-    InputError
-        as `export.export_scene` does, and if something does not stand where it should.
+    Raises InputError as `export.export_scene` does, and if something does not stand where it should.
     """
     features.note_render(scene, view_layer, camera_object, ledger, lit)
     with overridden() as overrides:

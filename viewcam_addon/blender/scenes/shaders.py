@@ -44,7 +44,7 @@ _ONLY_WITH: dict[str, dict[str, tuple[str, ...]]] = {
 _CLEAR_OR_MIRRORS = ("glossy", "glass", "refraction")  # without roughness, whatever their facets
 _WHITE, _ZERO = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 _RAMP = 256  # Cycles looks ramps up in a table of one more
-_BESIDE = 1e-6  # of a pixel: where a step lies is the pixel's that it leads to
+_BESIDE = 1e-6  # share of a pixel: where a step lies is the pixel's that it leads to
 # Values that Cycles computes of a mesh's edges; as attributes they can be asked for by name, too.
 _OF_EDGES = {
     ("NEW_GEOMETRY", "Pointiness"): cycles_attributes.POINTINESS,

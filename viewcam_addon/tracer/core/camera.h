@@ -9,7 +9,7 @@ struct Camera {
     Vec3 eye, right, up, forward;        // unit, but for silhouettes; `right` is −u where the picture is mirrored
     Vec2 principal_point, distance;      // pixels, along both axes
     uint32_t width = 0, height = 0;
-    double t_min = 0, t_max = INFINITE;  // of the clip range, whose own ends are visible
+    double t_min = 0, t_max = INFINITE;  // the clip range, whose own ends are visible
 
     // Where a point is: to the right, up and ahead; and where that is in the picture, from 0 to 1.
     Vec3 to_camera(Vec3 point) const {

@@ -167,7 +167,7 @@ typedef struct {
     int (*add_lamp)(ViewcamScene*, const ViewcamLamp*, const ViewcamColor* emission);
     int (*set_film)(ViewcamScene*, const ViewcamFilm*);
     /* What is made must be freed before its scene, or what gives light there, changes. */
-    int (*light_create)(const ViewcamScene*, const ViewcamLightSettings*, ViewcamLight** made);
+    int (*light_create)(const ViewcamScene*, const ViewcamLightSettings*, ViewcamLight** light);
     void (*light_free)(ViewcamLight*);
     /* The objects, two and two, that paths have met in one place, and how often: the first `most`. Returns how many there are. */
     size_t (*light_pairs)(const ViewcamLight*, size_t most, uint32_t* objects, uint64_t* counts);
@@ -176,7 +176,7 @@ typedef struct {
      * bottom; those that nobody wants are null. */
     int (*trace_light)(ViewcamLight*, uint32_t row, uint32_t column, uint32_t samples, float* const* passes, const volatile int* stop);
 
-    /* For tests: light_functions.h says what they are given and return. */
+    /* For tests: instance.cpp says what they are given and return. */
     int (*probe_sobol)(uint32_t seed, uint32_t samples, int scatterings, size_t, const uint32_t*, const uint32_t*, int first, int dimensions, double*);
     int (*probe_filter)(int shape, double width, size_t, const double*, double*);
     int (*probe_function)(int which, size_t, const double*, const double*, double*);

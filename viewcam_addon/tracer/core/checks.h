@@ -12,7 +12,7 @@
 
 namespace viewcam::VIEWCAM_ISA::check {
 
-constexpr double LARGEST = 1e18;  // of coordinates: squares of what matrices make of them are still numbers
+constexpr double LARGEST = 1e18;  // the largest coordinate: squares of products with matrices are still numbers
 
 inline void that(bool holds, const char* otherwise) {
     if (!holds) throw std::invalid_argument(otherwise);
@@ -34,30 +34,30 @@ inline uint32_t materials(const int32_t* values, size_t count) {
     return uint32_t(most) + 1;
 }
 
-inline void mesh(const ViewcamMesh& given) {
-    that(given.count < LEAF && given.vertex_count < LEAF, "a mesh has too many triangles or vertices");
-    that(!given.count || (given.vertices && given.triangles && given.materials), "a mesh lacks an array");
-    that(all_within(given.vertices, 3 * given.vertex_count, -LARGEST, LARGEST), "a mesh has a vertex that is too far away or nowhere");
+inline void mesh(const ViewcamMesh& mesh) {
+    that(mesh.count < LEAF && mesh.vertex_count < LEAF, "a mesh has too many triangles or vertices");
+    that(!mesh.count || (mesh.vertices && mesh.triangles && mesh.materials), "a mesh lacks an array");
+    that(all_within(mesh.vertices, 3 * mesh.vertex_count, -LARGEST, LARGEST), "a mesh has a vertex that is too far away or nowhere");
     bool within = true;
-    for (size_t i = 0; i < 3 * given.count; i++) within &= uint32_t(given.triangles[i]) < given.vertex_count;
+    for (size_t i = 0; i < 3 * mesh.count; i++) within &= uint32_t(mesh.triangles[i]) < mesh.vertex_count;
     that(within, "a mesh has a triangle that names no vertex");
-    that(!given.attribute_count || given.attributes, "a mesh lacks its attributes");
-    for (size_t i = 0; i < given.attribute_count; i++) {
-        const ViewcamAttribute& one = given.attributes[i];
-        that(one.name && one.width >= 1 && one.width <= 4 && (one.values || !given.count), "a mesh has an attribute without a name or values");
+    that(!mesh.attribute_count || mesh.attributes, "a mesh lacks its attributes");
+    for (size_t i = 0; i < mesh.attribute_count; i++) {
+        const ViewcamAttribute& attribute = mesh.attributes[i];
+        that(attribute.name && attribute.width >= 1 && attribute.width <= 4 && (attribute.values || !mesh.count), "a mesh has an attribute without a name or values");
     }
 }
-inline void spheres(const ViewcamSpheres& given) {
-    that(given.count < LEAF, "there are too many spheres");
-    that(!given.count || (given.centers && given.radii && given.materials), "spheres lack an array");
-    that(all_within(given.centers, 3 * given.count, -LARGEST, LARGEST), "a sphere is too far away or nowhere");
-    that(all_within(given.radii, given.count, 0, LARGEST), "a sphere has a radius below 0, or too large a one");
+inline void spheres(const ViewcamSpheres& spheres) {
+    that(spheres.count < LEAF, "there are too many spheres");
+    that(!spheres.count || (spheres.centers && spheres.radii && spheres.materials), "spheres lack an array");
+    that(all_within(spheres.centers, 3 * spheres.count, -LARGEST, LARGEST), "a sphere is too far away or nowhere");
+    that(all_within(spheres.radii, spheres.count, 0, LARGEST), "a sphere has a radius below 0, or too large a one");
 }
-inline void objects(const Scene& scene, const ViewcamObject& given) {
-    that(given.geometry < scene.geometries.size(), "an object names no geometry");
-    that(given.slot_count >= scene.material_counts[given.geometry], "an object has fewer materials than its geometry");
-    that(given.slot_indices && given.slot_materials, "an object lacks an array");
-    that(given.count < LEAF - scene.objects.size(), "there are too many objects");
+inline void objects(const Scene& scene, const ViewcamObject& object) {
+    that(object.geometry < scene.geometries.size(), "an object names no geometry");
+    that(object.slot_count >= scene.material_counts[object.geometry], "an object has fewer materials than its geometry");
+    that(object.slot_indices && object.slot_materials, "an object lacks an array");
+    that(object.count < LEAF - scene.objects.size(), "there are too many objects");
 }
 inline void placement(const Scene& scene, const double* matrices, const double* origin, int threads) {
     that(!scene.objects.size() || matrices, "objects have no matrices");
@@ -65,13 +65,13 @@ inline void placement(const Scene& scene, const double* matrices, const double* 
     that(all_within(origin, 3, -LARGEST, LARGEST), "the origin is too far away or nowhere");
     that(threads >= 1 && threads <= 4096, "the number of threads is not between 1 and 4096");
 }
-inline void camera(const ViewcamCamera& given) {
-    for (const double* axis : {given.eye, given.right, given.up, given.forward})
+inline void camera(const ViewcamCamera& camera) {
+    for (const double* axis : {camera.eye, camera.right, camera.up, camera.forward})
         that(all_within(axis, 3, -LARGEST, LARGEST), "the camera is too far away or nowhere");
-    that(all_finite(given.principal_point, 2) && all_finite(given.distance, 2), "the camera's view plane is nowhere");
-    that(given.distance[0] != 0 && given.distance[1] != 0, "the camera's view plane is at its eye");
-    that(given.t_min < given.t_max, "the camera's clip range is empty");
-    that(given.width < LEAF && given.height < LEAF, "the picture is too large");
+    that(all_finite(camera.principal_point, 2) && all_finite(camera.distance, 2), "the camera's view plane is nowhere");
+    that(camera.distance[0] != 0 && camera.distance[1] != 0, "the camera's view plane is at its eye");
+    that(camera.t_min < camera.t_max, "the camera's clip range is empty");
+    that(camera.width < LEAF && camera.height < LEAF, "the picture is too large");
 }
 inline void rows(const Scene& scene, uint32_t first, uint32_t end) {
     that(first <= end && end <= scene.camera.height, "rows are asked for that the picture does not have");
@@ -81,11 +81,11 @@ inline void texture(int width, int height, int channels, int texel, const void* 
     that(channels == 3 || texel != VIEWCAM_RGBE, "an image of RGBE has an alpha");
     that(texel >= VIEWCAM_FLOAT && texel <= VIEWCAM_RGBE, "an image has pixels of no kind");
 }
-inline void color(const Scene& scene, const ViewcamColor& given) {
-    that(given.image < int64_t(scene.illumination.textures.size()), "a color is that of an image that the scene does not have");
+inline void color(const Scene& scene, const ViewcamColor& color) {
+    that(color.image < int64_t(scene.illumination.textures.size()), "a color is that of an image that the scene does not have");
 }
-inline void node(const Scene& scene, const ViewcamNode& given) {
-    for (int i = 0; i < given.input_count; i++) color(scene, given.inputs[i].color);
+inline void node(const Scene& scene, const ViewcamNode& node) {
+    for (int i = 0; i < node.input_count; i++) color(scene, node.inputs[i].color);
 }
 inline void material(const Scene& scene, const ViewcamClosure* closures, int count, const ViewcamColor& normal) {
     color(scene, normal);
@@ -94,29 +94,29 @@ inline void material(const Scene& scene, const ViewcamClosure* closures, int cou
         for (int j = 0; j < closures[i].factor_count; j++) color(scene, closures[i].factors[j].value);
     }
 }
-inline void lamp(const ViewcamLamp& given) {
-    that(all_within(given.matrix, 12, -LARGEST, LARGEST), "a lamp has a matrix with too large a number, or none");
-    that(all_finite(given.color, 3), "a lamp has a color that is no number");
-    for (int i = 0; i < given.kind.input_count; i++) {
-        const ViewcamColor& input = given.kind.inputs[i].color;
+inline void lamp(const ViewcamLamp& lamp) {
+    that(all_within(lamp.matrix, 12, -LARGEST, LARGEST), "a lamp has a matrix with too large a number, or none");
+    that(all_finite(lamp.color, 3), "a lamp has a color that is no number");
+    for (int i = 0; i < lamp.kind.input_count; i++) {
+        const ViewcamColor& input = lamp.kind.inputs[i].color;
         that(all_within(input.rgb, 3, 0, LARGEST) && input.node < 0, "a lamp has a size that is no number");
     }
 }
-inline void film(const ViewcamFilm& given) {
-    for (const ViewcamWorld& world : {given.world, given.backdrop}) {
+inline void film(const ViewcamFilm& film) {
+    for (const ViewcamWorld& world : {film.world, film.backdrop}) {
         that(all_finite(world.radiance, 3), "the world's light is no number");
         that(all_finite(world.to_image, 12), "the world is turned by what is no number");
     }
-    that(given.filter >= VIEWCAM_BOX && given.filter <= VIEWCAM_GAUSSIAN, "the film's filter is of no shape");
-    that(given.filter_width >= 0 && given.filter_width <= LARGEST && std::isfinite(given.exposure), "the film's numbers are none");
+    that(film.filter >= VIEWCAM_BOX && film.filter <= VIEWCAM_GAUSSIAN, "the film's filter is of no shape");
+    that(film.filter_width >= 0 && film.filter_width <= LARGEST && std::isfinite(film.exposure), "the film's numbers are none");
 }
-inline void light(const Scene& scene, const ViewcamLightSettings& given) {
+inline void light(const Scene& scene, const ViewcamLightSettings& settings) {
     for (const Scene::Slot& slot : scene.slots)
         that(slot.material < scene.illumination.materials.size(), "an object has a material that the scene does not have");
-    for (int bounces : given.bounces) that(bounces >= 0, "the number of bounces is below 0");
-    that(given.samples >= 1 && given.samples <= 1 << 24, "the number of samples is not between 1 and 2^24");
-    that(given.coincident >= 0 && given.coincident <= LARGEST, "surfaces in one place are less than 0 roundings apart, or too many");
-    that(given.error >= 0 && std::isfinite(given.error), "the error is below 0, or no number");
+    for (int bounces : settings.bounces) that(bounces >= 0, "the number of bounces is below 0");
+    that(settings.samples >= 1 && settings.samples <= 1 << 24, "the number of samples is not between 1 and 2^24");
+    that(settings.coincident >= 0 && settings.coincident <= LARGEST, "surfaces in one place are less than 0 roundings apart, or too many");
+    that(settings.error >= 0 && std::isfinite(settings.error), "the error is below 0, or no number");
 }
 inline void tile(const TileSampler& light, uint32_t row, uint32_t column, uint32_t samples, const LightPasses& to) {
     that(row < light.camera().height && column < light.camera().width && row % light.TILE == 0 && column % light.TILE == 0, "a tile is asked for that the picture does not have");

@@ -22,7 +22,7 @@ struct WeightedClosure {
 struct Material {
     std::vector<WeightedClosure> closures;
     bool transparent_shadow = true;  // true if shadow rays, too, go through what is transparent
-    Color normal;                    // what it has in place of the smooth one, on which those of its closures stand; black: none
+    Color normal;                    // in place of the smooth one, for those of its closures that have none; black: none
     bool normal_on_tangents = false; // true if that asks for the tangents of a UV map
 
     // The kinds of rays that its lobes scatter.
@@ -40,7 +40,7 @@ struct Material {
     bool varies() const { return varies_; }
     // True if it asks for the tangents of a UV map.
     bool needs_tangents() const {
-        return normal_on_tangents || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.on_tangents; });
+        return normal_on_tangents || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& weighted) { return weighted.on_tangents; });
     }
     // About what it gives off, black only where it gives off nothing; and whether that is what it gives off everywhere.
     Vec3 mean_emission() const { return mean_emission_; }
@@ -48,7 +48,7 @@ struct Material {
 
     // To be called when all closures are there.
     void prepare(const std::vector<Texture>& textures) {
-        for (const WeightedClosure& one : closures)
+        for (const WeightedClosure& weighted : closures)
             std::visit(
                 [&](const auto& closure) {
                     uint32_t kinds = closure.KINDS;
@@ -61,12 +61,12 @@ struct Material {
                     if constexpr (requires { closure.is_wide(); }) wide_ &= closure.is_wide(); else wide_ = false;
                     if constexpr (requires { closure.lets_through(); }) transparent_ |= closure.lets_through();
                     if constexpr (requires { closure.mean_emission(textures); }) {
-                        mean_emission_ += closure.mean_emission(textures) * mean_weight(one, textures);
-                        shines_evenly_ &= closure.shines_evenly() && std::none_of(one.factors.begin(), one.factors.end(), [](const MixFactor& factor) { return factor.value.varies(); });
+                        mean_emission_ += closure.mean_emission(textures) * mean_weight(weighted, textures);
+                        shines_evenly_ &= closure.shines_evenly() && std::none_of(weighted.factors.begin(), weighted.factors.end(), [](const MixFactor& factor) { return factor.value.varies(); });
                     }
                 },
-                one.closure);
-        varies_ = bumped_ || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.varies; });
+                weighted.closure);
+        varies_ = bumped_ || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& weighted) { return weighted.varies; });
     }
 
     template <class At> BSDFAt<At> bsdf(const At& at) const {
@@ -75,35 +75,35 @@ struct Material {
         Mask<NumberOf<At>> bent = VIEWCAM_ISA::is_black(at.point.shading - at.point.normal) == Mask<NumberOf<At>>{};
         if (bumped_) bent = bent == bent;  // everywhere
         if (bumped_ || (kinds_ != DIFFUSE && any(bent))) bsdf.bump(bent, {at.point.shading, at.version >= CYCLES_4_3, at.version >= CYCLES_5_0});
-        for (const WeightedClosure& one : closures) add(one, at, bsdf);
+        for (const WeightedClosure& weighted : closures) add(weighted, at, bsdf);
         return bsdf;
     }
     Vec3 emission(const ShadingPoint& at) const {
         BSDF bsdf;
-        for (const WeightedClosure& one : closures)
+        for (const WeightedClosure& weighted : closures)
             std::visit(
                 [&](const auto& closure) {
-                    if constexpr (requires { closure.mean_emission(at.textures); }) add(one, at, bsdf);
+                    if constexpr (requires { closure.mean_emission(at.textures); }) add(weighted, at, bsdf);
                 },
-                one.closure);
+                weighted.closure);
         return bsdf.emission();
     }
 
    private:
-    template <class At> static void add(const WeightedClosure& one, const At& at, BSDFAt<At>& bsdf) {
+    template <class At> static void add(const WeightedClosure& weighted, const At& at, BSDFAt<At>& bsdf) {
         NumberOf<At> weight = splat<NumberOf<At>>(1);
-        for (const MixFactor& factor : one.factors) {
+        for (const MixFactor& factor : weighted.factors) {
             NumberOf<At> value = unit_range(at.number(factor.value));
             weight *= factor.rest ? 1.0 - value : value;
         }
         if (!any(weight > 0.0)) return;
-        std::visit([&](const auto& closure) { if constexpr (requires { closure.add_to(bsdf, at, gray(weight)); }) closure.add_to(bsdf, at, gray(weight)); }, one.closure);
+        std::visit([&](const auto& closure) { if constexpr (requires { closure.add_to(bsdf, at, gray(weight)); }) closure.add_to(bsdf, at, gray(weight)); }, weighted.closure);
     }
     // The mean over images, and above 0 where these may be.
-    static double mean_weight(const WeightedClosure& one, const std::vector<Texture>& textures) {
+    static double mean_weight(const WeightedClosure& weighted, const std::vector<Texture>& textures) {
         constexpr double LEAST = 0.01;
         double weight = 1;
-        for (const MixFactor& factor : one.factors) {
+        for (const MixFactor& factor : weighted.factors) {
             double mean = unit_range(factor.value.mean(textures).x), value = factor.rest ? 1 - mean : mean;
             weight *= factor.value.varies() ? max(value, LEAST) : value;
         }

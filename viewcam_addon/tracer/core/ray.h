@@ -124,7 +124,7 @@ template <class T> struct SurfacePoint {
     Vec3Of<T> position;
     Vec3Of<T> normal;   // unit, of the true geometry, on the side that the ray came from
     Vec3Of<T> shading;  // unit, smooth where the mesh is, turned to the other side where `normal` is
-    T offset{};         // how far along ±normal rays that leave must start, so that they do not meet where they start
+    T offset{};         // the distance along ±normal at which rays that leave must start, so that they do not meet where they start
 
     // Where a ray in `direction` starts that leaves the surface here.
     Vec3Of<T> ray_origin(Vec3Of<T> direction) const { return position + normal * copysign(offset, dot(normal, direction)); }
@@ -135,9 +135,9 @@ inline SurfacePoint<double> lane(const SurfacePoint<double4>& points, int i) {
 
 // The point of a surface that a ray meets, and all that is known of it.
 struct Interaction : SurfacePoint<double> {
-    Vec2 uv;               // of the mesh's UV map, 0 without one
+    Vec2 uv;               // by the mesh's UV map, 0 without one
     Vec3 vertex_color;     // linear, 0 on what has none
-    Vec2 barycentric;      // of a triangle, the shares of its second and third corner
+    Vec2 barycentric;      // on a triangle, the shares of its second and third corner
     uint32_t material = 0; // index into Scene::materials
     uint32_t slot = 0;     // index into Scene::slots
     uint32_t object = NONE, primitive = NONE;

@@ -12,35 +12,72 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <tuple>
 #include <variant>
 #include <vector>
 
 #include "camera.h"
-#include "illumination.h"
+#include "film/film.h"
+#include "film/filter.h"
+#include "lights/environment.h"
+#include "lights/lamps.h"
+#include "material.h"
+#include "nodes/value_node.h"
 #include "shapes/sphere.h"
 #include "shapes/tangents.h"
 #include "shapes/triangle_mesh.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
+struct Lamp {
+    LampOr<> kind;  // in rendering space
+    Vec3 middle;
+    Color emission{{1, 1, 1}};  // a factor of its light, at each place of the lamp and in each direction
+    bool casts_shadow = true, multiple_importance = true;
+    uint32_t hidden_from = 0;
+    uint64_t receivers = EVERYTHING;    // the sets of objects that it lights, as bits
+    RayKind shadow_rays = SHADOW;  // a kind of its own, where it has blockers of its own
+};
+
+// The most scatterings of light before it must reach a lamp: in all, and by each kind of surface; and how often it may go
+// straight through a surface. Cycles' own counting.
+struct Bounces {
+    int total = 0, diffuse = 0, glossy = 0, transmission = 0, transparent = 0;
+};
+
+// All of a scene that gives or scatters light, as it was described: images, materials, lights, the world and the film.
+struct Illumination {
+    std::vector<Texture> textures;
+    ValueNodes nodes;
+    std::vector<Material> materials;
+    std::vector<Lamp> lamps;
+    Environment environment;
+    std::optional<Environment> backdrop;  // seen by the camera in the environment's place
+    FilmSettings film;
+    FilterShape filter = BOX;
+    double filter_width = 1;  // pixels
+    Bounces bounces;
+    int version = CYCLES_5_2;  // the Cycles that computes materials so
+};
+
 class Scene {
    public:
     // A new shape is one more here, with functions of these names: bounds, intersect, interaction, magnitude; the latter two may take several hits at once.
     using Shape = std::variant<TriangleMesh, Spheres>;
     struct Slot {
-        float index;        // what the Material Index pass shows
+        float index;        // shown by the Material Index pass
         uint32_t material;  // index into materials
     };
 
     std::vector<Shape> geometries;
-    std::vector<uint32_t> material_counts;  // of each geometry, as many as its materials' numbers need
+    std::vector<uint32_t> material_counts;  // by geometry, as many as its materials' numbers need
     std::vector<Object> objects;
     std::vector<Slot> slots;
     Camera camera;
-    Vec3 origin;  // of rendering space, in the world
+    Vec3 origin;  // rendering space's, in the world
     Illumination illumination;
-    int threads = 1;  // that it is made ready with
+    int threads = 1;  // the threads that make it ready
 
     // Makes the scene ready for rays. matrices: (objects, 3, 4), to world space.
     void commit(const double* matrices) {
@@ -55,7 +92,7 @@ class Scene {
         std::vector<uint32_t> placed;
         for (uint32_t i = 0; i < objects.size(); i++) (merged[i] ? still[objects[i].visible] : placed).push_back(i);
         merged_.clear();
-        for (auto& [visible, some] : still) merged_.push_back({visible, merge(some)});
+        for (auto& [visible, members] : still) merged_.push_back({visible, merge(members)});
         build_geometries(placed);
         instances_ = build_bvh(placed.size(), [&](size_t i) { return world_bounds(objects[placed[i]]); }, 1, threads);
         for (uint32_t& leaf : instances_.leaves) leaf = placed[leaf];
@@ -64,16 +101,16 @@ class Scene {
     // The first hit of a ray among the objects that its kind sees, but one.
     Hit closest(const Ray& ray, RayKind kind, uint32_t but = NONE) const {
         Nearest nearest{ray.t_max, 0, but};
-        for (const Merged& some : merged_)
-            if (some.visible & kind) some.triangles.intersect<false>(ray, NONE, nearest);
+        for (const Merged& merged : merged_)
+            if (merged.visible & kind) merged.triangles.intersect<false>(ray, NONE, nearest);
         intersect_instances<false>(ray, kind, nearest);
         return hit(nearest, ray);
     }
     // True if anything that a kind of ray sees stands in t_min < t < t_max.
     bool occluded(const Ray& ray, RayKind kind = SHADOW) const {
         Nearest nearest{ray.t_max};
-        for (const Merged& some : merged_)
-            if (some.visible & kind && some.triangles.intersect<true>(ray, NONE, nearest)) return true;
+        for (const Merged& merged : merged_)
+            if (merged.visible & kind && merged.triangles.intersect<true>(ray, NONE, nearest)) return true;
         return intersect_instances<true>(ray, kind, nearest);
     }
     // The first hit of a ray, and all others up to `within` times as far beyond, the nearest first; of equal distances as
@@ -81,8 +118,8 @@ class Scene {
     void surfaces(const Ray& ray, RayKind kind, double within, std::vector<Hit>& hits) const {
         NearestOnes nearest{ray.t_max, within, std::move(hits)};
         nearest.hits.clear();
-        for (const Merged& some : merged_)
-            if (some.visible & kind) some.triangles.intersect<false>(ray, NONE, nearest);
+        for (const Merged& merged : merged_)
+            if (merged.visible & kind) merged.triangles.intersect<false>(ray, NONE, nearest);
         intersect_instances<false>(ray, kind, nearest);
         hits = std::move(nearest.hits);
         std::erase_if(hits, [&](const Hit& hit) { return hit.t > nearest.t; });
@@ -106,45 +143,45 @@ class Scene {
 
     // The surfaces at hits, with all that light needs to know there. magnitudes: receive what a renderer's relative rounding
     // applies to there, world units, if wanted.
-    void interactions(const Ray* const* rays, const Hit* hits, int count, Interaction* found, double* magnitudes = nullptr) const {
+    void interactions(const Ray* const* rays, const Hit* hits, int count, Interaction* points, double* magnitudes = nullptr) const {
         TriangleHit triangles[4];
         Interaction* to[4];
-        int some = 0;
+        int pending = 0;
         auto finish_triangles = [&] {
-            TriangleSurfaces surfaces(triangles, some);
+            TriangleSurfaces surfaces(triangles, pending);
             surfaces.interactions(to);
             if (magnitudes) {
                 double4 magnitude = surfaces.magnitude(origin);
-                for (int i = 0; i < some; i++) magnitudes[to[i] - found] = magnitude[i];
+                for (int i = 0; i < pending; i++) magnitudes[to[i] - points] = magnitude[i];
             }
-            some = 0;
+            pending = 0;
         };
         for (int i = 0; i < count; i++) {
             const Object& object = objects[hits[i].object];
             const Shape& shape = geometries[object.geometry];
             if (auto spheres = std::get_if<Spheres>(&shape)) {
-                found[i] = sphere_interaction(*spheres, object, *rays[i], hits[i].primitive);
+                points[i] = sphere_interaction(*spheres, object, *rays[i], hits[i].primitive);
                 if (magnitudes) magnitudes[i] = sphere_magnitude(*spheres, object, *rays[i], hits[i].primitive, origin);
                 continue;
             }
-            triangles[some] = {&std::get<TriangleMesh>(shape), &object, rays[i], hits[i].primitive};
-            to[some++] = &found[i];
-            if (some == 4) finish_triangles();
+            triangles[pending] = {&std::get<TriangleMesh>(shape), &object, rays[i], hits[i].primitive};
+            to[pending++] = &points[i];
+            if (pending == 4) finish_triangles();
         }
-        if (some) finish_triangles();
-        for (int i = 0; i < count; i++) name(found[i], hits[i].object, hits[i].primitive);
+        if (pending) finish_triangles();
+        for (int i = 0; i < count; i++) name(points[i], hits[i].object, hits[i].primitive);
     }
     // The surfaces of four triangles, of which not all may be others.
-    void interactions(const TriangleSurfaces& surfaces, const TriangleHit (&hits)[4], Interaction (&found)[4]) const {
-        Interaction* const to[] = {&found[0], &found[1], &found[2], &found[3]};
+    void interactions(const TriangleSurfaces& surfaces, const TriangleHit (&hits)[4], Interaction (&points)[4]) const {
+        Interaction* const to[] = {&points[0], &points[1], &points[2], &points[3]};
         surfaces.interactions(to);
-        for (int i = 0; i < 4; i++) name(found[i], uint32_t(hits[i].object - objects.data()), hits[i].triangle);
+        for (int i = 0; i < 4; i++) name(points[i], uint32_t(hits[i].object - objects.data()), hits[i].triangle);
     }
     Interaction interaction(const Ray& ray, const Hit& hit) const {
-        const Ray* one = &ray;
-        Interaction found;
-        interactions(&one, &hit, 1, &found);
-        return found;
+        const Ray* rays[] = {&ray};
+        Interaction point;
+        interactions(rays, &hit, 1, &point);
+        return point;
     }
 
     // The point that a path reaches, as a material is told of it.
@@ -155,7 +192,7 @@ class Scene {
     // Makes the tangents that nodes ask for, of meshes that have such materials.
     void make_tangents() {
         for (const ValueNode& node : illumination.nodes.all) {
-            const std::string* uv = ValueNodes::tangents_asked(node);
+            const std::string* uv = ValueNodes::uv_of_tangents(node);
             if (!uv) continue;
             for (const Object& object : objects) {
                 auto mesh = std::get_if<TriangleMesh>(&geometries[object.geometry]);
@@ -193,8 +230,8 @@ class Scene {
     // The bytes of all hierarchies, beside the arrays that came from Python.
     size_t bytes() const {
         size_t sum = instances_.bytes() + objects.size() * sizeof(Object) + slots.size() * sizeof(Slot);
-        for (const Merged& some : merged_) sum += some.triangles.bytes();
-        for (const TriangleBvh& some : triangles_) sum += some.bytes();
+        for (const Merged& merged : merged_) sum += merged.triangles.bytes();
+        for (const TriangleBvh& bvh : triangles_) sum += bvh.bytes();
         for (const Shape& shape : geometries)
             if (auto spheres = std::get_if<Spheres>(&shape)) sum += spheres->bvh.bytes();
         return sum;
@@ -202,11 +239,11 @@ class Scene {
 
    private:
     // Tells an interaction whose it is, once it has the number of its material in the object.
-    void name(Interaction& found, uint32_t object, uint32_t primitive) const {
-        found.slot = objects[object].first_slot + found.material;
-        found.material = slots[found.slot].material;
-        found.object = object;
-        found.primitive = primitive;
+    void name(Interaction& point, uint32_t object, uint32_t primitive) const {
+        point.slot = objects[object].first_slot + point.material;
+        point.material = slots[point.slot].material;
+        point.object = object;
+        point.primitive = primitive;
     }
 
     struct Merged {
@@ -237,21 +274,21 @@ class Scene {
         return merged;
     }
 
-    TriangleBvh merge(const std::vector<uint32_t>& some) const {
-        std::vector<size_t> first(some.size() + 1);
-        for (size_t i = 0; i < some.size(); i++)
-            first[i + 1] = first[i] + std::get<TriangleMesh>(geometries[objects[some[i]].geometry]).count;
-        Array<uint32_t> place(first.back());  // of each triangle's object among these
-        for (size_t i = 0; i < some.size(); i++) std::fill(place.begin() + first[i], place.begin() + first[i + 1], uint32_t(i));
+    TriangleBvh merge(const std::vector<uint32_t>& members) const {
+        std::vector<size_t> first(members.size() + 1);
+        for (size_t i = 0; i < members.size(); i++)
+            first[i + 1] = first[i] + std::get<TriangleMesh>(geometries[objects[members[i]].geometry]).count;
+        Array<uint32_t> place(first.back());  // of each triangle's object among the members
+        for (size_t i = 0; i < members.size(); i++) std::fill(place.begin() + first[i], place.begin() + first[i + 1], uint32_t(i));
         auto corners_of = [&](size_t triangle, Vec3 corner[3]) {
             size_t i = place[triangle];
-            const Object& object = objects[some[i]];
+            const Object& object = objects[members[i]];
             const TriangleMesh& mesh = std::get<TriangleMesh>(geometries[object.geometry]);
             for (int c = 0; c < 3; c++) corner[c] = object.to_world.point(mesh.corner(triangle - first[i], c));
         };
         auto name_of = [&](size_t triangle, uint32_t& object, uint32_t& primitive) {
             size_t i = place[triangle];
-            object = some[i];
+            object = members[i];
             primitive = uint32_t(triangle - first[i]);
         };
         TriangleBvh triangles;
@@ -298,7 +335,7 @@ class Scene {
         return box;
     }
 
-    template <bool ANY, class Found> bool intersect_instances(const Ray& ray, RayKind kind, Found& nearest) const {
+    template <bool ANY, class HitRecord> bool intersect_instances(const Ray& ray, RayKind kind, HitRecord& nearest) const {
         if (instances_.root == NOTHING) return false;
         return traverse<ANY>(instances_, ray, nearest.t, 0, [&](uint32_t leaf, BoxRay& box) {
             uint32_t number = instances_.leaves[leaf];
@@ -319,22 +356,22 @@ class Scene {
     // The nearest hits of rays among what their kind sees, at their ends where there is none; of ANY, at −infinity where there is one.
     template <bool ANY> void intersect(const Rays& rays, int count, RayKind kind, Hits& nearest) const {
         for (int i = 0; i < count; i += 4) store(nearest.t + i, load<double4>(rays.t_max + i)), store(nearest.name + i, long4{});
-        for (const Merged& some : merged_)
-            if (some.visible & kind) intersect_packets<ANY>(some.triangles, rays, count, nearest);
+        for (const Merged& merged : merged_)
+            if (merged.visible & kind) intersect_packets<ANY>(merged.triangles, rays, count, nearest);
         if (instances_.root == NOTHING) return;
         for (int i = 0; i < count; i++)
-            intersect_one<ANY>(nearest, i, [&](Nearest& found) { return intersect_instances<ANY>(rays.ray(i), kind, found); });
+            intersect_one<ANY>(nearest, i, [&](Nearest& hit) { return intersect_instances<ANY>(rays.ray(i), kind, hit); });
     }
     template <bool ANY, class Intersect> static void intersect_one(Hits& nearest, int i, const Intersect& intersect) {
         if (ANY && nearest.t[i] == -INFINITE) return;
-        Nearest found{nearest.t[i], nearest.name[i]};
-        bool met = intersect(found);
-        nearest.t[i] = ANY && met ? -INFINITE : found.t, nearest.name[i] = found.name;
+        Nearest hit{nearest.t[i], nearest.name[i]};
+        bool met = intersect(hit);
+        nearest.t[i] = ANY && met ? -INFINITE : hit.t, nearest.name[i] = hit.name;
     }
     template <bool ANY> static void intersect_packets(const TriangleBvh& triangles, const Rays& rays, int count, Hits& nearest) {
         constexpr int FEW = 4;
         if (triangles.bvh.root == NOTHING || !count) return;
-        auto& [all, some] = of_this_thread<std::array<Packet, 2>>();
+        auto& [all, group] = of_this_thread<std::array<Packet, 2>>();
         enter(triangles.bvh, rays, nearest, count, all);
         if (std::all_of(all.key, all.key + count, [&](int key) { return key == all.key[0]; })) {
             if (all.key[0] < 0) return;
@@ -346,21 +383,21 @@ class Scene {
         for (int i = 0; i < count; i++) {
             int key = all.key[i];
             if (key < 0) continue;
-            some.count = 0;
+            group.count = 0;
             for (int j = i; j < count; j++)
                 if (all.key[j] == key) {
-                    some.add(all, j);
+                    group.add(all, j);
                     all.key[j] = -1;
                 }
-            if (some.count >= FEW) {
-                some.close();
-                triangles.intersect<ANY>(some);
-                for (int j = 0; j < some.count; j++) nearest.t[some.source[j]] = some.t[j], nearest.name[some.source[j]] = some.name[j];
+            if (group.count >= FEW) {
+                group.close();
+                triangles.intersect<ANY>(group);
+                for (int j = 0; j < group.count; j++) nearest.t[group.source[j]] = group.t[j], nearest.name[group.source[j]] = group.name[j];
                 continue;
             }
-            for (int j = 0; j < some.count; j++) {
-                int which = some.source[j];
-                intersect_one<ANY>(nearest, which, [&](Nearest& found) { return triangles.intersect<ANY>(rays.ray(which), NONE, found); });
+            for (int j = 0; j < group.count; j++) {
+                int which = group.source[j];
+                intersect_one<ANY>(nearest, which, [&](Nearest& hit) { return triangles.intersect<ANY>(rays.ray(which), NONE, hit); });
             }
         }
     }
@@ -371,29 +408,29 @@ class Scene {
     }
 
     std::vector<Merged> merged_;
-    std::vector<TriangleBvh> triangles_;  // of geometries that instances stand for
+    std::vector<TriangleBvh> triangles_;  // by geometry, for those that instances stand for
     Bvh instances_;
 };
 
 inline ShadingPoint::Values ShadingPoint::attribute(const std::string& name) const {
     auto mesh = scene && object ? std::get_if<TriangleMesh>(&scene->geometries[object->geometry]) : nullptr;
     if (!mesh) return {};
-    for (const Attribute& one : mesh->attributes) {
-        if (one.name != name) continue;
-        const float* corners = one.values + 3 * size_t(one.width) * point.primitive;
-        double b1 = point.barycentric.x, b2 = point.barycentric.y, found[4] = {0, 0, 0, 1};
-        for (int i = 0; i < one.width; i++)
-            found[i] = corners[i] * (1 - b1 - b2) + corners[one.width + i] * b1 + corners[2 * one.width + i] * b2;
-        return {{found[0], found[1], found[2]}, found[3], one.width};
+    for (const Attribute& attribute : mesh->attributes) {
+        if (attribute.name != name) continue;
+        const float* corners = attribute.values + 3 * size_t(attribute.width) * point.primitive;
+        double b1 = point.barycentric.x, b2 = point.barycentric.y, value[4] = {0, 0, 0, 1};
+        for (int i = 0; i < attribute.width; i++)
+            value[i] = corners[i] * (1 - b1 - b2) + corners[attribute.width + i] * b1 + corners[2 * attribute.width + i] * b2;
+        return {{value[0], value[1], value[2]}, value[3], attribute.width};
     }
     return {};
 }
 inline ShadingPoint::TangentFrame ShadingPoint::tangent_frame(const std::string& uv) const {
     auto mesh = scene && object && !object->flat ? std::get_if<TriangleMesh>(&scene->geometries[object->geometry]) : nullptr;
     if (!mesh) return {};
-    auto found = mesh->tangents.find(uv);
-    if (found == mesh->tangents.end()) return {};
-    const float* tangents = found->second.data() + 12 * size_t(point.primitive);
+    auto tangents_of_map = mesh->tangents.find(uv);
+    if (tangents_of_map == mesh->tangents.end()) return {};
+    const float* tangents = tangents_of_map->second.data() + 12 * size_t(point.primitive);
     double b1 = point.barycentric.x, b2 = point.barycentric.y, b0 = 1 - b1 - b2;
     auto between = [&](auto&& at) { return at(0) * b0 + at(1) * b1 + at(2) * b2; };
     TangentFrame frame;
@@ -477,7 +514,7 @@ inline Vec3 ShadingPoint::in_window() const {
     return {place.x, place.y, 0};
 }
 inline Vec3 ShadingPoint::generated() const {
-    if (Values given = attribute("generated"); given.width == 3) return given.first;
+    if (Values values = attribute("generated"); values.width == 3) return values.first;
     auto mesh = scene && object ? std::get_if<TriangleMesh>(&scene->geometries[object->geometry]) : nullptr;
     if (!mesh) return {};
     double b1 = point.barycentric.x, b2 = point.barycentric.y;

@@ -6,8 +6,10 @@ or rays (native.py, core); the classes hold arrays and check their shapes. Mater
 bounces matter from level `direct` on; a scene of level `geometry` leaves them out.
 """
 
+import dataclasses
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, is_dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +18,10 @@ from ... import checks
 from ...checks import quoted
 from ...errors import InputError
 from ...pinhole import Pinhole
-from .film import Bounces, Film
+from .film import LEVELS, Bounces, Film
 from .lamps import MOST_LINKS, Lamp, World, hidden_from, linked
-from .materials import Material, Picture
+from .materials import PLAIN, Material, Picture
+from .shader_nodes import KINDS
 
 # Visibility is found in float32, which holds the square of nothing larger.
 LARGEST = 1e18
@@ -313,3 +316,92 @@ def _check_shape(name: str, array: NDArray[np.generic], shape: tuple[int | None,
     if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
         wanted = " × ".join("n" if size is None else str(size) for size in shape)
         raise InputError(f"{name} has the shape {array.shape} and must have {wanted}: check the scene")
+
+
+_FEW = 64  # numbers, below which NumPy takes longer to compare two arrays than to copy them
+
+
+def same_things(first: Scene, second: Scene) -> bool:
+    """True if the same geometries stand in the same places, made of materials of the same names.
+
+    Nothing in a scene is ever changed in place, so that what is one object is the same without a look inside. Everything else
+    is compared to the last bit. Rejected: fingerprints, which read all of both scenes where most of them is one object.
+    """
+    return same(first.objects, second.objects) and same(first.geometries, second.geometries)
+
+
+def same(first: Any, second: Any) -> bool:
+    """True if two values, of those that scenes are made of, are the same."""
+    if first is second:
+        return True
+    if type(first) is not type(second):
+        return False
+    if isinstance(first, np.ndarray):
+        return _same_array(first, second)
+    if isinstance(first, dict):
+        return list(first) == list(second) and all(same(value, second[key]) for key, value in first.items())
+    if isinstance(first, tuple):
+        return len(first) == len(second) and all(map(same, first, second))
+    if is_dataclass(first):
+        return all(same(getattr(first, field.name), getattr(second, field.name)) for field in dataclasses.fields(first))
+    return bool(first == second)
+
+
+def _same_array(first: NDArray[Any], second: NDArray[Any]) -> bool:
+    if first.shape != second.shape or first.dtype != second.dtype:
+        return False
+    if first.size < _FEW:
+        return first.tobytes() == second.tobytes()
+    return np.array_equal(first, second)
+
+
+_REFLECTS, _MIRRORS = "reflects light onto others", "mirrors"
+_WHAT = {"diffuse": _REFLECTS, "principled": _REFLECTS, "glossy": _MIRRORS, "metallic": _MIRRORS}
+
+
+def least_level(scene: Scene) -> tuple[str, str]:
+    """The level (film.LEVELS) at which nothing is left out that this scene shows, and one sentence that says why."""
+    materials = [(placed.name, material) for placed in scene.objects for material in _materials(scene, placed)]
+    return level_of(scene.lamps, scene.world, scene.bounces, materials)
+
+
+def level_of(
+    lamps: Sequence[Lamp], world: World, bounces: Bounces, materials: Sequence[tuple[str, Material]]
+) -> tuple[str, str]:
+    """`least_level` of what gives light. materials : (object's name, material), of each material that some part of it uses."""
+    geometry, direct, path = LEVELS
+    light = _light(lamps, world, materials)
+    if light is None:
+        return geometry, "Nothing gives light: no lamp, no surface and not the world."
+    if bounces.total == 0:
+        return direct, f"Light comes from {light}, and the scene allows no bounces."
+    scattering = [
+        (name, closure.node.type)
+        for name, material in materials
+        for closure in material.closures
+        if KINDS[closure.node.type].scatters
+    ]
+    if not scattering:
+        return direct, f"Light comes from {light}, and nothing reflects it."
+    for name, kind in scattering:
+        if any(getattr(bounces, bounce) > 0 for bounce in KINDS[kind].scatters):
+            return path, f"Light comes from {light}, and {name!r} {_WHAT.get(kind, 'is clear')}."
+    return direct, f"Light comes from {light}, and the scene allows no bounces of the kinds that it has."
+
+
+def _light(lamps: Sequence[Lamp], world: World, materials: Sequence[tuple[str, Material]]) -> str | None:
+    """The first thing that gives light."""
+    for lamp in lamps:
+        if any(lamp.strength):
+            return f"the lamp {lamp.name!r}"
+    for name, material in materials:
+        if material.shines:
+            return f"the surface of {name!r}"
+    return None if world.is_black else "the world"
+
+
+def _materials(scene: Scene, placed: Object) -> list[Material]:
+    """The materials of an object that some part of its geometry uses."""
+    used = sorted(set(scene.geometries[placed.geometry].materials.tolist()))
+    names = [placed.materials[index] if index < len(placed.materials) else "" for index in used]
+    return [scene.materials[name] if name else PLAIN for name in names]

@@ -51,7 +51,7 @@ class Picture:
         is_rgbe = dtype == RGBE and self.pixels.shape[-1:] == (1,)
         if self.pixels.ndim != 3 or not (is_rgbe or self.pixels.shape[2] in (3, 4)) or not self.pixels.size:
             raise InputError(f"an image has the shape {self.pixels.shape} and must have height × width × 3 or 4: check it")
-        with np.errstate(over="ignore"):  # what is too large for float32 becomes infinite, and is refused here
+        with np.errstate(over="ignore"):  # too large a number for float32 becomes infinite, and is refused here
             pixels = np.ascontiguousarray(self.pixels, dtype if is_rgbe or dtype in TEXELS[:-1] else np.float32)
         object.__setattr__(self, "pixels", pixels)
         ends = _ends(pixels)

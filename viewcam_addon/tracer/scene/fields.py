@@ -115,7 +115,7 @@ class Field:
         if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
             wanted = " × ".join("n" if size is None else str(size) for size in shape)
             self.fail(f"has the shape {' × '.join(map(str, array.shape))} and must have {wanted}: correct it")
-        with np.errstate(over="ignore"):  # what is too large for float32 becomes infinite, and is refused here
+        with np.errstate(over="ignore"):  # too large a number for float32 becomes infinite, and is refused here
             array = array.astype(dtype, copy=False)
         if array.dtype.kind == "f" and not np.isfinite(array).all():
             self.fail("holds a number that is not finite: give finite ones")

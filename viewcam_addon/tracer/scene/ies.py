@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ... import checks
 from ...errors import InputError
 
-_WATTS = 0.0706650768394  # of a candela: 4π / 177.83
+_WATTS = 0.0706650768394  # watts of a candela: 4π / 177.83
 _CLOSE = 1e-4  # degrees: files round their angles
 _TYPES = {1: "C", 2: "B", 3: "A"}
 _MOST = 1 << 20  # angles
@@ -43,10 +43,7 @@ def read(name: str, text: object) -> Table:
 
     name : its name in an error's sentence.
 
-    Raises
-    ------
-    InputError
-        if it is none.
+    Raises InputError if it is none.
     """
     if not isinstance(text, str):
         raise InputError(f"{name} is {checks.quoted(text)}: give the text of an IES file")

@@ -32,7 +32,7 @@ MOST_LINKS = {"receivers": 64, "blockers": 26}
 LEAST_SPREAD = 1e-3
 """Radians; what is less spread is nearly a beam, whose light would be found by chance alone."""
 
-_UNIT = 2.0**-50  # what is a unit vector stays one, to the last bit
+_UNIT = 2.0**-50  # a unit vector stays one, to the last bit
 
 
 def hidden_from(name: str, rays: Collection[str]) -> frozenset[str]:

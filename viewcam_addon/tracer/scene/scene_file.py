@@ -352,10 +352,7 @@ _LIST_OF_NUMBERS = re.compile(r"\[\n([-+.,\deE\s]*?)\n\s*\]")  # no text is met:
 def write(scene: Scene, path: str | os.PathLike[str]) -> None:
     """Write a scene to `path` (.json), and its large arrays to the .npz of the same name beside it; both whole or not at all.
 
-    Raises
-    ------
-    InputError
-        if the folder can't be written or the disk is full, or if arrays can't stand beside `path`.
+    Raises InputError if the folder can't be written or the disk is full, or if arrays can't stand beside `path`.
     """
     path = Path(path)
     arrays: dict[str, NDArray] = {}
@@ -377,10 +374,8 @@ def write(scene: Scene, path: str | os.PathLike[str]) -> None:
 def read(path: str | os.PathLike[str]) -> Scene:
     """Read a scene from its file.
 
-    Raises
-    ------
-    InputError
-        if there is no such file, or if a key in it is missing, unknown, of the wrong type or out of range; it names the key.
+    Raises InputError if there is no such file, or if a key in it is missing, unknown, of the wrong type or out of range; it
+    names the key.
     """
     path = Path(path)
     document = Field(_parsed(path), "the scene", path.name)

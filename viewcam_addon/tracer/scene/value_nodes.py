@@ -140,7 +140,7 @@ def _as_they_are(*names: str) -> dict[str, str]:
     return {name: name for name in names}
 
 
-_DRAWN = ("table", "least", "most")  # what is drawn, of curves
+_DRAWN = ("table", "least", "most")  # the curves' fields that are drawn
 _COLOR: dict[str, str | None] = {"Color": None}
 _FACTOR_OR_COLOR: dict[str, str | None] = {"Color": "color", "Fac": "factor"}
 _TITLES = {word: word.title() for word in ("linear", "closest", "cubic")}

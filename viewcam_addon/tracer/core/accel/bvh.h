@@ -125,7 +125,7 @@ class Builder {
             }
         }
     };
-    struct Extent {  // of boxes, and of their doubled centers
+    struct Extent {  // boxes together, and their doubled centers
         float4 low = EMPTY_LOW, high = EMPTY_HIGH, center_low = EMPTY_LOW, center_high = EMPTY_HIGH;
     };
     struct Place {

@@ -48,7 +48,7 @@ struct alignas(64) Packet : BoxRays<PACKET> {
     double origin[3][PACKET], by_x[PACKET], by_y[PACKET], by_z[PACKET], t_min[PACKET], start[PACKET], unit[PACKET], t[PACKET];
     uint64_t name[PACKET];
     int key[PACKET];     // axis · 8 + signs; −1 misses the hierarchy
-    int source[PACKET];  // which ray it is
+    int source[PACKET];  // the ray's number
     int count = 0;
     bool backward[3];
     Shear shear;  // its axes; the factors are by_x …
@@ -122,7 +122,7 @@ inline void enter(const Bvh& bvh, const Rays& rays, const Hits& nearest, int cou
         double4 longest = max(size[0], max(size[1], size[2])), inverse = splat4(INFINITE), per = longest * splat4(bvh.scale);
         for (int axis = 0; axis < 3; axis++) {
             reciprocal[axis] = splat4(1.0) / d[axis];
-            inverse = min(abs(reciprocal[axis]), inverse);  // that of the longest, to the bit
+            inverse = min(abs(reciprocal[axis]), inverse);  // the longest's reciprocal, to the bit
         }
         double4 start = t_min * per, end = load<double4>(packet.t + i) * per, far = splat4(0.0);
         for (int axis = 0; axis < 3; axis++) {
@@ -130,8 +130,8 @@ inline void enter(const Bvh& bvh, const Rays& rays, const Hits& nearest, int cou
             reciprocal[axis] = with_sign(min(abs(longest * reciprocal[axis]), splat4(1e200)), unit[axis]);
             from[axis] = (origin[axis] - splat4(bvh.center[axis])) * splat4(bvh.scale);
             double4 edge = splat4(bvh.half[axis] * (1 + 1e-9) + 1e-300) + splat4(4e-16) * abs(from[axis]);
-            double4 one = (-edge - from[axis]) * reciprocal[axis], other = (edge - from[axis]) * reciprocal[axis];
-            double4 first = min(one, other), last = max(one, other);
+            double4 to_low = (-edge - from[axis]) * reciprocal[axis], to_high = (edge - from[axis]) * reciprocal[axis];
+            double4 first = min(to_low, to_high), last = max(to_low, to_high);
             start = max(start, first - abs(first) * splat4(4e-15));
             end = min(end, last + abs(last) * splat4(4e-15));
             far = max(far, abs(from[axis]));
@@ -174,9 +174,9 @@ template <bool ANY, class Visit> inline void traverse_packet(const Bvh& bvh, Pac
     auto reduce = [&](const float* values, bool most, float* of_each, float* of_all) {
         float8 group[8];
         for (int g = 0; g < 8; g++) group[g] = load<float8>(values + from[g]);
-        float8 found = most ? reduce_eight<true>(group) : reduce_eight<false>(group);
-        store(of_each, found);
-        store(of_all, splat8(most ? reduce_max(found) : reduce_min(found)));
+        float8 extremes = most ? reduce_eight<true>(group) : reduce_eight<false>(group);
+        store(of_each, extremes);
+        store(of_all, splat8(most ? reduce_max(extremes) : reduce_min(extremes)));
     };
     for (int axis = 0; axis < 3; axis++) {
         bool backward = packet.backward[axis];
@@ -199,7 +199,7 @@ template <bool ANY, class Visit> inline void traverse_packet(const Bvh& bvh, Pac
     struct Entry {
         uint32_t child, parent;
         float distance;
-        uint16_t slot, groups;  // of the parent; those that may meet the parent
+        uint16_t slot, groups;  // the parent's slot; the groups that may meet the parent
     } stack[Bvh::STACK], entry{bvh.root, NOTHING, 0, 0, uint16_t((1u << groups) - 1)};
     int size = 0;
     for (;;) {

@@ -40,7 +40,7 @@ struct DominantAxis {
 
 struct BoxRay {
     float near_start[4], far_start[4], near_reciprocal[4], far_reciprocal[4];
-    bool backward[3];     // which components of the direction are negative
+    bool backward[3];     // true of a component that is negative
     int axis;             // the dominant one
     double start, unit;   // t · unit − start is the distance that boxes count from the entry
     double axis_factor;   // 1 / direction[axis]
@@ -64,7 +64,7 @@ inline bool enter(const Bvh& bvh, const Ray& ray, double t_max, double origin_er
     double4 center = load<double4>(&bvh.center.x), half = load<double4>(&bvh.half.x), scale = splat4(bvh.scale);
     double4 from = (origin - center) * scale;
     double4 edge = half * splat4(1 + 1e-9) + splat4(4e-16) * abs(from) + splat4(origin_error * bvh.scale + 1e-300);
-    double4 one = (-edge - from) * reciprocal, other = (edge - from) * reciprocal, first = min(one, other), last = max(one, other);
+    double4 to_low = (-edge - from) * reciprocal, to_high = (edge - from) * reciprocal, first = min(to_low, to_high), last = max(to_low, to_high);
     first -= abs(first) * splat4(4e-15);
     last += abs(last) * splat4(4e-15);
     box.unit = longest * bvh.scale;

@@ -84,7 +84,7 @@ template <class T> class BSDFOf {
         new (&storage_[count_]) Lobe(lobe);
         lanes_[count_] = lanes, shares_[count_] = select(lanes, share, T{}), total_ += shares_[count_], count_++;
         kinds_ |= where(lanes, Kind::KIND);
-        if (!Kind::DELTA) spread_ |= where(lanes, Kind::KIND);
+        if (!Kind::DELTA) non_specular_kinds_ |= where(lanes, Kind::KIND);
     }
     void emit(Vec3 radiance) { emission_ += radiance; }
     // Its lobes have bumped normals, and light ends on them so.
@@ -105,7 +105,7 @@ template <class T> class BSDFOf {
         for (int i = 0; i < count_; i++) total_ += shares_[i] *= std::visit([&](const auto& lobe) { return lobe.KIND == kind ? factor : splat<T>(1); }, lobe(i));
     }
     // The kinds of rays that light from any one direction is scattered into all over: what lights can be sampled for.
-    Flags<T> spread_kinds() const { return spread_; }
+    Flags<T> non_specular_kinds() const { return non_specular_kinds_; }
     // The albedo of what is diffuse, which a pass of its own shows.
     Vec3Of<T> diffuse_color() const {
         Vec3Of<T> sum;
@@ -192,9 +192,9 @@ template <class T> class BSDFOf {
     T shares_[MOST_LOBES], total_{};
     Mask<T> lanes_[MOST_LOBES], bumped_{};
     int count_ = 0;
-    Flags<T> kinds_{}, spread_{};
+    Flags<T> kinds_{}, non_specular_kinds_{};
     ShadowTerminatorOf<T> terminator_;
-    Vec3 emission_, transparency_;  // of one point: what shines or is transparent is met by each path alone
+    Vec3 emission_, transparency_;  // at one point: emissive and transparent surfaces are met by each path alone
 };
 using ScatteredLight = ScatteredLightOf<double>;
 using BSDF = BSDFOf<double>;

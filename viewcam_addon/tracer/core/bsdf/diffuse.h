@@ -45,7 +45,7 @@ template <class T> struct OrenNayarOf {
     static constexpr bool DELTA = false, IS_DIFFUSE = true;
     Vec3Of<T> color, normal, to_viewer;
     T a, b;
-    Vec3Of<T> multiple;  // of light that is reflected more than once, what depends on no direction
+    Vec3Of<T> multiple;  // light that is reflected more than once, but for its factors of direction
 
     // albedo: of what is reflected once, which is not `color` where that has other factors. multiple: whether more counts.
     OrenNayarOf(Vec3Of<T> color, Vec3Of<T> normal, Vec3Of<T> to_viewer, T roughness, Vec3Of<T> albedo, bool multiple)

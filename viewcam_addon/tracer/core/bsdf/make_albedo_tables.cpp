@@ -27,7 +27,7 @@ using namespace viewcam::tables;
 namespace {
 
 struct Quadrature {
-    std::vector<double> x, weight;  // of [0, 1]
+    std::vector<double> x, weight;  // on [0, 1]
 
     explicit Quadrature(int n) : x(n), weight(n) {
         for (int i = 0; i < n; i++) {
@@ -159,8 +159,8 @@ void write(const char* name, const char* axes, size_t count, const std::function
 
 }  // namespace
 
-int main(int given, char** words) {
-    Quadrature points(given > 1 ? std::atoi(words[1]) : 96), few(24), more(48);
+int main(int argc, char** argv) {
+    Quadrature points(argc > 1 ? std::atoi(argv[1]) : 96), few(24), more(48);
     auto average = [](const Quadrature& along, auto&& of) {
         double sum = 0;
         for (size_t i = 0; i < along.x.size(); i++) sum += 2 * along.weight[i] * along.x[i] * of(along.x[i]);

@@ -15,7 +15,7 @@ namespace viewcam::VIEWCAM_ISA {
 
 template <class T> struct MicrofacetsOf {
     T alpha_x, alpha_y;
-    bool beckmann = false;  // of single points alone
+    bool beckmann = false;  // single points alone have it
 
     // The density of facets that are turned so, by solid angle and by the surface's area.
     T d(Vec3Of<T> h) const {
@@ -143,9 +143,9 @@ struct MicrofacetTransmission : MicrofacetLobeOf<double> {
         Vec3 bent = wo * ratio + wi;
         double squared = dot(bent, bent);
         Vec3 h = bent / std::sqrt(squared);
-        double in = dot(wi, h), out = dot(wo, h), spread = ratio * ratio / squared * std::fabs(in * out);
+        double in = dot(wi, h), out = dot(wo, h), jacobian = ratio * ratio / squared * std::fabs(in * out);
         Vec3 let_through = gray(1) - reflectance(fresnel, std::fabs(in));
-        return color * let_through * (facets.d(h) * facets.g(wi, wo) / wi.z * spread);
+        return color * let_through * (facets.d(h) * facets.g(wi, wo) / wi.z * jacobian);
     }
     double pdf_local(Vec3 wo) const {
         if (!(wi.z > 0 && wo.z < 0)) return 0;

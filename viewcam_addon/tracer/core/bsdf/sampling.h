@@ -30,14 +30,14 @@ template <class T> inline Vec3Of<T> cosine_direction(Vec3Of<T> normal, Vec2Of<T>
     return direction / size;
 }
 
-// A direction spread evenly over the solid angle of a cone. spread: 1 − cos of half the opening; `short_of` receives 1 − cos of
+// A direction spread evenly over the solid angle of a cone. one_minus_cos_max: of half the opening; `one_minus_cos`: receives that of
 // the direction's angle to the axis.
-template <class T> inline Vec3Of<T> cone_direction(Vec3Of<T> axis, Scalar<T> spread, Vec2Of<T> u, T& short_of) {
+template <class T> inline Vec3Of<T> cone_direction(Vec3Of<T> axis, Scalar<T> one_minus_cos_max, Vec2Of<T> u, T& one_minus_cos) {
     FrameOf<T> frame(axis);
-    short_of = u.x * spread;
-    T sine = sqrt(short_of * (2.0 - short_of));
+    one_minus_cos = u.x * one_minus_cos_max;
+    T sine = sqrt(one_minus_cos * (2.0 - one_minus_cos));
     SinCosOf<T> turn = sincos_of_turns(u.y);
-    return axis * (1.0 - short_of) + frame.s * (sine * turn.cos) + frame.t * (sine * turn.sin);
+    return axis * (1.0 - one_minus_cos) + frame.s * (sine * turn.cos) + frame.t * (sine * turn.sin);
 }
 
 // 1 − cos of angles up to a right one: a light that is far away fills a cone whose cosine is 1 to the last bit.

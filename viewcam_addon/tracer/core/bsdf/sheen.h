@@ -45,10 +45,10 @@ struct VelvetLobe {
     static constexpr RayKind KIND = GLOSSY;
     static constexpr bool DELTA = false, IS_DIFFUSE = false;
     Vec3 color, normal, to_viewer;
-    double spread;  // the square of the fibers' slopes
+    double squared_slope;  // the fibers'
 
     VelvetLobe(Vec3 color, Vec3 normal, Vec3 to_viewer, double roughness) : color(color), normal(normal), to_viewer(to_viewer) {
-        spread = max(roughness, 0.01) * max(roughness, 0.01);
+        squared_slope = max(roughness, 0.01) * max(roughness, 0.01);
     }
 
     Vec3 eval(Vec3 to_light) const {
@@ -58,14 +58,14 @@ struct VelvetLobe {
         Vec3 h = normalize(to_viewer + to_light);
         double up = dot(normal, h), seen = std::fabs(dot(to_viewer, h));
         if (!(up < 1 - ALIKE && seen > ALIKE)) return {};
-        double sine = 1 - up * up, d = exp(-up * up / sine / spread) / (spread * PI * sine * sine);
+        double sine = 1 - up * up, d = exp(-up * up / sine / squared_slope) / (squared_slope * PI * sine * sine);
         double shadow = min(1.0, 2 * max(up / seen, ALIKE) * min(in, out));
         return color * (0.25 * d * shadow / in);
     }
     double pdf(Vec3 to_light) const { return dot(normal, to_light) > 0 ? 0.5 / PI : 0; }
     LobeSample sample(Vec2 u) const {
-        double short_of;
-        Vec3 direction = cone_direction(normal, 1, u, short_of);
+        double one_minus_cos;
+        Vec3 direction = cone_direction(normal, 1, u, one_minus_cos);
         return {direction, eval(direction) * (2 * PI), 0.5 / PI};
     }
 };

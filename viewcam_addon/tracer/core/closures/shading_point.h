@@ -60,14 +60,14 @@ struct ShadingPoint {
     // The index of refraction beyond the surface over that before it. ior: inside over outside.
     double ratio(double ior) const { return point.backside ? 1 / ior : ior; }
     // The normal that an input asks for, unit: the smooth one where it asks for none.
-    Vec3 normal(const Color& given) const {
-        Vec3 asked = given.node == NONE ? given.rgb : value_of_node(given.node);
-        double size = length(asked);
-        return size > 0 && size < INFINITE ? asked / size : point.shading;
+    Vec3 normal(const Color& input) const {
+        Vec3 requested = input.node == NONE ? input.rgb : value_of_node(input.node);
+        double size = length(requested);
+        return size > 0 && size < INFINITE ? requested / size : point.shading;
     }
     // A normal, bent so that a mirror's ray rises above the surface; and that which an input asks for.
     Vec3 specular(Vec3 normal) const { return VIEWCAM_ISA::specular_normal(incoming, point.normal, normal); }
-    Vec3 specular_normal(const Color& given) const { return specular(normal(given)); }
+    Vec3 specular_normal(const Color& input) const { return specular(normal(input)); }
     bool is_smooth(const Microfacets& facets) const { return is_mirror(facets, version); }
 
     // The mesh's attribute of a name here, up to four numbers; {0, 0, 0, 1} where it has nothing. Defined in scene.h.
@@ -89,7 +89,7 @@ struct ShadingPoint {
     Vec3 tangent_round(int axis) const;
     Vec3 tangent_along(const std::string& uv) const;
     // The tangent that an input asks for: round z where it asks for none.
-    Vec3 tangent(const Color& given) const { return given.node == NONE ? tangent_round(2) : value_of_node(given.node); }
+    Vec3 tangent(const Color& input) const { return input.node == NONE ? tangent_round(2) : value_of_node(input.node); }
     // A normal of the object's space, of any length.
     Vec3 to_world_normal(Vec3 normal) const;
     // Where this is in the box round the mesh's vertices, from 0 to 1; ½ along what has no extent.
@@ -132,11 +132,11 @@ struct ShadingPoints {
     double4 number(const Color& color) const {
         return color.varies() ? gather4([&](int i) { return each[i].number(color); }) : splat4(number_of(color.rgb));
     }
-    Vec3x4 normal(const Color& given) const {
-        return each ? gather4([&](int i) { return each[i].normal(given); }) : point.shading;
+    Vec3x4 normal(const Color& input) const {
+        return each ? gather4([&](int i) { return each[i].normal(input); }) : point.shading;
     }
     Vec3x4 specular(const Vec3x4& normal) const { return VIEWCAM_ISA::specular_normal(incoming, point.normal, normal); }
-    Vec3x4 specular_normal(const Color& given) const { return specular(normal(given)); }
+    Vec3x4 specular_normal(const Color& input) const { return specular(normal(input)); }
     long4 is_smooth(const MicrofacetsOf<double4>& facets) const { return is_mirror(facets, version); }
 };
 

@@ -66,7 +66,7 @@ class Pixel {
 
     // The sum of all samples' differences from the first one, and the variance of one sample; without exposure.
     Vec3 differences() const { return rgb(differences_); }
-    Vec3 sample_variance() const { return rgb(max((spread_ - differences_ * differences_ / double(count_)) / (count_ - 1.0), double4{})); }
+    Vec3 sample_variance() const { return rgb(max((squared_differences_ - differences_ * differences_ / double(count_)) / (count_ - 1.0), double4{})); }
 
     Vec3 combined(const FilmSettings& film) const { return rgb((first_ + differences_ / double(count_)) * film.exposure); }
     // The variance of `combined`: that of the batches' means over their number, as if one that has begun had ended.
@@ -84,9 +84,9 @@ class Pixel {
     }
     void write(const LightPasses& passes, size_t pixel, const FilmSettings& film, Vec3 variance) const {
         Vec3 color = rgb(totals_[COLOR]) / count_;
-        float* shown = passes.plane[LightPasses::COMBINED] + 4 * pixel;
-        store(shown, combined(film));
-        shown[3] = film.transparent ? float(covered_ / count_) : 1.0f;
+        float* rgba = passes.plane[LightPasses::COMBINED] + 4 * pixel;
+        store(rgba, combined(film));
+        rgba[3] = film.transparent ? float(covered_ / count_) : 1.0f;
         auto show = [&](LightPasses::Pass pass, Vec3 value) {
             if (float* to = passes.plane[pass]) store(to + 3 * pixel, value);
         };
@@ -104,27 +104,27 @@ class Pixel {
     static constexpr uint32_t BATCHES = 16, FEW = 4;
 
     [[gnu::always_inline]] void add_few(const PathLight* samples, uint32_t count, const FilmSettings& film, uint32_t batch_size) {
-        double4 shown[FEW] = {};
+        double4 combined[FEW] = {};
         unsigned brought = 0, by_all = ~0u;
         for (uint32_t i = 0; i < count; i++) brought |= samples[i].brought, by_all &= samples[i].brought;
         while (brought) {
             int category = take_bit(brought);
-            bool is_shown = category != COLOR && !(film.transparent && category == ENVIRONMENT);
+            bool in_combined = category != COLOR && !(film.transparent && category == ENVIRONMENT);
             double4 total = totals_[category];
             for (uint32_t i = 0; i < count; i++) {
                 if (!(by_all >> category & 1) && !(samples[i].brought >> category & 1)) continue;
                 total += samples[i].of[category];
-                if (is_shown) shown[i] += samples[i].of[category];
+                if (in_combined) combined[i] += samples[i].of[category];
             }
             totals_[category] = total;
         }
-        if (count_ == 0) first_ = shown[0];
-        double4 first = first_, differences = differences_, spread = spread_;
+        if (count_ == 0) first_ = combined[0];
+        double4 first = first_, differences = differences_, squared_differences = squared_differences_;
         double covered = covered_;
         for (uint32_t i = 0; i < count; i++) {
-            double4 difference = shown[i] - first;
+            double4 difference = combined[i] - first;
             differences += difference;
-            spread += difference * difference;
+            squared_differences += difference * difference;
             covered += samples[i].covered;
             if ((++count_ & (batch_size - 1)) == 0) {
                 double4 batch = differences - before_;
@@ -132,7 +132,7 @@ class Pixel {
                 before_ = differences;
             }
         }
-        differences_ = differences, spread_ = spread, covered_ = covered;
+        differences_ = differences, squared_differences_ = squared_differences, covered_ = covered;
     }
 
     static Vec3 rgb(double4 channels) { return {channels[0], channels[1], channels[2]}; }
@@ -155,7 +155,7 @@ class Pixel {
 
     double4 totals_[CATEGORIES] = {};
     double4 first_{}, differences_{};  // the first sample, and the sum of all differences from it
-    double4 spread_{};                 // their squares
+    double4 squared_differences_{};    // and of their squares
     double4 before_{}, squares_{};     // the sum of differences when the last batch began, and the batches' own sums, squared
     double covered_ = 0;
     uint32_t count_ = 0;

@@ -53,7 +53,7 @@ struct BlackmanHarris {
     }
 };
 struct Gaussian {
-    static constexpr double STEEPNESS = 18, REACH = 1.5;  // of exp(−18 x²)
+    static constexpr double STEEPNESS = 18, REACH = 1.5;  // exp(−18 x²), and its half width
 
     static double density(double x) { return exp(-STEEPNESS * x * x) / (2 * integral(1)); }
     static double mass(double x) { return 0.5 + integral(x) / (2 * integral(1)); }
@@ -101,8 +101,8 @@ class Filter {
     }
 
     template <class Shape> static const std::vector<Cubic>& inverse() {
-        static const std::vector<Cubic> made = inverted<Shape>();
-        return made;
+        static const std::vector<Cubic> cubics = inverted<Shape>();
+        return cubics;
     }
     template <class Shape> static std::vector<Cubic> inverted() {
         std::vector<Cubic> steps(STEPS);

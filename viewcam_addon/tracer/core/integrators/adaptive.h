@@ -82,9 +82,10 @@ class TileSampler {
         double columns[PathIntegrator::MOST], rows[PathIntegrator::MOST];  // on the film
         PathLight light[PathIntegrator::MOST];
     };
-    // The variance of a pixel's mean as its samples tell it: s²/N and D²/4, the mean of the channels.
-    struct Spread {
-        double sample = 0, own = 0, apart = 0;
+    // The variance of one sample of a pixel, s², and that of their mean as samples tell it, s²/N, and as halves do, D²/4: the mean of
+    // the channels.
+    struct VarianceEstimate {
+        double of_sample = 0, by_samples = 0, by_halves = 0;
     };
 
     static uint32_t tiles(uint32_t pixels) { return (pixels + TILE - 1) / TILE; }
@@ -145,7 +146,7 @@ class TileSampler {
     }
 
     void trace_until_known(Tile& tile, const LightPasses& passes, const volatile int* stop) const {
-        std::vector<Spread> spreads(TILE * TILE);
+        std::vector<VarianceEstimate> estimates(TILE * TILE);
         std::vector<double> efficiencies;
         std::vector<uint16_t> active = all(tile), going;
         for (uint32_t taken = 0; !active.empty() && !(stop && *stop);) {
@@ -155,58 +156,58 @@ class TileSampler {
             for (uint16_t place : active) halves[place] = tile.pixels[place].differences();
             sample(tile, active, half, goal, 1, stop);
             if (stop && *stop) return;
-            for (uint16_t place : active) spreads[place] = spread(tile.pixels[place], halves[place], half);
+            for (uint16_t place : active) estimates[place] = estimate(tile.pixels[place], halves[place], half);
             taken = goal;
-            efficiencies = efficiency(tile, spreads);
+            efficiencies = efficiency(tile, estimates);
             going.clear();
             if (taken < samples_)
                 for (uint16_t place : active)
-                    if (around(tile, spreads, place) / taken * efficiencies[place] > error_ * error_) going.push_back(place);
+                    if (around(tile, estimates, place) / taken * efficiencies[place] > error_ * error_) going.push_back(place);
             active.swap(going);
         }
         for (uint16_t place : all(tile)) {
-            const Pixel& one = tile.pixels[place];
-            Vec3 variance = one.sample_variance() / one.count() * (efficiencies[place] * film_.exposure * film_.exposure);
-            one.write(passes, pixel(tile, place), film_, variance);
+            const Pixel& sums = tile.pixels[place];
+            Vec3 variance = sums.sample_variance() / sums.count() * (efficiencies[place] * film_.exposure * film_.exposure);
+            sums.write(passes, pixel(tile, place), film_, variance);
         }
     }
 
-    Spread spread(const Pixel& pixel, Vec3 of_half, uint32_t half) const {
+    VarianceEstimate estimate(const Pixel& pixel, Vec3 of_half, uint32_t half) const {
         double exposure = film_.exposure * film_.exposure, sample = mean(pixel.sample_variance()) * exposure;
         Vec3 apart = (pixel.differences() - of_half) / (pixel.count() - half) - of_half / half;
         return {sample, sample / pixel.count(), mean(apart * apart) / 4 * exposure};
     }
 
     // For each pixel, the variance of its mean over s²/N, 1 at most.
-    static std::vector<double> efficiency(const Tile& tile, const std::vector<Spread>& spreads) {
+    static std::vector<double> efficiency(const Tile& tile, const std::vector<VarianceEstimate>& estimates) {
         constexpr uint32_t BLOCKS = TILE / BLOCK;
-        Spread total, block[BLOCKS * BLOCKS];
+        VarianceEstimate total, block[BLOCKS * BLOCKS];
         double known = 0;
-        std::vector<double> found(TILE * TILE, 1.0);
+        std::vector<double> efficiencies(TILE * TILE, 1.0);
         for (uint16_t place : all(tile)) {
-            Spread& here = block[place / TILE / BLOCK * BLOCKS + place % TILE / BLOCK];
-            here.own += spreads[place].own, here.apart += spreads[place].apart;
-            total.own += spreads[place].own, total.apart += spreads[place].apart;
-            known += spreads[place].own > 0;
+            VarianceEstimate& here = block[place / TILE / BLOCK * BLOCKS + place % TILE / BLOCK];
+            here.by_samples += estimates[place].by_samples, here.by_halves += estimates[place].by_halves;
+            total.by_samples += estimates[place].by_samples, total.by_halves += estimates[place].by_halves;
+            known += estimates[place].by_samples > 0;
         }
-        if (!(total.own > 0)) return found;
-        double weight = SHARED * BLOCK * BLOCK * total.own / known;
+        if (!(total.by_samples > 0)) return efficiencies;
+        double weight = SHARED * BLOCK * BLOCK * total.by_samples / known;
         for (uint16_t place : all(tile)) {
-            const Spread &here = block[place / TILE / BLOCK * BLOCKS + place % TILE / BLOCK], &own = spreads[place];
-            double others = total.own - own.own, apart = others > 0 ? (total.apart - own.apart) / others : 1;
-            double share = (here.apart - own.apart + weight * apart) / (here.own - own.own + weight);
-            found[place] = std::clamp(share, 0.0, 1.0);
+            const VarianceEstimate &here = block[place / TILE / BLOCK * BLOCKS + place % TILE / BLOCK], &pixel = estimates[place];
+            double others = total.by_samples - pixel.by_samples, ratio = others > 0 ? (total.by_halves - pixel.by_halves) / others : 1;
+            double share = (here.by_halves - pixel.by_halves + weight * ratio) / (here.by_samples - pixel.by_samples + weight);
+            efficiencies[place] = std::clamp(share, 0.0, 1.0);
         }
-        return found;
+        return efficiencies;
     }
 
     // The variance of a sample in the mean over the pixels around one.
-    static double around(const Tile& tile, const std::vector<Spread>& spreads, uint16_t place) {
+    static double around(const Tile& tile, const std::vector<VarianceEstimate>& estimates, uint16_t place) {
         int y = place / TILE, x = place % TILE, count = 0;
         double sum = 0;
         for (int row = std::max(y - AROUND, 0); row <= std::min(y + AROUND, int(tile.height) - 1); row++)
             for (int column = std::max(x - AROUND, 0); column <= std::min(x + AROUND, int(tile.width) - 1); column++)
-                if (row != y || column != x) sum += spreads[row * int(TILE) + column].sample, count++;
+                if (row != y || column != x) sum += estimates[row * int(TILE) + column].of_sample, count++;
         return count ? sum / count : INFINITE;
     }
 
@@ -216,7 +217,7 @@ class TileSampler {
     uint32_t samples_;
     double error_;
     Camera camera_;
-    std::vector<std::vector<Pixel>> under_way_;  // of each tile, while it has some of its samples
+    std::vector<std::vector<Pixel>> under_way_;  // by tile, while it has some of its samples
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

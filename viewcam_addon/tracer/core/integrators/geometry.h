@@ -46,30 +46,30 @@ inline void write_geometry(const Scene& scene, const RayOf& ray_of, const HitOf&
     const Ray* met_by[PACKET];
     Hit met[PACKET];
     size_t at[PACKET], beside[PACKET];
-    Interaction found[PACKET];
+    Interaction points[PACKET];
     double magnitudes[PACKET];
-    int some = 0, none = 0;
+    int hit_count = 0, miss_count = 0;
     for (int i = 0; i < count; i++) {
         if (Hit hit = hit_of(i))
-            rays[some] = ray_of(i), met_by[some] = &rays[some], met[some] = hit, at[some++] = pixels[i];
+            rays[hit_count] = ray_of(i), met_by[hit_count] = &rays[hit_count], met[hit_count] = hit, at[hit_count++] = pixels[i];
         else
-            beside[none++] = pixels[i];
+            beside[miss_count++] = pixels[i];
     }
-    passes.write(DEPTH, beside, none, [](int) { return BACKGROUND_DEPTH; });
-    for (GeometryPasses::Pass pass : {POSITION, NORMAL, UV}) passes.write(pass, beside, none, [](int) { return Vec3{}; });
+    passes.write(DEPTH, beside, miss_count, [](int) { return BACKGROUND_DEPTH; });
+    for (GeometryPasses::Pass pass : {POSITION, NORMAL, UV}) passes.write(pass, beside, miss_count, [](int) { return Vec3{}; });
     for (GeometryPasses::Pass pass : {OBJECT_INDEX, MATERIAL_INDEX, MAGNITUDE, FACING})
-        passes.write(pass, beside, none, [](int) { return 0.0; });
-    if (!some) return;
+        passes.write(pass, beside, miss_count, [](int) { return 0.0; });
+    if (!hit_count) return;
 
-    scene.interactions(met_by, met, some, found, passes.plane[MAGNITUDE] ? magnitudes : nullptr);
-    passes.write(DEPTH, at, some, [&](int i) { return found[i].t; });
-    passes.write(POSITION, at, some, [&](int i) { return met_by[i]->direction * found[i].t + (scene.origin + met_by[i]->origin); });
-    passes.write(NORMAL, at, some, [&](int i) { return found[i].shading; });
-    passes.write(UV, at, some, [&](int i) { return Vec3{found[i].uv.x, found[i].uv.y, found[i].has_uv ? 1.0 : 0.0}; });
-    passes.write(OBJECT_INDEX, at, some, [&](int i) { return scene.objects[found[i].object].index; });
-    passes.write(MATERIAL_INDEX, at, some, [&](int i) { return scene.slots[found[i].slot].index; });
-    passes.write(FACING, at, some, [&](int i) { return max(0.0, min(found[i].cosine, 1.0)); });
-    passes.write(MAGNITUDE, at, some, [&](int i) { return max(max_component(abs(scene.origin + met_by[i]->origin)), magnitudes[i]); });
+    scene.interactions(met_by, met, hit_count, points, passes.plane[MAGNITUDE] ? magnitudes : nullptr);
+    passes.write(DEPTH, at, hit_count, [&](int i) { return points[i].t; });
+    passes.write(POSITION, at, hit_count, [&](int i) { return met_by[i]->direction * points[i].t + (scene.origin + met_by[i]->origin); });
+    passes.write(NORMAL, at, hit_count, [&](int i) { return points[i].shading; });
+    passes.write(UV, at, hit_count, [&](int i) { return Vec3{points[i].uv.x, points[i].uv.y, points[i].has_uv ? 1.0 : 0.0}; });
+    passes.write(OBJECT_INDEX, at, hit_count, [&](int i) { return scene.objects[points[i].object].index; });
+    passes.write(MATERIAL_INDEX, at, hit_count, [&](int i) { return scene.slots[points[i].slot].index; });
+    passes.write(FACING, at, hit_count, [&](int i) { return max(0.0, min(points[i].cosine, 1.0)); });
+    passes.write(MAGNITUDE, at, hit_count, [&](int i) { return max(max_component(abs(scene.origin + met_by[i]->origin)), magnitudes[i]); });
 }
 
 // The change with each pixel of the UV and the normal of what the eye's ray through a place in the picture meets: of its own
@@ -81,22 +81,22 @@ inline void slopes_at(const Scene& scene, double column, double row, const Hit& 
                         scene.camera.ray(column, row - STEP), scene.camera.ray(column, row + STEP)};
     const Ray* met_by[] = {&rays[0], &rays[1], &rays[2], &rays[3], &rays[4]};
     const Hit hits[] = {hit, hit, hit, hit, hit};
-    Interaction found[5];
-    scene.interactions(met_by, hits, 5, found);
+    Interaction points[5];
+    scene.interactions(met_by, hits, 5, points);
     uv = normal = 0;
     for (int axis = 0; axis < 2; axis++) {
         double of_uv = 0, of_normal = 0;
         for (int side = 1; side < 3; side++) {
-            const Interaction& beside = found[2 * axis + side];
-            Vec2 moved{beside.uv.x - found[0].uv.x, beside.uv.y - found[0].uv.y};
+            const Interaction& beside = points[2 * axis + side];
+            Vec2 moved{beside.uv.x - points[0].uv.x, beside.uv.y - points[0].uv.y};
             of_uv = max(of_uv, moved.x * moved.x + moved.y * moved.y);
-            Vec3 turned = beside.shading - found[0].shading;
+            Vec3 turned = beside.shading - points[0].shading;
             if (beside.t < INFINITE) of_normal = max(of_normal, dot(turned, turned));  // not of a ray that a sphere's rim is beside
         }
         uv += of_uv, normal += of_normal;
     }
     uv = std::sqrt(uv) / STEP, normal = std::sqrt(normal) / STEP;
-    Vec3 smooth = found[0].shading - found[0].normal;
+    Vec3 smooth = points[0].shading - points[0].normal;
     if (scene.triangle_count(hit.object) && dot(smooth, smooth) < FLAT * FLAT) {
         Vec3 corner[3];
         scene.corners(hit.object, hit.primitive, corner);
@@ -146,9 +146,9 @@ inline void render_geometry(
 // Notes for each pixel of a camera whether its center shows anything at all.
 inline void silhouette(const Scene& scene, const Camera& camera, uint8_t* covered) {
     for_pixel_centers(camera, 0, camera.height, nullptr, [&](const Rays& rays, const size_t* pixels, int count) {
-        bool found[PACKET];
-        scene.occluded(rays, count, found);
-        for (int i = 0; i < count; i++) covered[pixels[i]] = found[i];
+        bool hidden[PACKET];
+        scene.occluded(rays, count, hidden);
+        for (int i = 0; i < count; i++) covered[pixels[i]] = hidden[i];
     });
 }
 

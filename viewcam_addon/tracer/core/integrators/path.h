@@ -82,7 +82,7 @@ class PathIntegrator {
             kinds_ |= material.kinds();
             transparent_ |= material.is_transparent();
             mixed_ |= material.is_transparent() && material.scatters();
-            spread_ |= (material.kinds() & DIFFUSE) | material.rough_kinds();
+            non_specular_ |= (material.kinds() & DIFFUSE) | material.rough_kinds();
         }
         for (RayKind kind : {DIFFUSE, GLOSSY, TRANSMISSION}) {
             meets_[kind] = shines || lights_.environment().lights(kind) || lights_.meets_lamps(kind);
@@ -114,7 +114,7 @@ class PathIntegrator {
     bool is_random() const {
         bool random = mixed_ || (kinds_ & GLOSSY && kinds_ & TRANSMISSION);
         for (RayKind kind : {DIFFUSE, GLOSSY, TRANSMISSION})
-            random |= spread_ & kind && (lights_.is_random() || std::min(most_, most_of_[kind]) > 1 || meets_[kind]);
+            random |= non_specular_ & kind && (lights_.is_random() || std::min(most_, most_of_[kind]) > 1 || meets_[kind]);
         return lit_ && random;
     }
 
@@ -144,9 +144,9 @@ class PathIntegrator {
         RayKind kind = CAMERA;
         bool coincident = false;             // true if it has met surfaces in one place
         bool last = false, through = false;  // through: whether light from behind counts where it leaves
-        bool diffuse = false;                // what its ray was scattered by
+        bool diffuse = false;                // true if a diffuse lobe scattered its ray
         int passed = 0;                      // surfaces that it has gone straight through
-        double width = 0, spread = 0;        // of its pixel, as RayState has it, where materials ask for that
+        double width = 0, spread = 0;        // its pixel's, as RayState has it, where materials ask for that
         std::array<uint16_t, 3> scattered = {};  // diffuse, glossy, transmission
         uint32_t inside = NONE;                   // the object that it has been let into last, until it is let out
         bool may_touch = false, touches = false;  // true if its ray may meet, or has met, a surface right where it starts
@@ -197,8 +197,8 @@ class PathIntegrator {
         uint64_t wide = 0;
         Path wide_paths[MOST];
         WidePoint wide_points[MOST];
-        Interaction tables[2][2 * MOST], *points = tables[0], *next_points = tables[1];  // those of wide materials behind the others
-        Lit lit[LightSampler::ASKED];  // by the light that was asked
+        Interaction tables[2][2 * MOST], *points = tables[0], *next_points = tables[1];  // wide materials' points behind the others
+        Lit lit[LightSampler::MOST_CHOICES];  // by the light that was asked
         Hits hits;
         // The hits of the rays of some paths.
         Ray met_rays[MOST];
@@ -529,10 +529,10 @@ class PathIntegrator {
                 if (!ends || meets_[kind]) leading |= kind;
             }
             double brightest = 0, sky = 1;  // sky: how often a diffuse ray is worth it that finds the sky alone
-            bool through = bsdf.spread_kinds() & TRANSMISSION;
-            LightSampler::Choice choices[LightSampler::ASKED];
+            bool through = bsdf.non_specular_kinds() & TRANSMISSION;
+            LightSampler::Choice choices[LightSampler::MOST_CHOICES];
             int chosen = 0;
-            if (bsdf.spread_kinds() && lights_.count() > 0)
+            if (bsdf.non_specular_kinds() && lights_.count() > 0)
                 chosen = lights_.choose(point, lights_.is_random() ? number(SobolSampler::LIGHT) : 0, depth == 1, through, choices, brightest);
             if (brightest > 0 && last & DIFFUSE) {
                 if (bsdf.kinds() & leading & ~DIFFUSE)  // lobes that may show lamps take its place
@@ -670,10 +670,10 @@ class PathIntegrator {
         if (!meets_[DIFFUSE]) diffuse &= ~last_diffuse;
         if (!meets_[GLOSSY]) glossy &= ~last_glossy;
 
-        LightSampler::Choices choices[LightSampler::ASKED];
+        LightSampler::Choices choices[LightSampler::MOST_CHOICES];
         double4 brightest{}, sky = splat4(1.0), u{};
         Vec2x4 u_light;
-        if (unsigned lit = four.lanes & lanes_with(bsdf.spread_kinds(), DIFFUSE | GLOSSY); lit && lights_.count() > 0) {
+        if (unsigned lit = four.lanes & lanes_with(bsdf.non_specular_kinds(), DIFFUSE | GLOSSY); lit && lights_.count() > 0) {
             if (lights_.is_random()) u = number(SobolSampler::LIGHT), u_light = pair(SobolSampler::LIGHT_POINT);
             lights_.choose(point_of, lit, u, depth == 1, choices, brightest);
         }
@@ -688,7 +688,7 @@ class PathIntegrator {
             }
             bsdf.thin(DIFFUSE, share);
         }
-        for (int slot = 0; slot < LightSampler::ASKED; slot++)
+        for (int slot = 0; slot < LightSampler::MOST_CHOICES; slot++)
             if (choices[slot].lanes) ask(choices[slot], slot, four, bsdf, point_of, u_light, depth, block);
 
         if (!(four.lanes & (diffuse | glossy))) return;
@@ -730,12 +730,12 @@ class PathIntegrator {
     template <class PointOf>
     void ask(const LightSampler::Choices& choice, int slot, const WidePaths& four, const BSDFOf<double4>& bsdf, const PointOf& point_of, const Vec2x4& u, int depth, Block& block) const {
         LightSampleOf<double4> sample = choice.sample_li(four.at, point_of, u);
-        uint4 kinds = choice.flags([](const Light& light) { return ~light.hidden_from; }), found_by = choice.flags([](const Light& light) { return light.found_by(); });
+        uint4 kinds = choice.flags([](const Light& light) { return ~light.hidden_from; }), hit_by = choice.flags([](const Light& light) { return light.hit_by(); });
         uint4 shadow_rays = choice.flags([](const Light& light) { return uint32_t(light.casts_shadow ? light.shadow_rays : NO_RAY); });
         // See the other one.
         long4 lossy = has(choice.flags([](const Light& light) { return uint32_t(light.multiple_importance); }), 1) & ~long4(dot(four.at.normal, sample.direction) > 0.0);
         auto weight = [&](RayKind kind, auto&& pdf) {
-            long4 shared = lossy | has(found_by, kind);
+            long4 shared = lossy | has(hit_by, kind);
             return any(shared) ? select(shared, power_heuristic(sample.pdf * choice.chance, pdf()), splat4(1.0)) : splat4(1.0);
         };
         ScatteredLightOf<double4> light = bsdf.eval(sample.direction, kinds, weight);
@@ -775,14 +775,14 @@ class PathIntegrator {
         uint32_t kinds = ~choice.light->hidden_from, unseen = 0;  // unseen: for which no scattered ray finds what this one does
         bool hidden_from_some = coincident_ > 0 && !path.coincident && end == 0;
         if (hidden_from_some) {
-            kinds &= bsdf.spread_kinds();
+            kinds &= bsdf.non_specular_kinds();
             see_otherwise(*choice.light, point, sample, path, depth, kinds, unseen);
             if (!kinds) return;
         }
         auto weight = [&](RayKind kind, auto&& pdf) {
             if (unseen & kind) return 1.0;
             bool is_lost = behind != (kind == TRANSMISSION);
-            return (is_lost && choice.light->multiple_importance) || choice.light->found_by() & kind ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1.0;
+            return (is_lost && choice.light->multiple_importance) || choice.light->hit_by() & kind ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1.0;
         };
         ScatteredLight light = bsdf.eval(sample.direction, kinds, weight);
         if (depth > 1) light.diffuse += light.other, light.other = {};
@@ -802,8 +802,8 @@ class PathIntegrator {
     // Leaves of kinds of rays those that see a light otherwise than shadow rays do. unseen: receives those of them that don't see it.
     [[gnu::noinline]] void see_otherwise(const Light& light, const Interaction& point, const LightSample& sample, const Path& path, int depth, uint32_t& kinds,
                                          uint32_t& unseen) const {
-        bool found_both_ways = light.is_sized() && light.multiple_importance && light.shadow_rays == SHADOW;
-        if (!sees_otherwise_ || !found_both_ways) {
+        bool uses_mis = light.is_sized() && light.multiple_importance && light.shadow_rays == SHADOW;
+        if (!sees_otherwise_ || !uses_mis) {
             kinds = 0;
             return;
         }
@@ -914,7 +914,7 @@ class PathIntegrator {
     }
 
     const Scene& scene_;
-    std::vector<char> wide_;  // of each material, Material::is_wide
+    std::vector<char> wide_;  // by material, Material::is_wide
     LightSampler lights_;
     SobolSampler sampler_;
     int most_, most_of_[TRANSMISSION + 1] = {};
@@ -925,7 +925,7 @@ class PathIntegrator {
     bool sees_otherwise_ = false;                     // true if shadow rays may find a light where scattered rays don't, or the reverse
     bool has_pixels_ = false;                         // true if materials ask how wide pixels are
     int most_passed_, ended_after_;                   // surfaces that shadow rays, and paths, go straight through
-    uint32_t kinds_ = 0, spread_ = 0;  // of rays that any material scatters, and all over
+    uint32_t kinds_ = 0, non_specular_ = 0;  // kinds of rays that any material scatters, and those scattered all over
     double coincident_;                // roundings
     mutable std::mutex mutex_;
     mutable std::map<std::pair<uint32_t, uint32_t>, uint64_t> pairs_;

@@ -37,7 +37,7 @@ class Environment {
         mean_ = {};
         double total = 0;
         for (int row = 0; row < rows_; row++) {
-            double part = (heights_[row + 1] - heights_[row]) / 2;  // of the sphere
+            double part = (heights_[row + 1] - heights_[row]) / 2;  // share of the sphere
             mean_ += of_rows[row] * (part / columns_);
             rows_reached_[row] = total += reached_[size_t(row + 1) * columns_ - 1] * part;
         }
@@ -108,7 +108,7 @@ class Environment {
     const Texture* texture_ = nullptr;
     Vec3 mean_{};
     int columns_ = 0, rows_ = 0;
-    std::vector<double> heights_;                 // of the rows' edges on the unit sphere
+    std::vector<double> heights_;                 // the rows' edges on the unit sphere
     std::vector<double> reached_, rows_reached_;  // light summed up along each row, and over the rows
 };
 

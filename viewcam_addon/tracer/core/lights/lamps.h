@@ -22,18 +22,18 @@ class Sun {
     Sun(const Affine& to_world, Vec3 irradiance, const Inputs& in) : towards_(column(to_world, 2)), irradiance_(irradiance) {
         double half = not_tiny(in.number("angle") / 2), sine = sin(half);
         half_chord_ = sin(half / 2);
-        spread_ = 2 * half_chord_ * half_chord_;
+        one_minus_cos_max_ = 2 * half_chord_ * half_chord_;
         radiance_ = half > 0 ? irradiance * (1 / (PI * sine * sine)) : Vec3{};
     }
 
-    bool is_sized() const { return spread_ > 0; }
+    bool is_sized() const { return one_minus_cos_max_ > 0; }
 
     template <class T> LightSampleOf<T> sample_li(const SurfacePoint<T>&, Vec2Of<T> u) const {
-        T short_of;
+        T one_minus_cos;
         Vec3Of<T> direction = splat<T>(towards_);
-        if (spread_ > 0) direction = cone_direction(direction, splat<T>(spread_), u, short_of);
+        if (one_minus_cos_max_ > 0) direction = cone_direction(direction, splat<T>(one_minus_cos_max_), u, one_minus_cos);
         // The weight is the radiance times 2π (1 − cos).
-        return {direction, splat<T>(INFINITE), splat<T>(irradiance_ * (2 / (2 - spread_))), splat<T>(pdf_li())};
+        return {direction, splat<T>(INFINITE), splat<T>(irradiance_ * (2 / (2 - one_minus_cos_max_))), splat<T>(pdf_li())};
     }
     double pdf_li(const Interaction&, Vec3) const { return pdf_li(); }
 
@@ -45,15 +45,15 @@ class Sun {
     Vec3 normal(Vec3, Vec3 ahead) const { return -ahead; }
 
     double estimate(Vec3, Vec3 normal) const {
-        return risen(dot(normal, towards_), 1, std::sqrt(spread_ * (2 - spread_))) * mean(irradiance_);
+        return risen(dot(normal, towards_), 1, std::sqrt(one_minus_cos_max_ * (2 - one_minus_cos_max_))) * mean(irradiance_);
     }
     double irradiance() const { return mean(irradiance_); }
 
    private:
-    double pdf_li() const { return spread_ > 0 ? 1 / (2 * PI * spread_) : INFINITE; }
+    double pdf_li() const { return one_minus_cos_max_ > 0 ? 1 / (2 * PI * one_minus_cos_max_) : INFINITE; }
 
     Vec3 towards_, irradiance_, radiance_;
-    double half_chord_, spread_;  // of half the disc's diameter; spread: 1 − cos
+    double half_chord_, one_minus_cos_max_;  // half the disc's diameter
 };
 
 // Points: spheres that shine evenly, or, with a soft falloff, discs that face whatever they light.
@@ -79,7 +79,7 @@ class Point {
         return Mask<T>(sqrt(dot(way, way)) <= radius_);
     }
     // 1 − cos of half the cone that the light fills, seen from outside.
-    template <class T> T spread(Vec3Of<T> place) const {
+    template <class T> T one_minus_cos_max(Vec3Of<T> place) const {
         Vec3Of<T> way = splat<T>(center_) - place;
         T to_edge = dot(way, way) + (soft_ ? radius_ * radius_ : 0.0);
         return select(Mask<T>(to_edge > 0.0), one_minus_cosine(min(radius_ * radius_ / to_edge, splat<T>(1))), T{});
@@ -99,7 +99,7 @@ class Point {
     double pdf_li(const Interaction& from, Vec3 direction) const {
         if (radius_ == 0) return INFINITE;
         if (is_around(from.position)) return max(dot(from.shading, direction), 0.0) / PI;
-        return 1 / (2 * PI * spread(from.position));
+        return 1 / (2 * PI * one_minus_cos_max(from.position));
     }
 
     // True if a ray runs into the light. leaves: from inside, `only_outside` forbids what lies behind the middle.
@@ -148,9 +148,9 @@ class Point {
         return {ahead, reached, splat<T>(radiance_) * (PI / max(cosine, splat<T>(LEAST_COSINE))), cosine / PI};
     }
     template <class T> LightSampleOf<T> sample_outside(const SurfacePoint<T>& from, Vec2Of<T> u, Vec3Of<T> axis, T squared, T distance) const {
-        T to_edge = squared + (soft_ ? radius_ * radius_ : 0.0), open = spread(from.position), short_of;
-        Vec3Of<T> ahead = cone_direction(axis, open, u, short_of);
-        T along = distance * (1.0 - short_of), root = sqrt(max(radius_ * radius_ - squared * short_of * (2.0 - short_of), T{}));
+        T to_edge = squared + (soft_ ? radius_ * radius_ : 0.0), open = one_minus_cos_max(from.position), one_minus_cos;
+        Vec3Of<T> ahead = cone_direction(axis, open, u, one_minus_cos);
+        T along = distance * (1.0 - one_minus_cos), root = sqrt(max(radius_ * radius_ - squared * one_minus_cos * (2.0 - one_minus_cos), T{}));
         T reached = soft_ ? select(Mask<T>(along > 0.0), squared / along, T{}) : along - root;
         return {ahead, reached, bounded(select(Mask<T>(to_edge > 0.0), 1.0 / ((2.0 - open) * (2 * PI * to_edge)), T{})), 1.0 / (2 * PI * open)};
     }
@@ -179,7 +179,7 @@ class Spot {
         double askew = max(std::fabs(dot(x, y)), max(std::fabs(dot(y, z)), std::fabs(dot(z, x))));
         double longest = max(dot(x, x), max(dot(y, y), dot(z, z)));
         double wider = max(dot(x, x), dot(y, y)) / dot(z, z), tangent = sin(angle / 2) / edge_;
-        spread_ = askew > SHEARED * longest ? UNKNOWN : 1 - 1 / std::sqrt(1 + tangent * tangent * wider);
+        one_minus_cos_max_ = askew > SHEARED * longest ? UNKNOWN : 1 - 1 / std::sqrt(1 + tangent * tangent * wider);
     }
 
     bool is_sized() const { return point_.is_sized(); }
@@ -191,7 +191,7 @@ class Spot {
         return sample;
     }
     double pdf_li(const Interaction& from, Vec3 direction) const {
-        if (is_sized() && !point_.is_around(from.position) && is_narrow(from.position)) return 1 / (2 * PI * spread_);
+        if (is_sized() && !point_.is_around(from.position) && is_narrow(from.position)) return 1 / (2 * PI * one_minus_cos_max_);
         return point_.pdf_li(from, direction);
     }
 
@@ -211,7 +211,7 @@ class Spot {
     }
     LightBounds bounds() const {
         LightBounds bounds = point_.bounds();
-        bounds.axis = -axis_, bounds.cos_normals = max(1 - spread_, -1.0);
+        bounds.axis = -axis_, bounds.cos_normals = max(1 - one_minus_cos_max_, -1.0);
         return bounds;
     }
 
@@ -226,18 +226,18 @@ class Spot {
         return rise * rise * (3 - 2 * rise);
     }
     // True if the sphere is so large, or near, that the spot's cone is narrower than it looks.
-    bool is_narrow(Vec3 place) const { return is_sized() && !point_.is_soft() && spread_ < point_.spread(place); }
+    bool is_narrow(Vec3 place) const { return is_sized() && !point_.is_soft() && one_minus_cos_max_ < point_.one_minus_cos_max(place); }
     LightSample along_the_beam(const Interaction& from, Vec2 u) const {
-        double short_of, radius = point_.radius();
-        Vec3 way = point_.center() - from.position, ahead = cone_direction(axis_, spread_, u, short_of);
+        double one_minus_cos, radius = point_.radius();
+        Vec3 way = point_.center() - from.position, ahead = cone_direction(axis_, one_minus_cos_max_, u, one_minus_cos);
         double along = dot(way, ahead), root = radius * radius - (dot(way, way) - along * along);
-        Vec3 weight = root >= 0 && along > 0 ? point_.radiance() * (2 * PI * spread_) : Vec3{};
-        return {ahead, along - std::sqrt(max(root, 0.0)), weight, 1 / (2 * PI * spread_)};
+        Vec3 weight = root >= 0 && along > 0 ? point_.radiance() * (2 * PI * one_minus_cos_max_) : Vec3{};
+        return {ahead, along - std::sqrt(max(root, 0.0)), weight, 1 / (2 * PI * one_minus_cos_max_)};
     }
 
     Point point_;
     Vec3 inverse_[3], axis_;        // axis: against the beam
-    double edge_, slope_, spread_;  // spread: 1 − cos of half the opening of a cone about the axis that holds all light
+    double edge_, slope_, one_minus_cos_max_;  // the latter: of half the opening of a cone about the axis that holds all light
 };
 
 // A rectangle parallel to the x-y plane, seen from the origin: points of it spread evenly over the solid angle that it fills.
@@ -344,7 +344,7 @@ class Area {
         double before = -dot(way, normal_), squared = dot(way, way), farthest = std::sqrt(squared) + reach_;
         if (!(before > 0)) return 0;
         double light = max(dot(normal, way) + reach_, 0.0) * (before + reach_);  // two cosines, as of `risen`
-        double aside = max(std::sqrt(max(squared - before * before, 0.0)) - reach_, 0.0);  // of what of it is the least aside
+        double aside = max(std::sqrt(max(squared - before * before, 0.0)) - reach_, 0.0);  // the least distance aside of any part of it
         double most = through_grid(before / std::sqrt(before * before + aside * aside));
         return light * most * (mean(power_) / PI / (farthest * farthest * (squared + reach_ * reach_ / 2)));
     }
@@ -416,7 +416,7 @@ class Area {
 
     Vec3 center_, power_, radiance_, first_, second_, normal_;  // half sides, unit; normal: to where it shines
     double lengths_[2], sine_, reach_, area_;
-    double cos_spread_ = 0, tan_spread_ = 0, focus_ = 0;  // of half the cone; focus: 0 without a grid
+    double cos_spread_ = 0, tan_spread_ = 0, focus_ = 0;  // half the cone; focus: 0 without a grid
     bool ellipse_, askew_;
 };
 

@@ -24,7 +24,7 @@ class Light {
     bool multiple_importance = true;  // true if rays run into it, where it has a size
     uint64_t receivers;
     RayKind shadow_rays;
-    uint32_t number = NONE;  // of lamps, in the scene
+    uint32_t number = NONE;  // a lamp's, in the scene
 
     // part: one number more in [0, 1), of those that have parts.
     LightSample sample_li(const Interaction& from, double part, Vec2 u) const {
@@ -113,7 +113,7 @@ class Light {
     const MeshLight* mesh() const { return std::get_if<MeshLight>(&kind_); }
     bool is_environment() const { return std::holds_alternative<EnvironmentLight>(kind_); }
     // The kinds of rays that are scattered all over and find it, too: diffuse ones see no lamps.
-    uint32_t found_by() const { return mesh() || is_environment() ? ~0u : is_sized() && multiple_importance ? ~uint32_t(DIFFUSE) : 0; }
+    uint32_t hit_by() const { return mesh() || is_environment() ? ~0u : is_sized() && multiple_importance ? ~uint32_t(DIFFUSE) : 0; }
 
     // Lets nodes change what a lamp gives, at each place of it and in each direction.
     void shine_by(const Color& emission, Vec3 middle, const Scene* scene) { emission_ = emission, middle_ = middle, scene_ = scene; }
@@ -157,7 +157,7 @@ static_assert(ALL_ARE_LIGHTS<Light::Kind>);
 
 // scene: whose nodes the lamp's emission is made by.
 inline Light light_of(const Lamp& lamp, const Scene* scene = nullptr) {
-    auto kind = std::visit([](const auto& one) -> Light::Kind { return one; }, lamp.kind);
+    auto kind = std::visit([](const auto& alternative) -> Light::Kind { return alternative; }, lamp.kind);
     Light light(kind, lamp.hidden_from, lamp.casts_shadow, lamp.receivers, lamp.shadow_rays);
     light.multiple_importance = lamp.multiple_importance;
     if (scene) light.shine_by(lamp.emission, lamp.middle, scene);

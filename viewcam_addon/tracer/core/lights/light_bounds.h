@@ -11,8 +11,8 @@ struct LightBounds {
     Bounds box;
     double intensity = 0;     // the most that any direction has, power by solid angle
     Vec3 axis{0, 0, 1};       // unit, in the middle of all normals
-    double cos_normals = -1;  // of the largest angle from the axis to a normal
-    double cos_emission = 1;  // of the largest angle from a normal to where light is given
+    double cos_normals = -1;  // the cosine of the largest angle from the axis to a normal
+    double cos_emission = 1;  // the cosine of the largest angle from a normal to where light is given
 
     Vec3 center() const { return box.low * 0.5 + box.high * 0.5; }
     bool is_around(Vec3 position) const {

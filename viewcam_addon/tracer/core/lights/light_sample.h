@@ -25,15 +25,15 @@ namespace viewcam::VIEWCAM_ISA {
 
 template <class T> struct LightSampleOf {
     Vec3Of<T> direction;               // unit, towards the light
-    T distance = splat<T>(INFINITE);   // of the point of the light
+    T distance = splat<T>(INFINITE);   // the distance of the point on the light
     Vec3Of<T> weight;                  // radiance over density
     T pdf = splat<T>(INFINITE);        // by solid angle; INFINITE of what has no size
     T cosine = splat<T>(1);            // under which the light's own surface is seen, of flat lights
 
     // Makes one of four this.
-    void set(int i, const LightSampleOf<double>& one) {
-        set_lane(direction, i, one.direction), set_lane(weight, i, one.weight);
-        distance[i] = one.distance, pdf[i] = one.pdf, cosine[i] = one.cosine;
+    void set(int i, const LightSampleOf<double>& sample) {
+        set_lane(direction, i, sample.direction), set_lane(weight, i, sample.weight);
+        distance[i] = sample.distance, pdf[i] = sample.pdf, cosine[i] = sample.cosine;
     }
 };
 using LightSample = LightSampleOf<double>;

@@ -21,7 +21,7 @@ namespace viewcam::VIEWCAM_ISA {
 class LightSampler {
    public:
     // For so many the chances are computed at each point, and so many lamps are asked one by one where the eye sees points.
-    static constexpr int FEW = 32, ASKED = 4;
+    static constexpr int FEW = 32, MOST_CHOICES = 4;
 
     // chance: that the light was chosen, above 0. rest: what is left of the number that chose, in [0, 1). slot: another for
     // each that is asked at a point, and the same at all points for a lamp that is asked by itself.
@@ -56,14 +56,14 @@ class LightSampler {
     };
 
     explicit LightSampler(const Scene& scene) : objects_(&scene.objects), environment_(&scene.illumination.environment) {
-        const Illumination& given = scene.illumination;
+        const Illumination& illumination = scene.illumination;
         uint32_t lit = DIFFUSE;  // the kinds of rays that surfaces scatter light into from any one direction
-        for (const Material& material : given.materials) lit |= material.rough_kinds();
+        for (const Material& material : illumination.materials) lit |= material.rough_kinds();
         std::vector<Light> unlit;
-        for (const Lamp& lamp : given.lamps) {
+        for (const Lamp& lamp : illumination.lamps) {
             linked_ |= lamp.receivers != EVERYTHING;
             Light light = light_of(lamp, &scene);
-            light.number = uint32_t(&lamp - given.lamps.data());
+            light.number = uint32_t(&lamp - illumination.lamps.data());
             (lit & ~lamp.hidden_from ? lights_ : unlit).push_back(light);
         }
         if (environment_->has_image() && lit & ~environment_->hidden_from) {
@@ -72,7 +72,7 @@ class LightSampler {
         }
         lamps_ = lights_.size();
         std::vector<Vec3> emissions;
-        for (const Material& material : given.materials) emissions.push_back(material.mean_emission());
+        for (const Material& material : illumination.materials) emissions.push_back(material.mean_emission());
         owners_.assign(scene.objects.size(), NONE);
         for (const Object& placed : scene.objects) linked_ |= placed.receivers != EVERYTHING;
         const Object* black = nullptr;  // the last object none of whose triangles shines: most of a million instances are like it
@@ -138,13 +138,13 @@ class LightSampler {
         return sum;
     }
 
-    // The lights that a point asks, at most ASKED. seen: whether the eye sees it, so that several are worth it. through: whether
+    // The lights that a point asks, at most MOST_CHOICES. seen: whether the eye sees it, so that several are worth it. through: whether
     // light from behind the surface counts. u: in [0, 1). brightest: receives about what the brightest lamp brings where lamps are asked one by one, else 0.
-    int choose(const Interaction& point, double u, bool seen, bool through, Choice (&choices)[ASKED], double& brightest) const {
+    int choose(const Interaction& point, double u, bool seen, bool through, Choice (&choices)[MOST_CHOICES], double& brightest) const {
         brightest = 0;
         if (count_ == 0) return 0;
-        if (asks_each() && seen) {
-            double estimates[ASKED];
+        if (samples_each() && seen) {
+            double estimates[MOST_CHOICES];
             for (int i = 0; i < count_; i++) brightest = max(brightest, estimates[i] = estimate(i, point, through));
             int chosen = 0;
             for (int i = 0; i < count_; i++) {
@@ -167,10 +167,10 @@ class LightSampler {
                 choices[0] = {&lights_[apart_[which]], apart * share, std::clamp((u - before) / share, 0.0, BELOW_1)};
                 return 1;
             }
-            LightTree::Choice found = tree_.choose(point, through, min((u - apart) / (1 - apart), BELOW_1));
-            double chance = (1 - apart) * found.chance;
+            LightTree::Choice choice = tree_.choose(point, through, min((u - apart) / (1 - apart), BELOW_1));
+            double chance = (1 - apart) * choice.chance;
             if (!(chance > SMALLEST_CHANCE)) return 0;
-            choices[0] = {&lights_[found.light], chance, found.rest};
+            choices[0] = {&lights_[choice.light], chance, choice.rest};
             return 1;
         }
         double estimates[FEW], total = 0, reached = 0;
@@ -191,15 +191,15 @@ class LightSampler {
     }
 
     // Choices for some of four points, by slot. point_of(i): all that is known of a point.
-    template <class PointOf> void choose(const PointOf& point_of, unsigned lanes, double4 u, bool seen, Choices (&choices)[ASKED], double4& brightest) const {
+    template <class PointOf> void choose(const PointOf& point_of, unsigned lanes, double4 u, bool seen, Choices (&choices)[MOST_CHOICES], double4& brightest) const {
         brightest = double4{};
-        if (count_ == 1 && !(asks_each() && seen)) {
+        if (count_ == 1 && !(samples_each() && seen)) {
             const Light* light = &lights_[0];
             choices[0] = {{light, light, light, light}, splat4(1.0), u, lanes};
             return;
         }
         while (lanes && count_ > 0) {
-            Choice chosen[ASKED];
+            Choice chosen[MOST_CHOICES];
             int i = take_bit(lanes);
             double most;
             for (int k = choose(point_of(i), u[i], seen, false, chosen, most); k-- > 0;) {
@@ -232,7 +232,7 @@ class LightSampler {
     static constexpr double WORTH = 0.25, SMALLEST_CHANCE = 1e-80, BELOW_1 = 1 - 0x1p-53;
 
     // True if lamps and the sky are asked one by one where the eye sees points.
-    bool asks_each() const { return count_ <= ASKED && !has_meshes() && (count_ > 1 || !is_black(environment_->radiance)); }
+    bool samples_each() const { return count_ <= MOST_CHOICES && !has_meshes() && (count_ > 1 || !is_black(environment_->radiance)); }
 
     // The most that a light may bring to a point.
     double estimate(uint32_t light, const Interaction& point, bool through) const {
@@ -247,7 +247,7 @@ class LightSampler {
     }
 
     void build_tree() {
-        constexpr double LEAST = 1e-100, MOST = 1e100;  // of which sums and quotients are numbers
+        constexpr double LEAST = 1e-100, MOST = 1e100;  // bounds within which sums and quotients are numbers
         std::vector<LightTree::Leaf> leaves;
         for (uint32_t i = 0; i < uint32_t(count_); i++) {
             if (std::optional<LightBounds> bounds = lights_[i].bounds())
@@ -292,7 +292,7 @@ class LightSampler {
     }
 
     double chance(const Interaction& point, uint32_t light, bool seen, bool through) const {
-        if (asks_each() && seen) {
+        if (samples_each() && seen) {
             double brightest = 0;
             for (int i = 0; i < count_; i++) brightest = max(brightest, estimate(i, point, through));
             return min(estimate(light, point, through) / (brightest * WORTH), 1.0);
@@ -320,16 +320,16 @@ class LightSampler {
     size_t lamps_;
     int count_;
     bool random_;
-    std::vector<uint32_t> owners_;                // of each object, which light it is
+    std::vector<uint32_t> owners_;                // by object, the light that it is
     std::vector<uint32_t> placed_, boundless_;    // lamps that have a size: in the hierarchy, and at infinity
     Bvh hierarchy_;
     uint32_t met_by_ = 0;  // the kinds of rays that run into any of these
-    LightTree tree_;                              // of many lights those that have a place
+    LightTree tree_;                              // among many lights, those that have a place
     std::vector<uint32_t> apart_;                 // and the others
     std::vector<double> reached_;                 // the sums of their chances
-    double irradiance_ = 0;                       // what they give together
+    double irradiance_ = 0;                       // the others' irradiance together
     const Environment* environment_;
-    uint32_t sky_ = NONE;  // which light the world's image is
+    uint32_t sky_ = NONE;  // the number of the world's image as a light
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -23,7 +23,7 @@ class LightTree {
     struct Choice {
         uint32_t light = NONE;
         double chance = 0;
-        double rest = 0;  // what is left of the number that chose, in [0, 1)
+        double rest = 0;  // the rest of the number that chose, in [0, 1)
     };
 
     LightTree() = default;
@@ -44,7 +44,7 @@ class LightTree {
         uint32_t node = 0;
         while (nodes_[node].light == NONE) {
             uint32_t first = node + 1, second = nodes_[node].second;
-            double one = importance(first, point, through), total = one + importance(second, point, through), share = one / total;
+            double weight = importance(first, point, through), total = weight + importance(second, point, through), share = weight / total;
             if (!(total > 0)) return {};
             bool is_first = choice.rest < share;
             choice.chance *= is_first ? share : 1 - share;
@@ -59,9 +59,9 @@ class LightTree {
         double product = 1;
         for (uint32_t node = node_of_[light]; node != 0;) {
             uint32_t parent = nodes_[node].parent, first = parent + 1;
-            double one = importance(first, point, through), total = one + importance(nodes_[parent].second, point, through);
+            double weight = importance(first, point, through), total = weight + importance(nodes_[parent].second, point, through);
             if (!(total > 0)) return 0;
-            product *= node == first ? one / total : 1 - one / total;
+            product *= node == first ? weight / total : 1 - weight / total;
             node = parent;
         }
         return product;
@@ -69,7 +69,7 @@ class LightTree {
 
    private:
     static constexpr double BELOW_1 = 1 - 0x1p-53;
-    static constexpr int FURTHER = 2;  // how far down it is looked where a box round a point says nothing
+    static constexpr int FURTHER = 2;  // levels to look further down where a box round a point says nothing
     static constexpr int BINS = 12, DEEP = 64;  // deeper, halves are split, whatever they give
 
     struct Node {
@@ -129,7 +129,7 @@ class LightTree {
     }
 
     std::vector<Node> nodes_;
-    std::vector<uint32_t> node_of_;  // of each light
+    std::vector<uint32_t> node_of_;  // by light
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -82,7 +82,7 @@ class MeshLight {
 
     const Scene* scene_;
     uint32_t object_;
-    std::vector<uint32_t> triangles_;  // those that shine
+    std::vector<uint32_t> triangles_;  // the emissive ones
     std::vector<double> reached_;      // their areas times mean emissions, summed up
     std::vector<double> densities_;    // by area, of the triangles of each material
     Bounds box_;

@@ -31,7 +31,7 @@ using SinCos = SinCosOf<double>;
 
 // Sine and cosine of an angle in turns, |turns| < 2^30, or of four: no digit is lost to a multiple of π.
 template <class T> inline SinCosOf<T> sincos_of_turns(T turns) {
-    constexpr double WHOLE = 0x1.8p52;  // what it is added to is rounded to a whole number, whose last binary digits are the sum's
+    constexpr double WHOLE = 0x1.8p52;  // added to a number, it rounds that to a whole number, which is in the sum's last binary digits
     static constexpr double SIN[] = {6.283185307179586,  -41.34170224039976, 81.60524927607493,  -76.70585975299812,
                                      42.05869392898878,  -15.094640403891546, 3.8197881201632113, -0.7116358090781666};
     static constexpr double COS[] = {1.0,

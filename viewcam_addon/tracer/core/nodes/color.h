@@ -46,7 +46,7 @@ struct SeparateColorNode : SeparateNode {
 
     explicit SeparateColorNode(const Inputs& in) : SeparateNode(in), mode(color_mode_of(in.choice("mode"))) {}
     Vec3 eval(const ShadingPoint& at) const {
-        Vec3 rgb = at.value(given);
+        Vec3 rgb = at.value(color);
         return gray((mode == ColorMode::HSV ? hsv_of(rgb) : mode == ColorMode::HSL ? hsl_of(rgb) : rgb)[axis]);
     }
 };

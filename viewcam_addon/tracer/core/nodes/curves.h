@@ -51,9 +51,9 @@ struct VectorCurvesNode : Curves {
 struct FloatCurveNode : Curves {
     static constexpr const char* NAME = "float_curve";
     static constexpr Gives GIVES = Gives::NUMBER;
-    Color given;
-    explicit FloatCurveNode(const Inputs& in) : Curves(in), given(in["value"]) {}
-    Vec3 eval(const ShadingPoint& at) const { return changed(at, gray(at.number(given))); }
+    Color value;
+    explicit FloatCurveNode(const Inputs& in) : Curves(in), value(in["value"]) {}
+    Vec3 eval(const ShadingPoint& at) const { return changed(at, gray(at.number(value))); }
 };
 
 using CurveNodes = std::variant<RGBCurvesNode, VectorCurvesNode, FloatCurveNode>;

@@ -45,10 +45,10 @@ struct AttributeNode {
           output(in.choice("output") == "color" ? COLOR : in.choice("output") == "vector" ? VECTOR : in.choice("output") == "number" ? NUMBER : ALPHA) {}
     Gives gives() const { return output == VECTOR ? Gives::VECTOR : GIVES; }
     Vec3 eval(const ShadingPoint& at) const {
-        ShadingPoint::Values found = at.attribute(name);
-        if (output == ALPHA) return gray(found.fourth);
-        Vec3 value = found.width == 1 ? gray(found.first.x) : found.first;
-        if (output == NUMBER && found.width == 2) return gray(value.x);  // as in Cycles
+        ShadingPoint::Values values = at.attribute(name);
+        if (output == ALPHA) return gray(values.fourth);
+        Vec3 value = values.width == 1 ? gray(values.first.x) : values.first;
+        if (output == NUMBER && values.width == 2) return gray(value.x);  // as in Cycles
         return output == NUMBER ? gray((value.x + value.y + value.z) / 3) : value;
     }
 };

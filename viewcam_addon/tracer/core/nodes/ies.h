@@ -19,14 +19,14 @@ struct IESNode {
     explicit IESNode(const Inputs& in) : vector(in["vector"]), strength(in["strength"]) {
         const char* text = in.choice("text").c_str();
         auto numbers = [&](size_t count) {
-            std::vector<double> found(count);
-            for (double& number : found) {
+            std::vector<double> row(count);
+            for (double& number : row) {
                 char* end;
                 number = std::strtod(text, &end);
                 if (end == text) throw std::invalid_argument("an IES table lacks numbers");
                 text = end;
             }
-            return found;
+            return row;
         };
         std::vector<double> counts = numbers(2);
         constexpr double MOST = 1 << 20;

@@ -8,7 +8,7 @@ namespace viewcam::VIEWCAM_ISA {
 namespace safe {
 // The powers that are finite: what lies beyond float64's range counts as its end.
 inline double positive_power(double x, double power) {
-    constexpr double MOST = 980;  // of the result's binary logarithm
+    constexpr double MOST = 980;  // the largest binary logarithm of the result
     if (!(x > 1e-300)) return x < 0 ? 0 : power > 0 ? 0 : power == 0 ? 1 : 1e300;
     double x_bounded = min(x, 1e300), exponent = log2(x_bounded);
     if (std::fabs(exponent * power) > MOST) return exponent * power > 0 ? 1e300 : 0;
@@ -170,12 +170,12 @@ struct VectorMathNode {
 
 // From one range to another. A range without extent makes 0 of a number; of a vector's components, where the other begins.
 struct MapRange {
-    Color given, from_min, from_max, to_min, to_max, steps;
+    Color value, from_min, from_max, to_min, to_max, steps;
     std::string interpolation;
     bool clamp;
 
     explicit MapRange(const Inputs& in)
-        : given(in["value"]), from_min(in["from_min"]), from_max(in["from_max"]), to_min(in["to_min"]), to_max(in["to_max"]), steps(in["steps"]),
+        : value(in["value"]), from_min(in["from_min"]), from_max(in["from_max"]), to_min(in["to_min"]), to_max(in["to_max"]), steps(in["steps"]),
           interpolation(in.choice("interpolation")), clamp(in.flag("clamp")) {}
 
    protected:
@@ -198,7 +198,7 @@ struct MapRangeNode : MapRange {
     using MapRange::MapRange;
     Vec3 eval(const ShadingPoint& at) const {
         double first = at.number(from_min), last = at.number(from_max);
-        return gray(first == last ? 0 : mapped(at.number(given), first, last, at.number(to_min), at.number(to_max), at.number(steps)));
+        return gray(first == last ? 0 : mapped(at.number(value), first, last, at.number(to_min), at.number(to_max), at.number(steps)));
     }
 };
 struct MapRangeVectorNode : MapRange {
@@ -206,24 +206,24 @@ struct MapRangeVectorNode : MapRange {
     static constexpr Gives GIVES = Gives::VECTOR;
     using MapRange::MapRange;
     Vec3 eval(const ShadingPoint& at) const {
-        Vec3 value = at.value(given), first = at.value(from_min), last = at.value(from_max), low = at.value(to_min), high = at.value(to_max),
+        Vec3 from = at.value(value), first = at.value(from_min), last = at.value(from_max), low = at.value(to_min), high = at.value(to_max),
              count = at.value(steps);
-        return {mapped(value.x, first.x, last.x, low.x, high.x, count.x), mapped(value.y, first.y, last.y, low.y, high.y, count.y),
-                mapped(value.z, first.z, last.z, low.z, high.z, count.z)};
+        return {mapped(from.x, first.x, last.x, low.x, high.x, count.x), mapped(from.y, first.y, last.y, low.y, high.y, count.y),
+                mapped(from.z, first.z, last.z, low.z, high.z, count.z)};
     }
 };
 
 struct ClampNode {
     static constexpr const char* NAME = "clamp";
     static constexpr Gives GIVES = Gives::NUMBER;
-    Color given, least, most;
+    Color value, least, most;
     bool either_way;  // true if the two ends may be swapped
 
-    explicit ClampNode(const Inputs& in) : given(in["value"]), least(in["min"]), most(in["max"]), either_way(in.choice("kind") == "range") {}
+    explicit ClampNode(const Inputs& in) : value(in["value"]), least(in["min"]), most(in["max"]), either_way(in.choice("kind") == "range") {}
     Vec3 eval(const ShadingPoint& at) const {
         double low = at.number(least), high = at.number(most);
         if (either_way && low > high) std::swap(low, high);
-        return gray(min(max(at.number(given), low), high));
+        return gray(min(max(at.number(value), low), high));
     }
 };
 
@@ -231,11 +231,11 @@ struct ClampNode {
 struct SeparateNode {
     static constexpr const char* NAME = "separate";
     static constexpr Gives GIVES = Gives::NUMBER;
-    Color given;
+    Color color;
     int axis;
 
-    explicit SeparateNode(const Inputs& in) : given(in["color"]), axis(in.choice("output") == "x" ? 0 : in.choice("output") == "y" ? 1 : 2) {}
-    Vec3 eval(const ShadingPoint& at) const { return gray(at.value(given)[axis]); }
+    explicit SeparateNode(const Inputs& in) : color(in["color"]), axis(in.choice("output") == "x" ? 0 : in.choice("output") == "y" ? 1 : 2) {}
+    Vec3 eval(const ShadingPoint& at) const { return gray(at.value(color)[axis]); }
 };
 struct CombineNode {
     Color x, y, z;

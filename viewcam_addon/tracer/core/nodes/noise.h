@@ -120,9 +120,9 @@ struct Octaves {
             case FBM: {
                 double most = 0;
                 for (int i = 0; i <= whole; i++, finer()) value += power * signed_noise(p), most += power;
-                auto shown = [&](double value, double most) { return normalize ? 0.5 * value / most + 0.5 : value; };
-                if (rest == 0) return shown(value, most);
-                return mix(shown(value, most), shown(value + power * signed_noise(p), most + power), rest);
+                auto normalized = [&](double value, double most) { return normalize ? 0.5 * value / most + 0.5 : value; };
+                if (rest == 0) return normalized(value, most);
+                return mix(normalized(value, most), normalized(value + power * signed_noise(p), most + power), rest);
             }
             case MULTIFRACTAL:
                 value = 1;

@@ -63,14 +63,14 @@ struct ValueNodes {
 
     // Adds the node of this name; std::invalid_argument if there is none.
     void add(std::string_view name, const Inputs& inputs, const std::vector<Texture>& textures) {
-        all.push_back(made(name, inputs, textures));
-        on_tangents_.push_back(tangents_asked(all.back()) != nullptr || need_tangents(inputs));
+        all.push_back(create(name, inputs, textures));
+        on_tangents_.push_back(uv_of_tangents(all.back()) != nullptr || need_tangents(inputs));
     }
     // True if what makes any of these asks for the tangents of a UV map; and the name of that which a node itself asks for.
     bool need_tangents(const Inputs& inputs) const {
         return inputs.any_node([&](uint32_t node) { return on_tangents_[node]; });
     }
-    static const std::string* tangents_asked(const ValueNode& node) {
+    static const std::string* uv_of_tangents(const ValueNode& node) {
         if (auto map = std::get_if<NormalMapNode>(&node); map && map->space == NormalMapNode::TANGENT) return &map->uv;
         if (auto tangent = std::get_if<TangentNode>(&node); tangent && !tangent->radial) return &tangent->uv;
         return nullptr;
@@ -103,12 +103,12 @@ struct ValueNodes {
     static double finite(double x) { return x < LARGEST ? max(x, -LARGEST) : x > 0 ? LARGEST : 0; }
     static Vec3 finite(Vec3 v) { return {finite(v.x), finite(v.y), finite(v.z)}; }
 
-    template <size_t I = 1> ValueNode made(std::string_view name, const Inputs& inputs, const std::vector<Texture>& textures) const {
+    template <size_t I = 1> ValueNode create(std::string_view name, const Inputs& inputs, const std::vector<Texture>& textures) const {
         if constexpr (I == std::variant_size_v<ValueNode>) {
             throw std::invalid_argument("no node is called " + std::string(name));
         } else {
             using Kind = std::variant_alternative_t<I, ValueNode>;
-            if (name != Kind::NAME) return made<I + 1>(name, inputs, textures);
+            if (name != Kind::NAME) return create<I + 1>(name, inputs, textures);
             Kind node(inputs);
             if constexpr (!requires { Kind::VARIES; })
                 if (inputs.all_constant() && !varies(node)) {

@@ -33,10 +33,10 @@ template <size_t N> struct VoronoiPoints {
     double exponent = 0.5, randomness = 1, smoothness = 0;
     bool by_pcg = true;
     std::array<int32_t, N> cell = {};
-    Place<N> local = {};  // of the place, in its cell
+    Place<N> local = {};  // the place within its cell
 
     // The figures of the point that counts. position: from the place's cell on.
-    struct Found {
+    struct Site {
         double distance = 0;
         Vec3 color;
         Place<N> position = {};
@@ -56,7 +56,7 @@ template <size_t N> struct VoronoiPoints {
         return metric == EUCLIDEAN ? std::sqrt(sum) : metric == MINKOWSKI ? safe::positive_power(sum, safe::divide(1, exponent)) : sum;
     }
 
-    Found nearest(bool second) const {
+    Site nearest(bool second) const {
         double least = INFINITE, next = INFINITE;
         Offset first = {}, after = {};
         around<1>([&](const Offset& offset) {
@@ -66,12 +66,12 @@ template <size_t N> struct VoronoiPoints {
             else if (distance < next)
                 next = distance, after = offset;
         });
-        const Offset& found = second ? after : first;
-        return {second ? next : least, color(found), point(found)};
+        const Offset& offset = second ? after : first;
+        return {second ? next : least, color(offset), point(offset)};
     }
     // The points' mean, weighted by how near they are.
-    Found blended() const {
-        Found sum;
+    Site blended() const {
+        Site sum;
         bool begun = false;
         around<2>([&](const Offset& offset) {
             double distance = size(from_place(offset)), h = 1;
@@ -226,25 +226,25 @@ struct VoronoiNode {
         if (output == RADIUS) return {};
         double octaves = min(max(at.number(detail), 0), 15), finer = at.number(lacunarity), weaker = unit_range(at.number(roughness));
         if (feature == DISTANCE_TO_EDGE) return output == DISTANCE ? gray(edges(points, p, octaves, weaker, finer)) : Vec3{};
-        typename Points::Found found = sum(points, p, octaves, weaker, finer);
-        if (output == DISTANCE) return gray(found.distance);
-        if (output == COLOR) return found.color;
+        typename Points::Site site = sum(points, p, octaves, weaker, finer);
+        if (output == DISTANCE) return gray(site.distance);
+        if (output == COLOR) return site.color;
         std::array<double, 4> place = {};
-        for (size_t i = 0; i < N; i++) place[N == 1 ? 3 : i] = safe::divide(found.position[i], by);
+        for (size_t i = 0; i < N; i++) place[N == 1 ? 3 : i] = safe::divide(site.position[i], by);
         return output == W ? gray(place[3]) : Vec3{place[0], place[1], place[2]};
     }
 
     // Octaves' sums of distances and colors, and mixtures of positions.
     template <size_t N>
-    typename VoronoiPoints<N>::Found sum(VoronoiPoints<N>& points, const Place<N>& p, double octaves, double weaker, double finer) const {
-        using Found = typename VoronoiPoints<N>::Found;
-        Found total;
+    typename VoronoiPoints<N>::Site sum(VoronoiPoints<N>& points, const Place<N>& p, double octaves, double weaker, double finer) const {
+        using Site = typename VoronoiPoints<N>::Site;
+        Site total;
         double weight = 1, weights = 0, fine = 1;
         for (int i = 0; i <= std::ceil(octaves); i++) {
             Place<N> there = p;
             for (double& x : there) x *= fine;
             points.stand_at(there);
-            Found octave = feature == SMOOTH_F1 && points.smoothness != 0 ? points.blended() : points.nearest(feature == F2);
+            Site octave = feature == SMOOTH_F1 && points.smoothness != 0 ? points.blended() : points.nearest(feature == F2);
             for (size_t k = 0; k < N; k++) octave.position[k] = safe::divide(octave.position[k] + std::floor(there[k]), fine);
             if (octaves == 0 || weaker == 0) {
                 total = octave, weights = 1;

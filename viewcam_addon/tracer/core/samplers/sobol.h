@@ -164,8 +164,8 @@ class SobolSampler {
         return {first, second, which, light, reordered(light), direction, reordered(direction), lobe, roulette, spare};
     }
     static const std::array<Matrix, ROWS>& matrices() {
-        static const std::array<Matrix, ROWS> made = all_matrices();
-        return made;
+        static const std::array<Matrix, ROWS> matrices = all_matrices();
+        return matrices;
     }
 
     std::array<uint32_t, 2> seeds_;

@@ -10,19 +10,19 @@ struct Object {
     uint32_t geometry = 0;
     uint32_t visible = 0;       // to which kinds of rays, RayKind's bits
     uint64_t lit_by = 0;        // a bit for each set of receivers that it is in
-    uint64_t receivers = EVERYTHING;  // of its own light: a bit of their lit_by
-    uint32_t first_slot = 0;    // of Scene::slots, one for each of the geometry's materials
-    float index = 0;            // what the Object Index pass shows
+    uint64_t receivers = EVERYTHING;  // the sets of objects that its own light reaches: a bit of their lit_by
+    uint32_t first_slot = 0;    // an index into Scene::slots, one for each of the geometry's materials
+    float index = 0;            // shown by the Object Index pass
     const float* info = nullptr;  // its color, alpha and random number, where a material may ask for them
     RayKind shadow_rays = SHADOW;  // the kind of those that are sent to it
     bool shared = false;        // true if other objects place the same geometry
     bool flat = false;          // true if the matrix has no inverse to speak of
     bool mirrored = false;      // true if corners that run counter-clockwise in object space run clockwise in the world
-    double condition = 1;       // of the matrix: by how much its inverse may enlarge a rounding
+    double condition = 1;       // the matrix's: by how much its inverse may enlarge a rounding
     Affine to_world;            // object space to rendering space
-    double inverse[3][3] = {};  // of its linear part
-    Vec3 translation_low;       // what the translation's rounding took away
-    double translation_error = 0;  // what that may be in object space, in each coordinate
+    double inverse[3][3] = {};  // the linear part's
+    Vec3 translation_low;       // the rest that the translation's rounding took away
+    double translation_error = 0;  // the largest such rest in object space, in each coordinate
 
     Vec3 to_object(Vec3 v) const { return product(inverse, v); }
     // The ray in object space; t stays what it is.

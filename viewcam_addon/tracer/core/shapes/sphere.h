@@ -113,7 +113,7 @@ inline bool passes(const LocalRay& local, Vec3 center, double radius, double con
     return dot(way, d) < -doubt * (std::fabs(d.x) + std::fabs(d.y) + std::fabs(d.z)) || dot(beside, beside) > reach * reach * dot(d, d);
 }
 
-template <bool ANY, class Found> bool intersect_spheres(const Spheres& spheres, const Object& object, const Ray& ray, uint32_t number, Found& nearest) {
+template <bool ANY, class HitRecord> bool intersect_spheres(const Spheres& spheres, const Object& object, const Ray& ray, uint32_t number, HitRecord& nearest) {
     if (object.flat) return false;
     LocalRay local = object.to_object(ray);
     return traverse<ANY>(spheres.bvh, local, nearest.t, local.origin_error, [&](uint32_t leaf, BoxRay& box) {
@@ -131,24 +131,24 @@ template <bool ANY, class Found> bool intersect_spheres(const Spheres& spheres, 
 // `cosine` is that of the true one. The point lies inside by what its rounding may be, from where nothing of the sphere is seen.
 inline Interaction sphere_interaction(const Spheres& spheres, const Object& object, const Ray& ray, size_t i) {
     UnitSphere sphere(spheres, object, i, ray, object.to_object(ray));
-    Interaction found;
-    found.t = sphere.distance();
-    Vec3 unit = normalize(sphere.direction * found.t - sphere.center), c = spheres.center(i);
+    Interaction point;
+    point.t = sphere.distance();
+    Vec3 unit = normalize(sphere.direction * point.t - sphere.center), c = spheres.center(i);
     double radius = spheres.radii[i];
     Vec3 outward = object.to_world.vector(unit * radius), middle = object.to_world.point(c);
     double reach = max_component(abs(middle)) + max_component(abs(object.to_world.translation())) +
                    object.stretched(max_component(abs(c)) + radius);
     double rounding = 16 * DOUBLE_ROUNDING * object.condition * reach, size = length(outward);
-    found.position = middle + outward * max(0.0, 1 - rounding / size);
+    point.position = middle + outward * max(0.0, 1 - rounding / size);
     outward = outward / size;
-    found.backside = dot(outward, ray.direction) > 0;
-    found.normal = found.shading = found.backside ? -outward : outward;
+    point.backside = dot(outward, ray.direction) > 0;
+    point.normal = point.shading = point.backside ? -outward : outward;
     Vec3 gradient = {unit.x * object.inverse[0][0] + unit.y * object.inverse[1][0] + unit.z * object.inverse[2][0],
                      unit.x * object.inverse[0][1] + unit.y * object.inverse[1][1] + unit.z * object.inverse[2][1],
                      unit.x * object.inverse[0][2] + unit.y * object.inverse[1][2] + unit.z * object.inverse[2][2]};
-    found.cosine = -dot(normalize(gradient), ray.direction) / length(ray.direction);
-    found.material = uint32_t(spheres.materials[i]);
-    return found;
+    point.cosine = -dot(normalize(gradient), ray.direction) / length(ray.direction);
+    point.material = uint32_t(spheres.materials[i]);
+    return point;
 }
 
 // The length to which rounding applies, as of triangles, with the sphere's extent; a sphere is as slender as an equilateral

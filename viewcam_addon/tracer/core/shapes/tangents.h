@@ -59,7 +59,7 @@ class TangentsOfMesh {
             std::array<float, 3> n = normal(i);
             keys[i] = {at.x, at.y, at.z, n[0], n[1], n[2], uvs_[2 * i], uvs_[2 * i + 1]};
             for (double& each : keys[i])
-                if (!(each == each)) each = 0;  // what is no number has no order
+                if (!(each == each)) each = 0;  // NaN has no order
         }
         std::iota(order.begin(), order.end(), 0u);
         std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return keys[a] < keys[b]; });
@@ -99,11 +99,11 @@ class TangentsOfMesh {
         }
         std::sort(edges.begin(), edges.end());
         std::vector<std::pair<uint32_t, uint32_t>> shared;
-        std::vector<bool> taken(edges.size());
+        std::vector<bool> is_paired(edges.size());
         for (size_t i = 0; i < edges.size(); i++)
-            for (size_t k = i + 1; !taken[i] && k < edges.size() && edges[k].low == edges[i].low && edges[k].high == edges[i].high; k++)
-                if (!taken[k] && vertex_[edges[k].corner] != vertex_[edges[i].corner])  // they run against each other
-                    taken[i] = taken[k] = true, shared.push_back({edges[i].corner, edges[k].corner});
+            for (size_t k = i + 1; !is_paired[i] && k < edges.size() && edges[k].low == edges[i].low && edges[k].high == edges[i].high; k++)
+                if (!is_paired[k] && vertex_[edges[k].corner] != vertex_[edges[i].corner])  // they run against each other
+                    is_paired[i] = is_paired[k] = true, shared.push_back({edges[i].corner, edges[k].corner});
         // A triangle that has no side of its own is on that of a neighbor.
         for (auto [a, b] : shared)
             for (auto [from, to] : {std::pair{a / 3, b / 3}, std::pair{b / 3, a / 3}})
@@ -121,28 +121,28 @@ class TangentsOfMesh {
         std::vector<Vec3> sum(corners_);
         for (size_t i = 0; i < corners_; i++) {
             if (is_degenerate(i / 3)) continue;
-            std::array<float, 3> given = normal(i);
-            Vec3 n{given[0], given[1], given[2]};
+            auto [x, y, z] = normal(i);
+            Vec3 n{x, y, z};
             Vec3 before = within(place(previous(i)) - place(i), n), after = within(place(next(i)) - place(i), n);
             double cosine = max(min(dot(before, after), 1.0), -1.0);
             sum[root(uint32_t(i))] += within(along_[i / 3], n) * acos(cosine);
         }
-        std::vector<float> made(4 * corners_);
+        std::vector<float> tangents(4 * corners_);
         for (size_t i = 0; i < corners_; i++) {
             Vec3 tangent = sum[root(uint32_t(i))];
             double size = length(tangent);
             if (size > 0) tangent = tangent / size;
-            for (int axis = 0; axis < 3; axis++) made[4 * i + size_t(axis)] = float(tangent[axis]);
-            made[4 * i + 3] = turns_[i / 3] < 0 ? -1 : 1;
+            for (int axis = 0; axis < 3; axis++) tangents[4 * i + size_t(axis)] = float(tangent[axis]);
+            tangents[4 * i + 3] = turns_[i / 3] < 0 ? -1 : 1;
         }
-        return made;
+        return tangents;
     }
 
     const TriangleMesh& mesh_;
     const float* uvs_;
     size_t corners_;
-    std::vector<uint32_t> vertex_, group_;  // of corners
-    std::vector<Vec3> along_;               // of triangles
+    std::vector<uint32_t> vertex_, group_;  // by corner
+    std::vector<Vec3> along_;               // by triangle
     std::vector<int> turns_;
 };
 

@@ -35,7 +35,7 @@ struct TriangleMesh {
     const float* corner_colors = nullptr;    // (count, 3, 3), linear, or nothing
     std::vector<Attribute> attributes;
     std::map<std::string, std::vector<float>> tangents;  // (count, 3, 4), by the UV map's name, of those that nodes ask for
-    Bounds bounds;                           // of the vertices
+    Bounds bounds;                           // the vertices'
 
     Vec3 corner(size_t triangle, int i) const {
         const double* v = vertices + 3 * size_t(triangles[3 * triangle + i]);
@@ -44,8 +44,8 @@ struct TriangleMesh {
     // (count, 3, 2): the UV map of this name, "" the mesh's own; or nothing.
     const float* uvs(const std::string& name) const {
         if (name.empty()) return corner_uvs;
-        for (const Attribute& one : attributes)
-            if (one.name == name && one.width == 2) return one.values;
+        for (const Attribute& attribute : attributes)
+            if (attribute.name == name && attribute.width == 2) return attribute.values;
         return nullptr;
     }
     static Vec3 corner_value(const float* values, size_t triangle, int i) {
@@ -104,7 +104,7 @@ class TriangleBvh {
     size_t bytes() const { return bvh.bytes() + blocks.size() * sizeof(Block); }
 
     // object: whose the triangles are, NONE where the blocks tell. origin_error: see LocalRay.
-    template <bool ANY, class Found> bool intersect(const Ray& ray, uint32_t object, Found& nearest, double origin_error = 0) const {
+    template <bool ANY, class HitRecord> bool intersect(const Ray& ray, uint32_t object, HitRecord& nearest, double origin_error = 0) const {
         BoxRay box;
         if (bvh.root == NOTHING || !enter(bvh, ray, nearest.t, origin_error, box)) return false;
         Shear shear(ray.direction, box);
@@ -188,9 +188,9 @@ class TriangleSurfaces {
         second_ = corner_[2] - corner_[0];
         Vec3x4 third = corner_[2] - corner_[1];
         normal_ = cross(first_, second_);
-        double4 one = dot(first_, first_), two = dot(second_, second_), squared = dot(normal_, normal_);
-        longest_squared_ = max(max(one, two), dot(third, third));
-        if (unsigned slender = bits(long4(squared * splat4(SLENDER * SLENDER) < one * two))) {
+        double4 squared_first = dot(first_, first_), squared_second = dot(second_, second_), squared = dot(normal_, normal_);
+        longest_squared_ = max(max(squared_first, squared_second), dot(third, third));
+        if (unsigned slender = bits(long4(squared * splat4(SLENDER * SLENDER) < squared_first * squared_second))) {
             while (slender) {
                 int i = take_bit(slender);
                 set_lane(normal_, i, exact_cross(lane(first_, i), lane(second_, i)));
@@ -231,15 +231,15 @@ class TriangleSurfaces {
         }
         return {corner_[0] + b1_ * first_ + b2_ * second_, normal, shading, offset()};
     }
-    // Writes the surfaces to *found[0], …; material: the slot of the object.
-    void interactions(Interaction* const* found) const {
+    // Writes the surfaces to *targets[0], …; material: the slot of the object.
+    void interactions(Interaction* const* targets) const {
         SurfacePoint<double4> points = this->points();
         double4 cosine = -dot(points.normal, direction_) / length(direction_);
         unsigned turned = bits(long4(side() < splat4(0.0)));
         for (int i = 0; i < count_; i++) {
             const TriangleMesh& mesh = *hits_[i].mesh;
             uint32_t triangle = hits_[i].triangle;
-            Interaction& to = *found[i];
+            Interaction& to = *targets[i];
             static_cast<SurfacePoint<double>&>(to) = lane(points, i);
             to.t = t_[i], to.cosine = cosine[i];
             to.backside = bool(turned >> i & 1) != hits_[i].object->mirrored;
@@ -343,10 +343,10 @@ class TriangleSurfaces {
     TriangleHit hits_[4];
     int count_;
     bool on_one_ = true;  // on one object
-    Vec3x4 origin_, direction_, translation_;  // of the rays; of the objects' places
+    Vec3x4 origin_, direction_, translation_;  // the rays'; the objects' places
     Vec3x4 corner_[3], first_, second_;        // rendering space; the sides from the first corner
     Vec3x4 normal_;                            // their cross product
-    double4 size_, longest_squared_;           // of the normal; of the sides
+    double4 size_, longest_squared_;           // the normal's length; the longest side's square
     double4 t_, b1_, b2_;
 };
 

@@ -1,6 +1,8 @@
-"""Windows, under wine: the core's pictures, what the add-on does with Blender 4.2 and 5.0, the wheels that its zip brings.
+"""Pythons of other platforms, emulated (.ci/emulated.py), and what this machine computes, to compare with.
 
-`make test-windows-smoke` runs what is quick here, `make test-windows` the rest as well, and the suite itself inside.
+Linux on arm64, under qemu: the same bits as here (`make test-arm64`). Windows, under wine: the core's pictures, what the add-on
+does with Blender 4.2 and 5.0, the wheels that its zip brings; `make test-windows-smoke` runs what is quick here, `make
+test-windows` the rest as well, and the suite itself inside.
 """
 
 import json
@@ -14,7 +16,68 @@ import pytest
 
 pytestmark = [pytest.mark.platforms, pytest.mark.timeout(3600)]
 
+
 ROOT = Path(__file__).resolve().parent.parent.parent
+HASHES = Path(__file__).with_name("picture_hashes.py")
+LONGEST = 1500
+"""Seconds: a machine of two cores that has other work, too."""
+
+
+@pytest.fixture(scope="session")
+def run_emulated():
+    """run_emulated(platform, arguments…) → what Python printed there; fails the test if its exit status is another."""
+    import emulated
+
+    def run(platform, *arguments, status=0, **variables):
+        child = emulated.start(platform, *arguments, **variables)
+        printed = child.communicate(timeout=LONGEST)[0].decode("utf-8", "replace")
+        assert child.returncode == status, f"status {child.returncode}: {printed}"
+        return printed
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def sample_scenes(tmp_path_factory):
+    """Scene files of all sample scenes."""
+    folder = tmp_path_factory.mktemp("scenes")
+    for blend in sorted((ROOT / "sample_scenes").glob("*.blend")):
+        command = [sys.executable, "-m", "viewcam_addon", "export", blend, folder / f"{blend.stem}.json"]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return sorted(folder.glob("*.json"))
+
+
+@pytest.fixture(scope="session")
+def hashes_here(sample_scenes):
+    """Hashes of the sample scenes' pictures and of the core's functions on this machine: 'scene level pass' → hash."""
+    done = subprocess.run([sys.executable, HASHES, "2", *sample_scenes], check=True, capture_output=True, text=True)
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="session")
+def hashes_there(run_emulated):
+    """hashes_there(platform, threads, scene files): the same as hashes_here, on another platform."""
+
+    def run(platform, threads, scenes):
+        return json.loads(run_emulated(platform, HASHES, threads, *scenes).splitlines()[-1])
+
+    return run
+
+
+def test_on_arm64_every_sample_scene_has_the_same_bits_at_all_levels(sample_scenes, hashes_here, hashes_there):
+    there = hashes_there("linux-arm64", 2, sample_scenes)
+    assert there.keys() == hashes_here.keys()
+    assert {name.split()[1] for name in there if not name.startswith("function")} == {"geometry", "direct", "path"}
+    assert {name.split()[0] for name in there} >= {path.stem for path in sample_scenes}
+    different = [name for name in there if there[name] != hashes_here[name]]
+    assert not different, f"{len(different)} of {len(there)} are different: {different}"
+
+
+def test_on_arm64_the_functions_are_as_right_as_here(run_emulated):
+    printed = run_emulated("linux-arm64", "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/tracer/test_trig.py")
+    assert " passed" in printed and "failed" not in printed, printed
+
+
 CORNELL, STUDIO = ROOT / "sample_scenes" / "cornell.blend", ROOT / "sample_scenes" / "studio.blend"
 BLENDERS = ["4.2", "5.0"]
 DATASETS = {"coco": "coco.json", "panoptic": "panoptic.json", "bop": "bop", "colmap": "colmap", "kitti": "kitti"}

@@ -1,6 +1,10 @@
-"""Far from the origin: with the origin at the eye both sides show the file's scene to a thousandth of a pixel."""
+"""Far from the origin: with the origin at the eye both sides show the file's scene to a thousandth of a pixel.
+
+And the file stays as it is, and what did not come along is named.
+"""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,14 +16,138 @@ from mathutils import Vector
 
 from viewcam_addon.blender.camera import apply
 from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.blender.rendering import cycles
+from viewcam_addon.blender.scenes import recentering
 from viewcam_addon.cli import main
-from viewcam_addon.errors import InputError
+from viewcam_addon.errors import InputError, NotModeledError
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
-from viewcam_addon.tracer.scene import scene_file
+from viewcam_addon.tracer.scene import Mesh, scene_file
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def look(scene, camera_object):
+    """A function that states the camera some meters beside a place, in float64, looking at it."""
+    scene.render.resolution_x, scene.render.resolution_y = 160, 120
+
+    def state(place, **options):
+        eye, look_at = (tuple(np.add(place, point).tolist()) for point in ((6.2, -7.3, 4.123456789), (0.1, 0.2, 0.3)))
+        return apply(camera_object, Pinhole(eye, look_at, (0, 0, 1), 150, 160, 120, **options), scene)
+
+    return state
+
+
+def _grid(name, place, size=30.0, count=20):
+    """A mesh whose vertices lie at `place`: a map as geographers' files bring it, the object's origin far away."""
+    steps = np.linspace(-size / 2, size / 2, count)
+    x, y = np.meshgrid(steps, steps, indexing="ij")
+    points = np.stack([x, y, np.sin(x / 3) + np.cos(y / 4) - 1], axis=-1).reshape(-1, 3) + place
+    faces = [
+        (i * count + j, (i + 1) * count + j, (i + 1) * count + j + 1, i * count + j + 1)
+        for i in range(count - 1)
+        for j in range(count - 1)
+    ]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(points.tolist(), [], faces)
+    return mesh
+
+
+@pytest.fixture
+def map_mesh():
+    """A function (name, place, size, count) that makes the mesh of a map at a place."""
+    return _grid
+
+
+@pytest.fixture
+def add_map(scene):
+    """A function that adds an object at the origin whose mesh is a map at a place, and returns it."""
+
+    def add(place, name="Map", **options):
+        block = bpy.data.objects.new(name, _grid(name, place, **options))
+        scene.collection.objects.link(block)
+        return block
+
+    return add
+
+
+@pytest.fixture
+def crowd(scene, look, add, add_map, mesh_from):
+    """A function that fills the scene at a place with all that Blender puts somewhere in the world."""
+
+    def fill(place):
+        look(place)
+        add_map(place)
+        monkey = add(mesh_from("monkey"), "Monkey", np.add(place, (0, 0, 1.5)))
+        monkey.modifiers.new("Subdivision", "SUBSURF").render_levels = 1
+        monkey.shape_key_add(name="Basis")
+        key = monkey.shape_key_add(name="Raised")
+        key.value = 1.0
+        for point in key.data:
+            point.co.z += 0.5
+        parent = add(None, "Parent", np.add(place, (2, 1, 1)))
+        parent.rotation_euler, parent.scale = (0.2, 0.3, 0.4), (1, 2, 0.5)
+        child = add(mesh_from("cube", size=1), "Child", (0.5, 0, 0.2))
+        child.parent, child.rotation_euler = parent, (0.5, 0.1, 0.9)
+        many = bpy.data.collections.new("Many")
+        for number in range(3):
+            add(mesh_from("ico_sphere", radius=0.5), f"Ball {number}", (number, 0, 0), many)
+        for number in range(2):
+            instance = add(None, f"Instance {number}", np.add(place, (-3, 2.0 * number, 0.5)))
+            instance.instance_type, instance.instance_collection = "COLLECTION", many
+        animated = add(mesh_from("cube", size=1), "Animated")
+        for frame, shift in ((1, 0), (11, 2)):
+            animated.location = np.add(place, (shift, -2, 0.5))
+            animated.keyframe_insert("location", frame=frame)
+        scene.frame_set(4)
+        text = bpy.data.curves.new("Words", "FONT")
+        text.body, text.extrude = "far", 0.1
+        add(text, "Text", np.add(place, (-2, -3, 1)))
+        add(bpy.data.lights.new("Sun", "SUN"), "Sun", place)
+
+    return fill
+
+
+def assert_moved(plain, moved):
+    """Assert that each object has as many instances, and each point stands where the plain export has it, less the origin."""
+    counts, wanted = ([(each.name, len(each.matrices)) for each in scene.objects] for scene in (moved, plain))
+    assert counts == wanted, "not the same objects with the same number of instances"
+    for was, now in zip(plain.objects, moved.objects, strict=True):
+        before, after = (scene.geometries[each.geometry] for scene, each in ((plain, was), (moved, now)))
+        points, moved_points = (each.vertices if isinstance(each, Mesh) else each.centers for each in (before, after))
+        for number, (stood, stands) in enumerate(zip(was.matrices, now.matrices, strict=True), start=1):
+            wanted = points @ stood[:3, :3].T + (stood[:3, 3] - moved.origin)
+            counts = moved_points @ stands[:3, :3].T + stands[:3, 3]
+            # The translation and the vertex are rounded to float32 once each, and the vertex is multiplied by the matrix.
+            size = np.abs(moved_points) @ np.abs(stands[:3, :3]).T + np.abs(stands[:3, 3])
+            off = np.abs(counts - wanted)
+            error = off - 2.0**-23 * size - 1e-30
+            assert error.max(initial=0) <= 0, f"instance {number} of {was.name} is {off.max():.3g} from where it should be"
+
+
+@pytest.fixture
+def check_moved():
+    """`assert_moved`, for a test that it can fail."""
+    return assert_moved
+
+
+@pytest.fixture
+def check(both_sides):
+    """A function that fails unless both sides, recentered, are one picture of the file's scene; it returns them."""
+
+    def compare(**request):
+        plain = jobs.export(Job(**request))
+        sides = both_sides(recenter=True, **request)
+        sides.check()
+        position = sides.comparison.rows[0]
+        assert position.values[2] < 1e-3, f"99 % of the positions are within {position.values[2]:.1e} px"
+        assert_moved(plain, sides.exported)
+        return sides
+
+    return compare
+
 
 UTM = (448262.25, 5411932.5, 42.0)
 ECEF = (4200952.5, 780362.0, 4720030.0)
@@ -308,3 +436,154 @@ def test_materials_that_ask_where_they_are_are_the_same_on_both_sides_and_told(
     traced = render(exported, "direct", 1, threads=2)["Diffuse Color"]
     assert np.percentile(np.abs(traced - cycles_passes), 99.5) <= 1e-6 and cycles_passes.max() > 0.01
     assert {entry.status for entry in exported.ledger if entry.object in ("Left", "Right")} == {status}
+
+
+def file_state():
+    """Names, users and transforms of all that is in the file, and what is selected."""
+    kinds = [prop.identifier for prop in bpy.data.bl_rna.properties if prop.type == "COLLECTION"]
+    state = {kind: [(block.name_full, block.users) for block in getattr(bpy.data, kind)] for kind in kinds}
+    for block in bpy.data.objects:
+        own = ("location", "rotation_euler", "rotation_quaternion", "scale", "delta_location", "color")
+        state[block.name] = [tuple(getattr(block, name)) for name in own] + [
+            [tuple(row) for matrix in (block.matrix_world, block.matrix_parent_inverse) for row in matrix],
+            (block.parent, block.parent_type, block.pass_index, block.hide_render, block.select_get(), len(block.constraints)),
+            [slot.material for slot in block.material_slots],
+        ]
+    for mesh in bpy.data.meshes:
+        state[f"mesh {mesh.name}"] = [tuple(vertex.co) for vertex in mesh.vertices]
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    return state | {"context": (scene, scene.camera, scene.frame_current, scene.frame_subframe, layer, layer.objects.active)}
+
+
+def near_the_origin(entry):
+    """An entry as a tuple, but for triangles that far from the origin, in float32, lie exactly where others do."""
+    return entry.object, entry.status, "" if "lie exactly where" in entry.reason else entry.reason
+
+
+def test_the_ledger_is_that_of_the_file(crowd, scene, add, mesh_from, check):
+    crowd(UTM)
+    glass = bpy.data.materials.new("Glass")
+    glass.use_nodes = True
+    glass.node_tree.nodes["Principled BSDF"].inputs["Alpha"].default_value = 0.3
+    bpy.data.objects["Map"].data.materials.append(glass)
+    scene.camera.data.dof.use_dof = True
+    add(bpy.data.hair_curves.new("Hair"), "Hair", UTM)
+    plain, sides = jobs.export(Job()), check()
+    assert sorted(map(near_the_origin, sides.exported.ledger)) == sorted(map(near_the_origin, plain.ledger))
+    assert {entry.status for entry in plain.ledger} == {"exported", "approximated", "skipped"}
+    with pytest.raises(NotModeledError, match="Hair"):
+        jobs.export(Job(strict=True, recenter=True))
+
+
+def test_rendering_alone_recenters_too(look, tmp_path, add_map):
+    look(UTM)
+    add_map(UTM)
+    entries = jobs.cycles(Job(recenter=True), tmp_path / "picture.exr")
+    assert [(entry.object, entry.status) for entry in entries] == [("Map", "exported")]
+    assert (tmp_path / "picture.exr").stat().st_size > 1000
+
+
+def test_the_file_is_as_it_was(crowd, both_sides):
+    crowd(UTM)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Monkey"]
+    bpy.data.objects["Monkey"].select_set(True)
+    jobs.export(Job())  # evaluates all, and leaves a render result
+    before = file_state()
+    both_sides(recenter=True)
+    assert file_state() == before
+
+
+@pytest.mark.parametrize(
+    ("room", "name"), [(cycles, "render"), (recentering, "_moved"), (recentering, "_camera"), (recentering, "_verify")]
+)
+def test_the_file_is_as_it_was_after_a_failure(crowd, monkeypatch, tmp_path, room, name):
+    crowd(ECEF)
+    jobs.export(Job())
+    before = file_state()
+
+    def fails(*_arguments, **_options):
+        raise InputError("out of luck")
+
+    monkeypatch.setattr(room, name, fails)
+    with pytest.raises(InputError, match="out of luck"):
+        jobs.both_sides(Job(recenter=True), [tmp_path / "picture.exr"])
+    assert file_state() == before
+
+
+def stays(placed):
+    """An object that was not moved."""
+    return placed.matrix + np.pad(np.array(ECEF)[:, None], ((0, 1), (3, 0)))
+
+
+def one_unit_off(placed):
+    """An object that is off by two units in the last place of its largest coordinate."""
+    matrix = placed.matrix.copy()
+    matrix[0, 3] *= 1 + 2.0**-22
+    return matrix
+
+
+def turned(placed):
+    """An object that is turned by a thousandth of a degree."""
+    angle = math.radians(1e-3)
+    turn = np.eye(4)
+    turn[:2, :2] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    return placed.matrix @ turn
+
+
+@pytest.mark.parametrize("sabotage", [stays, one_unit_off, turned])
+def test_an_object_that_did_not_follow_is_named(sabotage, look, add, mesh_from, monkeypatch):
+    look(ECEF)
+    add(mesh_from("cube"), "Cube", np.add(ECEF, (20, 0, 0)))
+    place = recentering._place
+
+    def place_wrongly(overrides, temporary, placed):
+        copies = place(overrides, temporary, placed)
+        for block, each in copies.items():
+            block.matrix_parent_inverse = recentering.Matrix(sabotage(each))
+        return copies
+
+    monkeypatch.setattr(recentering, "_place", place_wrongly)
+    with pytest.raises(InputError, match="object 'Cube' did not follow") as caught:
+        jobs.export(Job(recenter=True))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_vertex_that_did_not_follow_and_an_object_that_is_gone_are_named(look, monkeypatch, add_map):
+    look(UTM)
+    add_map(UTM)
+    place = recentering._place
+
+    def spoil(change):
+        def place_wrongly(overrides, temporary, placed):
+            copies = place(overrides, temporary, placed)
+            change(next(iter(copies)))
+            return copies
+
+        monkeypatch.setattr(recentering, "_place", place_wrongly)
+
+    def move_a_vertex(block):
+        block.data.vertices[7].co.x *= 1 + 2.0**-20
+
+    spoil(move_a_vertex)
+    with pytest.raises(InputError, match="object 'Map' did not follow"):
+        jobs.export(Job(recenter=True))
+    spoil(lambda block: setattr(block, "hide_render", True))
+    with pytest.raises(InputError, match="object 'Map' is missing"):
+        jobs.export(Job(recenter=True))
+
+
+def test_objects_of_a_library_are_shown_and_stay_linked(look, add, mesh_from, scene, tmp_path, check):
+    look(UTM)
+    block = add(mesh_from("monkey"), "Linked", UTM)
+    block.shape_key_add(name="Basis")
+    block.data.materials.append(bpy.data.materials.new("Linked too"))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"), copy=True)
+    for blocks, each in ((bpy.data.objects, block), (bpy.data.meshes, block.data)):
+        blocks.remove(each)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, target):
+        target.objects = ["Linked"]
+    scene.collection.objects.link(target.objects[0])
+    check()
+    before = file_state()
+    check()
+    assert file_state() == before and bpy.data.objects["Linked"].library

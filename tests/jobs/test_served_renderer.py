@@ -10,10 +10,10 @@ import pytest
 
 from viewcam_addon import child_process
 from viewcam_addon.errors import FullDiskError, InputError
-from viewcam_addon.jobs import one, render_client
+from viewcam_addon.jobs import one, served_renderer
 from viewcam_addon.jobs.folder import Folder, Outputs
 from viewcam_addon.jobs.job import Job
-from viewcam_addon.jobs.render_client import ServedRenderer
+from viewcam_addon.jobs.served_renderer import ServedRenderer
 
 pytestmark = pytest.mark.slow
 
@@ -73,20 +73,20 @@ def test_a_blender_that_crashes_in_the_check_renders_the_shot_again_before_it_ch
 
 def test_a_shot_in_which_blender_always_crashes_fails_and_the_next_one_is_rendered(renderer, stand_in, tmp_path):
     with pytest.raises(
-        InputError, match=rf"^{render_client.ATTEMPTS} times in a row .*blender has ended with signal {signal.SIGKILL:d}"
+        InputError, match=rf"^{served_renderer.ATTEMPTS} times in a row .*blender has ended with signal {signal.SIGKILL:d}"
     ):
         renderer.render(shot("crash"), tmp_path / "a.exr", tmp_path / "a.png")
-    assert len(stand_in.diary("render")) == render_client.ATTEMPTS
+    assert len(stand_in.diary("render")) == served_renderer.ATTEMPTS
     assert renderer.render(shot("b"), tmp_path / "b.exr", tmp_path / "b.png")
 
 
 def test_a_blender_that_was_killed_between_two_shots_costs_no_attempt(renderer, stand_in, tmp_path, processes):
-    for number in range(render_client.ATTEMPTS + 1):
+    for number in range(served_renderer.ATTEMPTS + 1):
         renderer.render(shot(f"a{number}"), tmp_path / "a.exr", tmp_path / "a.png")
         process = int(stand_in.diary("open")[-1][-1])
         os.kill(process, signal.SIGKILL)
         assert processes.until(lambda process=process: not processes.run(process))
-    assert len(stand_in.diary("render")) == render_client.ATTEMPTS + 1
+    assert len(stand_in.diary("render")) == served_renderer.ATTEMPTS + 1
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_a_program_that_does_not_serve_is_one_sentence(monkeypatch, blend, tmp_p
 
 def test_where_there_is_no_blender_at_all_a_sentence_says_how_to_have_one(monkeypatch, blend):
     monkeypatch.delenv("VIEWCAM_BLENDER", raising=False)
-    monkeypatch.setattr(render_client.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(served_renderer.importlib.util, "find_spec", lambda name: None)
     with ServedRenderer(blend) as renderer, pytest.raises(InputError, match="name one in VIEWCAM_BLENDER, or pip install bpy"):
         renderer.open()
 

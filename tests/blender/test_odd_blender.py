@@ -1,8 +1,22 @@
-"""Scenes, view layers, units and pictures around an enabled camera. docs/odd-blender.md says what each test expects."""
+"""docs/odd-blender.md, row by row: parents, scenes, view layers, units and pictures around an enabled camera.
 
+Each row says what its test expects (fixture `odd`). Every row has its test, every test its row, and a false row fails.
+"""
+
+import ast
+import dataclasses
+import inspect
+import math
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
+
+from mathutils import Matrix
 
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import datablocks, targets, versions
@@ -12,6 +26,411 @@ from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 
 pytestmark = pytest.mark.slow
+
+
+class _Layout:
+    """Takes all that a panel puts into Blender's layout, which draws in a window only."""
+
+    def __getattr__(self, name):
+        return lambda *arguments, **looks: _Layout()
+
+    def prop(self, block, name, **looks):
+        assert hasattr(block, name), f"{block} has no {name}"
+
+    def panel(self, name, **looks):
+        return _Layout(), _Layout()
+
+
+class _Panel:
+    """Stands in for an instance of a panel's class, which Blender makes itself."""
+
+    def __init__(self, kind):
+        self.kind, self.layout = kind, _Layout()
+
+    def __getattr__(self, name):
+        attribute = inspect.getattr_static(self.kind, name)
+        return attribute.__get__(self, self.kind) if hasattr(attribute, "__get__") else attribute
+
+
+class _Over:
+    """Blender's own modules, with something that only a window adds to them."""
+
+    def __init__(self, blenders, **more):
+        self._blenders = blenders
+        vars(self).update(more)
+
+    def __getattr__(self, name):
+        return getattr(self._blenders, name)
+
+
+@pytest.fixture
+def draw_panels():
+    """A function that draws the add-on's panels for the active object, as far as they are shown: their names.
+
+    camera : the data that the properties editor shows, if it is another's than the active object's.
+    """
+    import bpy
+
+    from viewcam_addon import blender
+
+    def draw(camera=None):
+        active, preferences = bpy.context.active_object, bpy.context.preferences
+        context = _Over(
+            bpy.context,
+            camera=camera or (active.data if active and active.type == "CAMERA" else None),
+            region=SimpleNamespace(width=300),
+            preferences=_Over(preferences, system=SimpleNamespace(ui_scale=1.0, pixel_size=1.0)),
+        )
+        drawn = []
+        for kind in (each for room in blender._rooms() for each in getattr(room, "CLASSES", ())):
+            if issubclass(kind, bpy.types.Panel) and kind.__name__.startswith("VIEWCAM_PT") and _is_shown(kind, context, drawn):
+                for part in ("draw_header", "draw"):
+                    if hasattr(kind, part):
+                        getattr(_Panel(kind), part)(context)
+                drawn.append(kind.__name__)
+        return drawn
+
+    return draw
+
+
+def _is_shown(kind, context, drawn):
+    parent = getattr(kind, "bl_parent_id", None)
+    return (parent is None or parent in drawn) and (not hasattr(kind, "poll") or kind.poll(context))
+
+
+@pytest.fixture(autouse=True)
+def no_traceback(capfd):
+    """Whatever is done, nothing that a handler or a callback raises stands in the console."""
+    yield
+    output = "".join(capfd.readouterr())
+    print(output)
+    assert "Traceback" not in output
+
+
+@dataclasses.dataclass(frozen=True)
+class OddRow:
+    """A row of docs/odd-blender.md, and the scene that holds it to its word.
+
+    sticks : true for each of these moments at which the pose sticks: right after `apply`, later, in the render; None where
+        nothing is said of it.
+    sentences : the panel's sentences in the end.
+    folder : a folder for files.
+    draw : draws the panels of what is active.
+    """
+
+    sticks: tuple[bool | None, bool | None, bool | None]
+    sentences: list[str]
+    folder: Path
+    draw: Callable[[], object] = list
+
+    def check(self, camera_object, then=None, scene=None, reopened=True):
+        """Apply the four values; let `then` happen, four frames pass; render; save and open again. Another file is open then.
+
+        Fails unless at each stage the pose sticks or not as the row has it, and the panel says what the row says.
+        reopened : true if that holds of the saved file too.
+        """
+        import bpy
+
+        scene = scene or bpy.context.scene
+        self.apply(camera_object, scene)
+        if then:
+            then()
+        self.later(camera_object, scene, "after an update")
+        scene.frame_set(scene.frame_current + 4)
+        self.later(camera_object, scene, "at another frame")
+        self.render(camera_object, scene)
+        if reopened:
+            self.later(*self.reopen(camera_object, scene), "saved and opened again")
+
+    def apply(self, camera_object, scene):
+        """Apply the four values."""
+        from viewcam_addon.blender import camera as cameras
+        from viewcam_addon.blender import datablocks
+        from viewcam_addon.errors import InputError
+
+        try:
+            messages = cameras.apply(camera_object, cameras.stated(camera_object, scene), scene)
+        except InputError as error:
+            messages = [datablocks.sentence(error)]
+        self._compare(0, _off_by(camera_object, scene, datablocks.depsgraph_of(scene)), "right after apply")
+        if self.sticks[0] == self.sticks[1]:
+            assert set(messages) <= set(self.sentences), f"apply says {messages}"
+
+    def later(self, camera_object, scene, moment):
+        """Look at the camera and at its panel."""
+        import bpy
+
+        from viewcam_addon.blender import datablocks
+        from viewcam_addon.blender.interface import panel
+
+        for _ in range(2):  # a handler's change in one update shows in the next
+            bpy.context.view_layer.update()
+        self._compare(1, _off_by(camera_object, scene, datablocks.depsgraph_of(scene)), moment)
+        self.draw()
+        sentences = [notice.sentence for notice in panel.notices(camera_object, scene)]
+        assert sentences == self.sentences, f"{moment} the panel says\n" + "\n".join(sentences)
+
+    def render(self, camera_object, scene):
+        """Look at the camera as a render engine gets it."""
+        from viewcam_addon.blender.scenes import depsgraph
+
+        off = depsgraph.visit(scene, lambda graph: _off_by(camera_object, scene, graph))
+        self._compare(2, off, "in the render")
+
+    def reopen(self, camera_object, scene):
+        """Save and open again: the camera and the scene in the new file."""
+        import bpy
+
+        names, path = (camera_object.name, scene.name), str(self.folder / "odd.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        scene = bpy.data.scenes[names[1]]
+        return scene.objects.get(names[0]) or bpy.data.objects[names[0]], scene
+
+    def _compare(self, stage, off, moment):
+        if self.sticks[stage] is not None:
+            # Blender's own projection runs in float32: 20 roundings of numbers up to 2 · 1920 px.
+            assert (off < 20 * 2.0**-24 * 3840) == self.sticks[stage], f"{moment} the picture is off by {off:.3g} px"
+
+
+def _off_by(camera_object, scene, graph):
+    """Pixels between where Blender's own function sees points about the look-at point and where the four values see them."""
+    from bpy_extras.object_utils import world_to_camera_view
+    from mathutils import Vector
+
+    from viewcam_addon.blender import camera as cameras
+    from viewcam_addon.blender import datablocks
+    from viewcam_addon.errors import InputError
+
+    evaluated = camera_object.evaluated_get(graph)
+    try:
+        stated = cameras.stated(camera_object, scene)
+    except InputError:
+        return math.inf
+    if not evaluated.is_evaluated or not evaluated.matrix_world.determinant():
+        return math.inf
+    frame = datablocks.frame_of(scene)
+    points = np.add(stated.look_at, [(0, 0, 0), (0.5, 0, 0), (0, 0.5, 0), (0, 0, 0.5)])
+    seen = np.array([world_to_camera_view(scene, evaluated, Vector(point)) for point in points])[:, :2]
+    stated_at = np.column_stack(stated.project(points)[:2]) + frame.window[:2]
+    return float(np.linalg.norm(seen * frame.size - stated_at, axis=1).max())
+
+
+@pytest.fixture
+def odd_rows(tmp_path, draw_panels):
+    """The rows of docs/odd-blender.md by the name of their test."""
+    rows = {}
+    page = Path(__file__).resolve().parent.parent.parent / "docs" / "odd-blender.md"
+    for line in page.read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split(" | ")]
+        if cells[-1].strip("`").startswith("test_"):
+            _, *sticks, sentence, test = cells
+            assert test not in rows and len(sticks) == 3, f"one row, three cells of yes or no for {test}"
+            sticks = tuple({"yes": True, "no": False, "—": None}[cell] for cell in sticks)
+            rows[test.strip("`")] = OddRow(
+                sticks, [] if sentence == "nothing" else sentence.split("<br>"), tmp_path, draw_panels
+            )
+    return rows
+
+
+@pytest.fixture
+def odd(request, odd_rows):
+    """The row of docs/odd-blender.md that names the test."""
+    return odd_rows[request.node.originalname]
+
+
+TURNED = (0.3, 0.4, 0.5)
+
+
+@pytest.fixture
+def rig(add_rig):
+    """An armature with one bone, Head, posed."""
+    armature = add_rig(0.4)
+    armature.location, armature.rotation_euler = (1, 2, 3), TURNED
+    armature.pose.bones["Head"].location = (0.5, 0, 0)
+    return armature
+
+
+@pytest.fixture
+def carrying_path():
+    """A circle that carries what hangs on it along."""
+    bpy.ops.curve.primitive_bezier_circle_add(radius=3, location=(1, 2, 3))
+    curve = bpy.context.object
+    curve.name = "Path"
+    curve.data.use_path = curve.data.use_path_follow = True
+    curve.data.eval_time = 30
+    return curve
+
+
+def apply_scale(block):
+    """Object > Apply > Scale."""
+    bpy.ops.object.select_all(action="DESELECT")
+    block.select_set(True)
+    bpy.context.view_layer.objects.active = block
+    bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
+
+
+def set_again(camera_object, scene):
+    return cameras.apply(camera_object, cameras.stated(camera_object, scene), scene)
+
+
+def test_under_a_parent_that_is_moved_turned_and_scaled_the_pose_sticks(posed_camera, empty, odd):
+    posed_camera.parent = empty("Dolly", (1, 2, 3), rotation_euler=TURNED, scale=(2, 2, 2))
+    odd.check(posed_camera)
+
+
+def test_under_a_parent_set_with_keep_transform_the_pose_sticks(posed_camera, empty, odd):
+    parent = empty("Dolly", (1, 2, 3), rotation_euler=TURNED)
+    posed_camera.parent, posed_camera.matrix_parent_inverse = parent, parent.matrix_world.inverted()
+    parent.location = (4, 5, 6)
+    odd.check(posed_camera)
+
+
+def test_a_parent_that_moves_later_takes_the_camera_along(posed_camera, empty, odd):
+    posed_camera.parent = parent = empty("Dolly")
+    odd.check(posed_camera, then=lambda: setattr(parent, "location", (0, 0, 2)))
+
+
+def test_under_a_mirrored_parent_the_pose_sticks_and_the_picture_stays_mirrored(posed_camera, empty, scene, odd):
+    posed_camera.parent = empty("Mirror", scale=(-2, 2, 2))
+    assert cameras.stated(posed_camera, scene).mirrored
+    odd.check(posed_camera)
+
+
+def test_under_a_turned_parent_that_is_scaled_non_uniformly_the_camera_is_oblique(posed_camera, empty, odd):
+    posed_camera.parent = empty("Stretched", (1, 2, 3), rotation_euler=TURNED, scale=(1, 1, 3))
+    odd.check(posed_camera)
+
+
+def test_under_an_ancestor_that_is_scaled_non_uniformly_the_camera_is_oblique(posed_camera, empty, odd):
+    ancestor = empty("Stretched", scale=(1, 1, 3))
+    posed_camera.parent = empty("Dolly", (1, 2, 3), rotation_euler=TURNED)
+    posed_camera.parent.parent = ancestor
+    odd.check(posed_camera)
+
+
+def test_applying_the_scale_of_the_parent_helps_as_the_sentence_says(posed_camera, empty, scene):
+    posed_camera.parent = parent = empty("Stretched", (1, 2, 3), rotation_euler=TURNED, scale=(1, 1, 3))
+    assert "apply the scale of 'Stretched'" in set_again(posed_camera, scene)[0]
+    apply_scale(parent)
+    assert set_again(posed_camera, scene) == []
+
+
+def test_clearing_the_parent_inverse_helps_as_the_sentence_says(posed_camera, empty, scene):
+    posed_camera.parent = empty("Dolly")
+    posed_camera.matrix_parent_inverse = Matrix.Diagonal((1, 1, 3, 1))
+    assert "clear the parent inverse" in set_again(posed_camera, scene)[0]
+    posed_camera.matrix_parent_inverse = Matrix.Identity(4)
+    assert set_again(posed_camera, scene) == []
+
+
+def test_a_parents_stretching_along_the_cameras_own_axes_does_no_harm(posed_camera, empty, odd):
+    group = posed_camera.virtual_pinhole
+    group.eye, group.look_at, group.up = (0, 0, 5), (0, 0, 0), (0, 1, 0)
+    posed_camera.parent = empty("Stretched", scale=(1, 1, 3))
+    odd.check(posed_camera)
+
+
+def test_under_a_parent_that_is_scaled_to_zero_there_is_no_camera(posed_camera, empty, odd):
+    posed_camera.parent = empty("Flat", scale=(1, 0, 1))
+    odd.check(posed_camera)
+
+
+def test_under_a_parent_inverse_with_a_non_uniform_scale_the_camera_is_oblique(posed_camera, empty, odd):
+    posed_camera.parent = parent = empty("Stretched", rotation_euler=TURNED, scale=(1, 1, 3))
+    posed_camera.matrix_parent_inverse = parent.matrix_world.inverted()
+    parent.rotation_euler, parent.scale = (0, 0, 0), (1, 1, 1)
+    odd.check(posed_camera)
+
+
+def test_on_a_bone_the_pose_sticks(posed_camera, rig, odd):
+    posed_camera.parent, posed_camera.parent_type, posed_camera.parent_bone = rig, "BONE", "Head"
+    odd.check(posed_camera)
+
+
+def test_on_a_bone_that_is_scaled_non_uniformly_the_camera_is_oblique(posed_camera, rig, odd):
+    posed_camera.parent, posed_camera.parent_type, posed_camera.parent_bone = rig, "BONE", "Head"
+    rig.pose.bones["Head"].scale = (1, 1, 3)
+    odd.check(posed_camera)
+
+
+def test_on_an_animated_bone_the_camera_goes_along(posed_camera, rig, odd):
+    posed_camera.parent, posed_camera.parent_type, posed_camera.parent_bone = rig, "BONE", "Head"
+    bone = rig.pose.bones["Head"]
+    for frame, x in ((1, 0.0), (5, 2.0)):
+        bone.location.x = x
+        bone.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+    odd.check(posed_camera, then=lambda: bpy.context.scene.frame_set(5))
+
+
+@pytest.mark.parametrize(("kind", "vertices"), [("VERTEX", (3, 0, 0)), ("VERTEX_3", (3, 50, 100))])
+def test_on_one_vertex_or_three_the_pose_sticks(posed_camera, odd, kind, vertices):
+    bpy.ops.mesh.primitive_monkey_add(location=(1, 2, 3), rotation=TURNED)
+    posed_camera.parent, posed_camera.parent_type = bpy.context.object, kind
+    posed_camera.parent_vertices = vertices
+    odd.check(posed_camera)
+
+
+def test_on_a_path_that_it_follows_the_pose_sticks(posed_camera, carrying_path, odd):
+    posed_camera.parent = carrying_path
+    odd.check(posed_camera)
+
+
+def test_on_a_path_with_an_animated_time_the_camera_goes_along(posed_camera, carrying_path, odd):
+    posed_camera.parent = carrying_path
+    for frame, time in ((1, 0.0), (5, 50.0)):
+        carrying_path.data.eval_time = time
+        carrying_path.data.keyframe_insert("eval_time", frame=frame)
+    bpy.context.scene.frame_set(1)
+    odd.check(posed_camera, then=lambda: bpy.context.scene.frame_set(5))
+
+
+def test_under_a_parent_with_a_constraint_the_pose_sticks(posed_camera, empty, odd):
+    posed_camera.parent = parent = empty("Dolly")
+    parent.constraints.new("COPY_LOCATION").target = empty("Car", (3, 3, 3))
+    odd.check(posed_camera)
+
+
+def test_under_a_parent_whose_constraint_moves_it_later_the_camera_goes_along(posed_camera, empty, odd):
+    posed_camera.parent = parent = empty("Dolly")
+    parent.constraints.new("COPY_LOCATION").target = car = empty("Car", (3, 3, 3))
+    odd.check(posed_camera, then=lambda: setattr(car, "location", (3, 3, 5)))
+
+
+def animate_height(block):
+    for frame, height in ((1, 0), (5, 2)):
+        block.location.z = height
+        block.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+
+
+def test_under_an_animated_parent_the_camera_goes_along(posed_camera, empty, odd):
+    posed_camera.parent = parent = empty("Dolly")
+    animate_height(parent)
+    odd.check(posed_camera, then=lambda: bpy.context.scene.frame_set(5))
+
+
+def test_under_a_parent_with_a_driver_the_camera_goes_along(posed_camera, empty, odd):
+    posed_camera.parent = empty("Dolly")
+    posed_camera.parent.driver_add("location", 2).driver.expression = "2.0 if frame > 4 else 0.0"
+    odd.check(posed_camera, then=lambda: bpy.context.scene.frame_set(5))
+
+
+def test_under_an_animated_parent_animated_values_win(posed_camera, empty, scene, odd, render_positions, picture_error):
+    posed_camera.parent = parent = empty("Dolly", rotation_euler=TURNED)
+    animate_height(parent)
+    group = posed_camera.virtual_pinhole
+    for frame, height in ((1, 5), (9, 9)):
+        group.eye[2] = height
+        group.keyframe_insert("eye", frame=frame)
+    scene.frame_set(3)
+    scene.frame_start = scene.frame_end = 5
+    positions = render_positions(animation=True)[5]
+    scene.frame_set(5)
+    error, tolerance = picture_error(cameras.stated(posed_camera, scene), positions)
+    assert error <= tolerance, f"{error:.1e} px, and {tolerance:.1e} are rounding"
+    odd.check(posed_camera)
 
 
 @pytest.fixture
@@ -267,8 +686,6 @@ def test_a_camera_that_is_named_is_rendered_though_a_marker_chooses_another(both
 
 
 # --- Channels of an enabled camera that something else sets too, or holds. docs/odd-blender.md says what each test expects
-
-
 MODES = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "QUATERNION", "AXIS_ANGLE")
 
 
@@ -447,8 +864,6 @@ def test_a_pose_far_from_the_origin_is_stored_as_well_as_float32_can(posed_camer
 
 
 # --- Constraints on an enabled camera. docs/odd-blender.md says what each test expects (fixture `odd`)
-
-
 @pytest.fixture
 def constrain(posed_camera, empty):
     """A function that adds a constraint to the camera, by default with the empty Target at (5, 5, 5), turned."""
@@ -668,8 +1083,6 @@ def test_animated_values_follow_a_moving_target_of_child_of(posed_camera, constr
 
 
 # --- What people do with objects: duplicate, copy and paste, link, append, override, rename, delete, undo
-
-
 @pytest.fixture
 def aimed_camera(posed_camera, empty):
     """The posed camera with an object Target as look-at, which stands in for the point (0, 0, 1)."""
@@ -976,8 +1389,6 @@ def test_the_panel_of_data_that_no_object_of_the_scene_has_stays_away(posed_came
 
 
 # --- Enabled cameras from another .blend: linked, overridden, half of each. docs/odd-blender.md says what each test expects
-
-
 @pytest.fixture
 def library(posed_camera, tmp_path):
     """A function that opens an empty file and links one camera object, or its data, from a saved one with an enabled camera."""
@@ -1047,3 +1458,38 @@ def test_an_override_of_object_and_data_sticks(library, odd, system):
     odd.check(camera_object)
     camera_object = bpy.context.scene.camera
     assert camera_object.override_library and tuple(camera_object.virtual_pinhole.eye) == (7, -6, 6)
+
+
+def found_tests():
+    """The tests here that take the fixture `odd`, by name: whether they ask it for what the row says."""
+    result = {}
+    for node in ast.parse(Path(__file__).read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef) and any(argument.arg == "odd" for argument in node.args.args):
+            body = ast.unparse(node)
+            result[node.name] = "odd.check(" in body or "odd.later(" in body
+    return result
+
+
+def test_every_row_has_its_test_and_every_test_its_row(odd_rows):
+    assert set(odd_rows) == set(found_tests())
+    assert len(odd_rows) > 90
+
+
+def test_every_test_holds_its_row_to_its_word():
+    assert [name for name, asks in found_tests().items() if not asks] == []
+
+
+@pytest.mark.parametrize(
+    "untruth",
+    [
+        {"sentences": ["The camera is well."]},
+        {"sticks": (False, True, True)},
+        {"sticks": (True, False, True)},
+        {"sticks": (True, True, False)},
+    ],
+)
+def test_a_row_that_is_not_true_is_seen(posed_camera, odd_rows, untruth):
+    row = odd_rows["test_in_every_rotation_mode_the_pose_sticks"]
+    assert (row.sticks, row.sentences) == ((True, True, True), [])
+    with pytest.raises(AssertionError):
+        dataclasses.replace(row, **untruth).check(posed_camera)
