@@ -428,7 +428,7 @@ def test_a_camera_that_is_not_enabled_shows_its_own_values_grayed_and_one_button
 
 @pytest.mark.parametrize("width", [NARROWEST, 253, 300, 600])
 def test_no_number_of_a_camera_that_is_not_enabled_is_cut_off(posed_camera, width):
-    """Numbers that do not fit beside one another stand one below the other; in a window of 1280 pixels the panel is 253 wide."""
+    """Numbers that do not fit beside one another stand one below the other. A window of 1280 pixels has a panel of 253."""
     posed_camera.virtual_pinhole.enabled = False
     posed_camera.location = (-123.456, 2666.66, -0.0123)
     bpy.context.view_layer.update()

@@ -278,7 +278,7 @@ class Scene {
         std::vector<size_t> first(members.size() + 1);
         for (size_t i = 0; i < members.size(); i++)
             first[i + 1] = first[i] + std::get<TriangleMesh>(geometries[objects[members[i]].geometry]).count;
-        Array<uint32_t> place(first.back());  // of each triangle's object among the members
+        Array<uint32_t> place(first.back());  // each triangle's object, among the members
         for (size_t i = 0; i < members.size(); i++) std::fill(place.begin() + first[i], place.begin() + first[i + 1], uint32_t(i));
         auto corners_of = [&](size_t triangle, Vec3 corner[3]) {
             size_t i = place[triangle];
