@@ -26,10 +26,11 @@ def lacking() -> str | None:
     return None
 
 
-def filled(template: str, **values: Any) -> "Markup":
+def filled(template: str, macro: str = "", **values: Any) -> "Markup":
     """A template with values put in: a page, or a part of one, which other templates take as HTML.
 
     template : its path below the package, with slashes.
+    macro : the macro of it that is the part.
     values : a value for each name in it; filters and tests are Jinja2's.
 
     Raises InputError if there is no Jinja2.
@@ -38,7 +39,8 @@ def filled(template: str, **values: Any) -> "Markup":
         raise InputError(sentence)
     from markupsafe import Markup
 
-    return Markup(_environment().get_template(template).render(values))
+    of = _environment().get_template(template)
+    return getattr(of.module, macro)(**values) if macro else Markup(of.render(values))
 
 
 @functools.cache

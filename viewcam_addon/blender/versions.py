@@ -23,6 +23,8 @@ DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
 # True if Cycles has one normal a vertex, and splits those at sharp edges (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
 CYCLES_HAS_VERTEX_NORMALS = bpy.app.version < (5, 1)
 
+# Types of nodes that one Blender calls otherwise than those before and after it. Measured: 4.4.0.
+NODE_TYPES = {"DIFFUSE_BSDF": "BSDF_DIFFUSE"}
 # True if nodes whose links go in a circle are black; before, Cycles left these links out. Measured: 4.2, 5.0 and 5.2.
 CIRCLES_ARE_BLACK = bpy.app.version >= (5, 0)
 

@@ -1,6 +1,6 @@
 """Drawings of the report as SVG: they scale, print, and take the page's colors in light and dark.
 
-chart.html and marks.html draw them. Rejected: matplotlib, whose pictures know one background only and which Blender does not
+parts.html draws them. Rejected: matplotlib, whose pictures know one background only and which Blender does not
 have.
 """
 
@@ -17,6 +17,8 @@ from . import pictures
 from .mismatches import KINDS, Mismatches
 from .statistics import percentile_name
 from .tolerances import PERCENTILES, ROUNDINGS
+
+_PARTS = "comparison/parts.html"
 
 # More mismatches than this are painted as pixels (pictures.stain): marks would hide the picture.
 _MOST_MARKED = 400
@@ -89,12 +91,12 @@ def marks(mismatches: Mismatches, size: tuple[int, int]) -> str:
     """The mismatches over a picture of this size, (width, height): as marks, or as pixels where they are many."""
     width, height = size
     if len(mismatches.kinds) > _MOST_MARKED:
-        return html_page.filled("comparison/marks.html", stain=pictures.png_uri(pictures.stain(mismatches, size)))
+        return html_page.filled(_PARTS, "marks", stain=pictures.png_uri(pictures.stain(mismatches, size)))
     places = [
         (mismatches.columns[i] + 0.5, height - mismatches.rows[i] - 0.5, mismatches.explained[i], mismatch_text(mismatches, i))
         for i in range(len(mismatches.kinds))
     ]
-    return html_page.filled("comparison/marks.html", stain=None, width=width, height=height, places=places)
+    return html_page.filled(_PARTS, "marks", stain=None, width=width, height=height, places=places)
 
 
 def mismatch_text(mismatches: Mismatches, i: int) -> str:
@@ -106,9 +108,9 @@ def mismatch_text(mismatches: Mismatches, i: int) -> str:
 
 
 def _drawn(label: str, below: int, **parts: object) -> str:
-    """chart.html. below : the room below the axis."""
+    """The chart. below : the room below the axis."""
     placed = {"width": _WIDTH, "height": _BASE + below, "left": _LEFT, "right": _RIGHT, "base": _BASE, "label": label}
-    return html_page.filled("comparison/chart.html", **({"lanes": (), "limits": (), "curve": ""} | placed | parts))
+    return html_page.filled(_PARTS, "chart", **({"lanes": (), "limits": (), "curve": ""} | placed | parts))
 
 
 def _bars(counts: NDArray[np.int64], edges: list[float], most: float) -> list[tuple[float, float, float, float]]:

@@ -63,7 +63,7 @@ _LUMINANCE = (0.2126390, 0.7151687, 0.0721923)
 
 
 # Shaders that Cycles takes for another one on a surface, and for none.
-_AS = {"BACKGROUND": "EMISSION"}
+_AS = {"BACKGROUND": "EMISSION"} | versions.NODE_TYPES
 _VOLUMES = ("VOLUME_ABSORPTION", "VOLUME_SCATTER", "VOLUME_COEFFICIENTS", "PRINCIPLED_VOLUME")
 # Nodes that feed one another in a row. One of them may become two of the tracer's, which may be more (shader_nodes.MOST_DEEP).
 _MOST_DEEP = 100
