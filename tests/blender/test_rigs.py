@@ -178,6 +178,18 @@ def test_there_and_back_by_bake_the_camera_flies_the_same(rigged, scene):
         np.testing.assert_allclose(matrix, was, rtol=0, atol=2 * findings.LARGEST_TURN)
 
 
+def test_a_baked_camera_that_is_ticked_again_has_the_lens_of_its_frame(rigged, scene):
+    """Not that of the last frame, up to which Bake has gone, where its lens is keyed in millimeters."""
+    camera_object = rigged("keyed")
+    bpy.ops.viewcam.convert_keyframes(camera="Camera")
+    scene.frame_set(77)
+    bpy.ops.viewcam.bake_camera(camera="Camera")
+    (_, lens), last = stands(camera_object), flight_of(camera_object, scene, [250])[0][1]
+    scene.frame_set(77)
+    camera_object.virtual_pinhole.enabled = True
+    assert abs(stands(camera_object)[1] - lens) <= lens * 2**-22 and abs(last - lens) > 1
+
+
 def test_one_step_of_undo_brings_the_keyframes_back(rigged, scene):
     camera_object = rigged("keyed")
     before = flight_of(camera_object, scene, range(1, 251, 50))

@@ -443,6 +443,80 @@ def test_a_matrix_alone_leaves_the_lens_as_it_is():
     the_same([read], known)
 
 
+def blenders(matrix):
+    """A matrix as Blender's console shows it."""
+    return "<Matrix 4x4 " + "\n            ".join(f"({row(each)})" for each in matrix) + ">"
+
+
+ALONE = {
+    "numpy": lambda m: repr(np.array(m)),
+    "printed": fixed,
+    "list": lambda m: repr(m.tolist()),
+    "three_rows": lambda m: repr(m[:3].tolist()),
+    "arrays": lambda m: repr([*m]),
+    "torch": lambda m: f"tensor({m.tolist()}, device='cuda:0', dtype=torch.float64)",
+    "matlab": lambda m: f"[{rows(m)}]",
+    "lines": lambda m: rows(m, ", ", chr(10)),
+    "julia": lambda m: f"4×4 Matrix{{Float64}}:\n{rows(m, '  ', chr(10))}",
+    "mathutils": lambda m: f"Matrix(({', '.join(f'({row(each)})' for each in m)}))",
+    "blender": blenders,
+    "columns": lambda m: row(m.T),
+}
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_a_matrix_without_a_name_is_a_pose_once_its_way_is_said(name):
+    with np.printoptions(floatmode="unique"):
+        text = ALONE[name](OPENGL)
+    assert cameras.recognized(text) == "arrays"
+    with pytest.raises(InputError, match="which way it goes is not said"):
+        cameras.read(text, options=Options(view_plane=known.pinhole.plane))
+    the_same(cameras.read(text, options=Options(view_plane=known.pinhole.plane, pose="c2w_opengl")), known)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        rows(OPENGL * 2),  # no row 0 0 0 1
+        row(np.arange(12)),  # no rotation
+        rows(OPENGL) + "; 1 2 3 4",
+        rows(OPENGL) + " meters",
+    ],
+)
+def test_other_numbers_alone_are_no_pose(text):
+    with pytest.raises(InputError, match="no camera that is understood"):
+        cameras.recognized(text)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1000.0])
+def test_variables_as_matlab_shows_them_are_read_with_the_factor_that_it_takes_out(factor):
+    def display(name, matrix, factor=1.0):
+        by = f"   {factor:.1e} *\n\n" if factor != 1 else ""
+        return f"{name} =\n\n{by}" + "".join(f"   {row(each, '   ')}\n" for each in matrix / factor) + "\n\n"
+
+    text = display("K", K, factor) + display("R", R) + display("t", T[:, None])
+    (read,) = cameras.read(text, options=CORNER)
+    np.testing.assert_allclose(read.pinhole.distance, known.pinhole.distance, rtol=1e-15)
+    np.testing.assert_allclose(read.pinhole.eye, known.pinhole.eye, rtol=1e-12)
+
+
+def test_a_row_that_goes_on_after_three_points_is_one_row():
+    k = f"K = [{row(K[0], ' ')}; ...\n {row(K[1], ' ')}; ... % of pixels\n {row(K[2], ' ')}];"
+    the_same(cameras.read(f"{k}\nR = [{rows(R)}];\nt = [{row(T)}];", options=CORNER), known)
+
+
+def test_k_alone_leaves_the_camera_where_it_stands():
+    """Also where the text's world is another: what it does not say is no part of it."""
+    base = known.pinhole
+    for axes, scale in (("as_is", 1.0), ("y_up", 0.5)):
+        options = Options(size=CORNER.size, base=base, axes=axes, scale=scale)
+        (read,) = cameras.read("K = [900 0 330; 0 900 170; 0 0 1];", options=options)
+        assert (read.pinhole.eye, read.pinhole.look_at, read.pinhole.up) == (base.eye, base.look_at, base.up)
+        assert read.pinhole.distance == (900.0, 900.0) and "where the camera stands" in " ".join(read.notes)
+    (read,) = cameras.read("K = [900 0 330; 0 900 170; 0 0 1];", options=CORNER)
+    assert read.pinhole.eye == (0, 0, 0)
+
+
 @pytest.mark.parametrize(
     "pose",
     [

@@ -10,6 +10,7 @@ Leaves with status 0, or 5 and a traceback.
 """
 
 import importlib
+import importlib.util
 import math
 import sys
 import time
@@ -20,6 +21,7 @@ import numpy as np
 from bpy_extras.object_utils import world_to_camera_view
 
 sys.path.append(str(Path(__file__).parent))
+import tour_step
 from hands import (
     LEFT,
     NOWHERE,
@@ -42,6 +44,7 @@ from hands import (
     press,
     push,
     push_undo,
+    redo,
     region,
     same,
     seen,
@@ -610,6 +613,132 @@ def render_two_formats():
     bpy.data.objects.remove(other)
 
 
+def taken_back(steps, what, is_scenes_edit=True):
+    """Steps that do something, and fail unless one Ctrl Z takes it back, and Ctrl Shift Z brings it again, to the bit.
+
+    is_scenes_edit : false for what leaves the scene as it is, before which a value is typed: that alone is taken back.
+    """
+    push_undo("before")
+    yield
+    before = tour_step.state()
+    if not is_scenes_edit:
+        yield from type_into("virtual_pinhole.eye[2]", "6.5")
+    edited = tour_step.state()
+    yield from steps
+    move(*NOWHERE)
+    yield from settle()
+    after = tour_step.state()
+    assert (after == edited) != is_scenes_edit, f"{what} changes {tour_step.differing(edited, after)}"
+    yield from undo()
+    assert not (lost := tour_step.differing(before, tour_step.state())), f"undone, {what} leaves {lost}"
+    yield from redo()
+    assert not (lost := tour_step.differing(after, tour_step.state())), f"done again, {what} lacks {lost}"
+    yield from undo()
+
+
+def undo_what_is_pasted():
+    """The camera and the scene's size are one step."""
+    bpy.context.window_manager.clipboard = "eye=3,-5,2.5 look_at=0,0,1 up=0,0,1 d=900 width=640 height=480"
+    yield from taken_back(_paste_with_its_size(), "a paste")
+
+
+def _paste_with_its_size():
+    call(bpy.ops.viewcam.paste_camera, camera=camera().name, set_size=True)
+    yield from settle()
+    render = bpy.context.scene.render
+    assert (values().numbers()[0], render.resolution_x, render.resolution_y) == ((3, -5, 2.5), 640, 480)
+
+
+def undo_what_is_converted():
+    """Keyframes that became values, and those that are deleted, come back with all of their curves."""
+    for frame, x, lens in ((1, 6.0, 35.0), (20, -6.0, 85.0)):
+        camera().location.x, camera().data.lens = x, lens
+        camera().keyframe_insert("location", frame=frame)
+        camera().data.keyframe_insert("lens", frame=frame)
+    bpy.context.scene.frame_end = 20
+    bpy.context.scene.frame_set(10)
+    yield
+    for operator in (bpy.ops.viewcam.convert_keyframes, bpy.ops.viewcam.delete_keyframes):
+        yield from taken_back(_confirmed(operator), operator.idname_py())
+    for block in (camera(), camera().data):
+        block.animation_data_clear()
+    bpy.context.scene.frame_set(1)
+    yield
+
+
+def _confirmed(operator):
+    """Steps that run an operator which asks, and confirm it."""
+    move(*NOWHERE)
+    yield
+    call(operator, camera=camera().name)
+    yield from settle()
+    press("RET", *NOWHERE)
+    yield from settle()
+    yield from settle()
+
+
+def undo_after_a_proof():
+    """A proof is no edit: Ctrl Z takes back what was done before it, and the verdict stays on show."""
+    scene, proof = bpy.context.scene, room("interface.proof")
+    scene.render.resolution_x, scene.render.resolution_y = 64, 36
+    values().eye, values().look_at, values().up = (4, -6, 3.5), bpy.data.objects["Cube"].location, (0, 0, 1)
+    yield
+    yield from taken_back(_proven(proof), "a proof", is_scenes_edit=False)
+    assert proof.background.latest, "undo has taken the verdict away"
+
+
+def _proven(proof):
+    call(bpy.ops.viewcam.compare_with_cycles, camera=camera().name)
+    yield from until(lambda: proof.background.running is None, "the verdict", PATIENCE, WAITING)
+    assert proof.background.latest.answer == "same", proof.background.latest.verdict
+
+
+def undo_after_render_all_cameras():
+    """Nor are pictures of all cameras one: Ctrl Z takes back what was done before them, also while they are on their way."""
+    scene, render_all = bpy.context.scene, room("interface.render_all")
+    scene.render.engine, scene.cycles.samples = "CYCLES", 1
+    scene.render.resolution_x, scene.render.resolution_y = 64, 36
+    folder = FOLDER / "undone"
+    folder.mkdir()
+    yield
+    yield from taken_back(_all_rendered(render_all, folder), "rendering all cameras", is_scenes_edit=False)
+    (rendered,) = [each for each in folder.iterdir() if "all cameras" in each.name]
+    assert {path.stem for path in rendered.glob("*.exr")} == {"Camera"}, "undo has taken the pictures away"
+
+
+def _all_rendered(render_all, folder):
+    """Steps that render all cameras, and undo and redo meanwhile."""
+    yield from choose_in_the_file_browser(bpy.ops.viewcam.render_all_cameras, folder)
+    yield from until(lambda: render_all.background.running, "the rendering's start")
+    edited = tour_step.state()
+    yield from undo()
+    assert tour_step.state() != edited and render_all.background.running, "Ctrl Z takes nothing back while cameras render"
+    yield from redo()
+    assert not (lost := tour_step.differing(edited, tour_step.state())), f"done again while cameras render, {lost} differs"
+    yield from until(lambda: render_all.background.running is None, "the pictures", PATIENCE, WAITING)
+    yield from settle()
+    press("ESC", *NOWHERE)  # closes what tells of them
+    yield from settle()
+
+
+def render_by_workbench():
+    """The Blender that tries whether there is a graphics driver leaves the wheels of the user's extensions where they are."""
+    scene, render_all = bpy.context.scene, room("interface.render_all")
+    scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "BLENDER_WORKBENCH", 64, 36
+    folder = FOLDER / "workbench"
+    folder.mkdir()
+    yield from choose_in_the_file_browser(bpy.ops.viewcam.render_all_cameras, folder)
+    yield from until(lambda: render_all.background.running, "the rendering's start")
+    yield from until(lambda: render_all.background.running is None, "the pictures", PATIENCE, WAITING)
+    assert len(list(folder.glob("*/contact-sheet.html"))) == 1, "there is no contact sheet"
+    importlib.invalidate_caches()
+    lost = [name for name in ("viewcam_core", "OpenEXR", "jinja2") if importlib.util.find_spec(name) is None]
+    assert not lost, f"the wheels are gone of {lost}"
+    yield from settle()
+    press("ESC", *NOWHERE)
+    yield from settle()
+
+
 def add_a_camera_where_there_is_none():
     bpy.data.objects.remove(camera())
     yield
@@ -725,7 +854,13 @@ DAY = {
         look_straight_down,
     ),
     "What is drawn can be read": (draw_on_light_and_dark,),
-    "All cameras are rendered by one click": (render_two_formats,),
+    "All cameras are rendered by one click": (render_two_formats, render_by_workbench),
+    "One undo takes back one edit, whatever ran since": (
+        undo_what_is_pasted,
+        undo_what_is_converted,
+        undo_after_a_proof,
+        undo_after_render_all_cameras,
+    ),
     "There is always a way to a camera": (add_a_camera_where_there_is_none,),
     "A photo gives its camera": (escape_from_a_match, match_a_photo),
 }

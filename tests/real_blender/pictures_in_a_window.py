@@ -24,6 +24,7 @@ from hands import (
     call,
     hide_the_sidebar,
     match_photo,
+    move,
     photograph,
     press,
     region,
@@ -38,7 +39,6 @@ from tour_step import room
 FOLDER, PHOTO, *PARTS = sys.argv[sys.argv.index("--") + 1 :]
 FOLDER, PHOTO = Path(FOLDER), Path(PHOTO)
 STUDIO = Path(__file__).resolve().parent.parent.parent / "sample_scenes" / "studio.blend"
-LISTED = 222  # pixels of the file browser's list
 SAMPLES, PATIENCE = 8, 3000  # light's, and seconds until it is there
 EDGE, LEGEND = 24, 70  # pixels around the pictures of a proof, and below them
 # (axis, start, end) of edges of the room, world space.
@@ -86,26 +86,29 @@ def photo_match():
 
 
 def export():
-    """The file browser with its options, without the empty middle of its list."""
-    bpy.ops.wm.open_mainfile(filepath=str(STUDIO), load_ui=False)
-    yield
-    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch, "shots")
-        folder.mkdir()
-        call(bpy.ops.viewcam.export_scene, filepath=str(folder / STUDIO.with_suffix(".json").name))
-        yield from settle()
-        area, files = region("FILE_BROWSER", "WINDOW")
-        _, name = region("FILE_BROWSER", "EXECUTE")
-        right, top = area.x + area.width, files.y + files.height
-        parts = [(files.x, top - LISTED, right - files.x, LISTED), (name.x, name.y, right - name.x, name.height)]
-        pictures = [Path(scratch, f"{number}.png") for number in range(2)]
-        for where, picture in zip(parts, pictures, strict=True):
-            photograph(where, picture, 60)
-        subprocess.run(["convert", *pictures, "-append", FOLDER / "artists" / "export.png"], check=True)
-        with bpy.context.temp_override(window=window(), area=area, region=files):
-            bpy.ops.file.cancel()
-        yield from until(lambda: all(each.type != "FILE_BROWSER" for each in window().screen.areas), "the end of the browser")
+    """The list of what an exported scene lacks, over the scene: a haze, which is no surface."""
+    yield from open_the_studio()
+    (view, part), (name, at) = region(*VIEWPORT), ("Haze", (0.0, 1.0, 2.0))
+    haze = bpy.data.materials.new(name)
+    if not haze.node_tree:  # new materials have one from 5.0 on
+        haze.use_nodes = True
+    tree = haze.node_tree
+    tree.nodes.clear()
+    scatter, output = tree.nodes.new("ShaderNodeVolumeScatter"), tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(scatter.outputs["Volume"], output.inputs["Volume"])
+    with bpy.context.temp_override(window=window(), area=view, region=part):
+        bpy.ops.mesh.primitive_cube_add(size=1, location=at)
+    bpy.context.object.name = name
+    bpy.context.object.data.materials.append(haze)
+    bpy.context.object.display_type = "WIRE"
+    move(part.x + part.width * 0.35, part.y + part.height * 0.7)
+    yield from settle()
+    with tempfile.TemporaryDirectory() as scratch, bpy.context.temp_override(window=window(), area=view, region=part):
+        bpy.ops.viewcam.export_scene(filepath=str(Path(scratch, STUDIO.with_suffix(".json").name)))
+    yield from settle()
+    photograph((part.x, part.y, part.width, part.height), FOLDER / "artists" / "export.png", 60)
+    press("ESC", *NOWHERE)
+    yield from settle()
 
 
 def preferences():

@@ -92,7 +92,9 @@ def axes():
 
 def state():
     """Everything that undo has to bring back, bit for bit, as a flat dict."""
-    result = {"frame": bpy.context.scene.frame_current, "camera": getattr(bpy.context.scene.camera, "name", None)}
+    scene, render = bpy.context.scene, bpy.context.scene.render
+    result = {"frame": scene.frame_current, "camera": getattr(scene.camera, "name", None)}
+    result |= {name: getattr(render, name) for name in ("resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y")}
     for block in bpy.context.scene.objects:
         result[block.name] = tuple(number for row in block.matrix_basis for number in row)
         if block.type == "CAMERA":
@@ -101,7 +103,16 @@ def state():
             result[data.name + "'s lens"] = (data.lens, data.shift_x, data.shift_y, data.sensor_width, data.sensor_height)
             action = block.animation_data and block.animation_data.action
             result[f"{block.name} action"] = action and action.name
+            result[f"{block.name} keyframes"] = tuple(map(_keyframes, (block, data)))
+            result[f"{block.name} constraints"] = tuple(each.name for each in block.constraints)
     return result
+
+
+def _keyframes(block):
+    return tuple(
+        (curve.data_path, curve.array_index, tuple(tuple(point.co) for point in curve.keyframe_points))
+        for curve in room("versions").action_curves(block)
+    )
 
 
 def _stored(group):

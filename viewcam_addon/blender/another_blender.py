@@ -1,6 +1,7 @@
 """A Blender like this one, in a process of its own, with factory settings and nothing open: for what this one can't do now.
 
-Rejected: a thread, since Blender renders one thing at a time.
+It has a folder of its own for what is the user's: a Blender that reads factory settings has no extension enabled, and removes
+the wheels of all that are installed. Rejected: a thread, since Blender renders one thing at a time.
 """
 
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 import bpy
 
 from .. import child_process
+from ..files import temporary_folder
 
 
 def run(statements: str, timeout: float) -> subprocess.CompletedProcess[bytes]:
@@ -22,18 +24,18 @@ def run(statements: str, timeout: float) -> subprocess.CompletedProcess[bytes]:
         command += ["--python-exit-code", "1", "--python-expr", statements]
     else:
         command = [sys.executable, "-c", statements]
-    # There stands a bpy that only this process can import.
-    variables = child_process.environment(apart_from=bpy.utils.system_resource("SCRIPTS"))
-    # In a session of its own: a Ctrl-C that is meant for us would end it, and look like a failure.
-    return subprocess.run(
-        command,
-        env=variables,
-        start_new_session=True,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        timeout=timeout,
-        check=False,
-    )
+    scripts = bpy.utils.system_resource("SCRIPTS")  # where there is a bpy that only this process can import
+    with temporary_folder() as folder:
+        # In a session of its own: a Ctrl-C that is meant for us would end it, and look like a failure.
+        return subprocess.run(
+            command,
+            env=child_process.environment(scripts, BLENDER_USER_RESOURCES=str(folder)),
+            start_new_session=True,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=timeout,
+            check=False,
+        )
 
 
 def call(module: str, arguments: list[str], timeout: float) -> subprocess.CompletedProcess[bytes]:

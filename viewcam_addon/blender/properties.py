@@ -35,6 +35,8 @@ def _on_enabled(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     storage.forget_stated(group.id_data)
     if not group.enabled:
         return
+    with contextlib.suppress(InputError):
+        cameras.answer(group.id_data)  # a curve of a look at a value has asked for it at this frame
     storage.begin(group.id_data)
     if keep != storage.EXACT:
         with storage.without_callbacks():

@@ -8,8 +8,9 @@
     fc = [ 657.4 ; 657.8 ]; cc = …; kc = …; omc_1 = …; Tc_1 = …     the Camera Calibration Toolbox for MATLAB, a picture each
 
 The arrays are found by their names and brought into rows; their meaning, and what the names are, is OpenCV's (opencv.py). A
-4 × 4 matrix is also read without K: then the camera sees as `Options.view_plane` says. Nothing is run: what is computed from
-other arrays (an inverse, a product) is refused where the camera needs it.
+4 × 4 matrix is also read without K: then the camera sees as `Options.view_plane` says; and without a name, as consoles print
+one, where nothing stands beside it. Nothing is run: what is computed from other arrays (an inverse, a product) is refused where
+the camera needs it.
 
 Sources: the Camera Calibration Toolbox's description of its parameters; the manuals of numpy.array, torch.tensor, MATLAB's
 matrices, cv::Mat_'s and Eigen's comma initializers, R's matrix.
@@ -52,6 +53,22 @@ _TEMPLATE = re.compile(r"\s*<[\w\s,:]{0,60}>")
 _ORDER = re.compile(r"byrow\s*=\s*(?:TRUE|T)\b")
 _SCALARS = ("fx", "fy", "cx", "cy")
 _DIAGONAL = re.compile(r"\(\s*[1-4]\s*\)")
+# The words of consoles around the numbers of a matrix; and a text of numbers alone.
+_PRINTED_AROUND = re.compile(
+    r"\A<?Matrix [34]x4|>\s*\Z|\A[34]×4 \w+\{[^}\n]{0,40}\}:|(?:\b\w+\.)*\b(?:array|tensor|[Mm]atrix)\s*(?=\()"
+    r"|,\s*(?:dtype|device|requires_grad|grad_fn)\s*=\s*[\w.'\"<>:]{1,40}"
+)
+_NUMBERS_ALONE = re.compile(r"[\s\d.eE+\-,;()\[\]{}]*")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_LONGEST_ALONE = 2_000  # characters of a matrix that stands alone
+_LIKE_A_TURN = 1e-2  # that rows of a rotation with few digits may be off square, relative to their lengths' square
+# MATLAB's and Octave's way to show a variable, with the factor that they take out of its numbers; and a row that goes on.
+_SHOWN = re.compile(
+    r"^([A-Za-z]\w{0,40})[ \t]*=[ \t]*\n(?:[ \t]*\n)*(?:[ \t]+(1\.0e[-+]\d+)[ \t]*\*[ \t]*\n(?:[ \t]*\n)*)?"
+    r"((?:[ \t]+[-+\d.eE \t]+(?:\n|\Z))+)",
+    re.MULTILINE,
+)
+_GOES_ON = re.compile(r"\.\.\.(?=[ \t]*(?:%[^\n]*)?$)", re.MULTILINE)
 _TOOLBOX = re.compile(r"^[ \t]*(fc|cc|kc|nx|ny|alpha_c|omc_\d+|Tc_\d+)[ \t]*=[ \t]*\[?([^\]\n]*)\]?", re.MULTILINE)
 
 
@@ -66,7 +83,11 @@ class _Unknown:
 
 
 def recognizes(source: Source) -> bool:
-    if source.is_binary or source.is_folder or source.document or source.xml is not None or len(source.text) > _MOST_CHARACTERS:
+    if source.is_binary or source.is_folder or source.xml is not None or len(source.text) > _MOST_CHARACTERS:
+        return False
+    if _alone(source.text):
+        return True
+    if source.document:
         return False
     if own.lines_of(source):  # several cameras of our own, whose names look like a program's
         return False
@@ -127,9 +148,35 @@ def _of_toolbox(text: str) -> dict[str, dict[str, Any]]:
     return posed or {"Camera": shared}
 
 
+def _alone(text: str) -> list[float]:
+    """The numbers of a text that is nothing but a matrix of a pose; none if it is anything else."""
+    if len(text) > _LONGEST_ALONE:
+        return []
+    left = _PRINTED_AROUND.sub(" ", text.strip().replace("−", "-"))
+    numbers = [*map(float, _NUMBER.findall(left))] if _NUMBERS_ALONE.fullmatch(left) else []
+    if len(numbers) == 16:
+        last = numbers[12:], numbers[3::4]
+        return numbers if [0.0, 0.0, 0.0, 1.0] in last else []
+    if len(numbers) != 12:
+        return []
+    turn = np.reshape(numbers, (3, 4))[:, :3]
+    square, scale = turn @ turn.T, (turn * turn).sum() / 3
+    return numbers if np.abs(square - scale * np.eye(3)).max() <= _LIKE_A_TURN * scale else []
+
+
+def _as_written(match: re.Match) -> str:
+    """A variable that MATLAB shows, as it is written."""
+    factor = float(match[2] or 1)
+    rows = [" ".join(repr(factor * float(word)) for word in line.split()) for line in match[3].splitlines() if line.strip()]
+    return f"{match[1]} = [{'; '.join(rows)}];\n"
+
+
 @functools.lru_cache(maxsize=1)
 def _values(text: str) -> Mapping[str, Any]:
     """The arrays, in rows, and the numbers of a text by their plain names. What is recognized is then read."""
+    if alone := _alone(text):
+        return {"pose": alone}
+    text = _SHOWN.sub(_as_written, _GOES_ON.sub("   ", text))
     text = texts.without(_COMMENT_OF_C, text) if _IN_C.search(text) else texts.without(_COMMENT, text)
     code = _Code(text.replace("−", "-"))
     values = code.values()

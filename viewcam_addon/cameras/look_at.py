@@ -142,6 +142,7 @@ _VECTORS = {"eye", "target", "up", "direction"}
 _OF_VTK = re.compile(
     r"SetViewUp|SetFocalPoint|CameraFocalPoint|\bcamera_position\s*=|\bcpos\s*=|\bfocal_point\s*=", re.IGNORECASE
 )
+_OF_THREE = re.compile(r"\b(?:THREE|PerspectiveCamera)\b|\.position\.set\s*\(")
 _OF_POTREE = re.compile(r"\bPotree\b|\bscene\.view\.(?:position|lookAt|setView)\b")
 _LENSES = {"ThinLens", "FishEye", "Fisheye", "Spherical", "Stereo", "StereoCamera", "Orthographic"}
 
@@ -467,7 +468,7 @@ class _Code:
         if len(self.statements) > _MOST_STATEMENTS:
             raise InputError(f"the text says more than {_MOST_STATEMENTS} things of cameras: copy one camera")
         is_potree = bool(_OF_POTREE.search(self.text))
-        scene = _Scene(three=is_potree or bool(re.search(r"\b(?:THREE|PerspectiveCamera)\b", self.text)), is_z_up=is_potree)
+        scene = _Scene(three=is_potree or bool(_OF_THREE.search(self.text)), is_z_up=is_potree)
         for at in self._all(*_LENSES):
             if self._words[at + 1] == "*" or self._words[at - 1] == "new":
                 not_a_pinhole("the text's camera", f"a {self._words[at]}")

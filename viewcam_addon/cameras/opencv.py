@@ -20,6 +20,7 @@ Source: OpenCV's modules/core/src/persistence_yml.cpp and calib3d's projectPoint
 """
 
 import contextlib
+import dataclasses
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -512,6 +513,10 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
         not_a_pinhole(what, f"of the model {checks.quoted(values['model'])}")
     lens, note = settled(bent, is_fisheye, plane, what, options)
     notes = told_of_half_pixel(options, "OpenCV") + windowed + note
+    if options.base and not _says_pose(values):
+        standing = axes.moved_back(Camera(name, options.base), options).pinhole
+        pinhole = dataclasses.replace(standing, **vars(plane))
+        return Camera(name, pinhole, stated, (*notes, "The text does not say where the camera stands: where it did"), lens=lens)
     matrix, more = _pose(values, what, options)
     pinhole, more_of_pose = axes.pinhole(matrix, plane, what)
     return Camera(name, pinhole, stated, (*notes, *more, *more_of_pose), lens=lens)
@@ -581,6 +586,10 @@ def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple
         across, up = (pixels(f"the size of {what}", number) for number in numbers)
         return (across, up), True
     return options.size_or_refuse(what), False
+
+
+def _says_pose(values: Mapping[str, Any]) -> bool:
+    return any(is_of_pose(name) or (name not in _NO_POSE and _MAY_BE_POSE.search(name)) for name in values)
 
 
 def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.ndarray, tuple[str, ...]]:

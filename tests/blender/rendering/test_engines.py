@@ -19,7 +19,7 @@ from viewcam_addon.image import Image, read, write
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import temporary_settings, versions
+from viewcam_addon.blender import another_blender, temporary_settings, versions
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.rendering import cycles, displayed, rasters
 from viewcam_addon.blender.scenes import depsgraph
@@ -461,6 +461,13 @@ def test_what_an_engine_draws_is_what_the_tracer_sees_or_it_is_refused(engine, b
         return
     status, sentence = verdict(tmp_path, engine, scene)
     assert status == 0 and sentence.startswith("The same picture"), sentence
+
+
+def test_another_blender_keeps_its_hands_off_the_users_extensions():
+    """One that reads factory settings has none enabled, and removes the wheels of all that are installed."""
+    done = another_blender.run("import bpy; print('EXTENSIONS', bpy.utils.user_resource('EXTENSIONS'))", 60)
+    line = next(line for line in done.stdout.decode().splitlines() if line.startswith("EXTENSIONS"))
+    assert bpy.utils.user_resource("EXTENSIONS") not in line, line
 
 
 def test_without_a_driver_there_is_one_sentence_and_no_file(ball, scene, tmp_path, monkeypatch):

@@ -58,13 +58,23 @@ def until(condition):
     assert condition(), "it does not come to it"
 
 
+def pictures_of(live):
+    """All pictures that a view will publish, with their samples."""
+    seen, publish = [], live._publish
+
+    def published(picture, samples, message=""):
+        seen.append((picture, samples))
+        publish(picture, samples, message)
+
+    live._publish = published
+    return seen
+
+
 def test_surfaces_come_first_and_then_light_up_to_the_samples_asked_for(live, lit):
-    seen = []
-    publish = live._publish
-    live._publish = lambda picture, samples, message="": (seen.append(samples), publish(picture, samples, message))
+    seen = pictures_of(live)
     live.show(lit, "path", 64)
     until(lambda: live.samples == 64)
-    assert seen == [0, 1, 2, 4, 8, 16, 32, 48, 64]
+    assert [samples for _, samples in seen] == [0, 1, 2, 4, 8, 16, 32, 48, 64]
     np.testing.assert_array_equal(live.picture, render(lit, "path", 64)["Combined"])
     live.drawn = live.number
     until(lambda: live.is_settled)
@@ -74,6 +84,36 @@ def test_at_level_geometry_the_picture_is_the_engine_s_own(live, lit):
     live.show(lit, "geometry", 64)
     until(lambda: live.number == 1)
     np.testing.assert_array_equal(live.picture, live_view.lit_from_the_eye(render(lit, "geometry")))
+
+
+@pytest.mark.parametrize("is_slow", [True, False])
+def test_a_view_begins_coarse_where_its_whole_picture_would_take_long(live, lit, is_slow, monkeypatch):
+    monkeypatch.setattr(live_view, "_AT_ONCE", 0.0 if is_slow else 1.0)
+    seen = pictures_of(live)
+    odd = replace(lit, camera=lit.camera.resized(47, 32))
+    live.show(odd, "path", 1)
+    until(lambda: live.samples == 1)
+    cameras = [odd.camera.resized(24, 16)] * is_slow + [odd.camera]
+    assert [samples for _, samples in seen] == [0] * len(cameras) + [1]
+    for camera, (picture, _) in zip(cameras, seen, strict=False):
+        np.testing.assert_array_equal(picture, live_view.lit_from_the_eye(render(replace(odd, camera=camera), "geometry")))
+
+
+def test_a_view_that_turns_without_a_pause_has_pictures(live, lit):
+    """Surfaces are finished though the next view is asked for while each band of them is traced."""
+    views = [replace(lit, camera=replace(lit.camera, eye=(*lit.camera.eye[:2], 3 + 0.1 * i))) for i in range(10)]
+    left, tile = iter(views[1:]), live.tile
+
+    def turned(passes, rows):
+        if view := next(left, None):
+            live.show(view, "geometry", 1)
+        tile(passes, rows)
+
+    live.tile = turned
+    seen = pictures_of(live)
+    live.show(views[0], "geometry", 1)
+    until(lambda: live.number >= len(views) / 2)  # two bands a picture
+    np.testing.assert_array_equal(seen[0][0], live_view.lit_from_the_eye(render(views[0], "geometry")))
 
 
 def test_what_is_asked_for_last_ends_what_is_under_way(live, lit):

@@ -27,6 +27,7 @@ from .operators import CameraOperator
 _DIALOG_WIDTH = 480
 _ROUNDING = 1e-6  # pixels, of principal points that were computed
 _Y_UP = (0.0, 1.0, 0.0)
+_ANSWERED_BY = ": give --"  # behind which a sentence has an option of the shell
 _NAMES = {"eye": "eye", "look_at": "look-at", "up": "up"}
 
 
@@ -113,6 +114,7 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
     )
     names: ClassVar[list[str]] = []
     question: ClassVar[str] = ""
+    asked: ClassVar[str] = ""  # the property that answers it
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
@@ -133,8 +135,11 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
             if len(read) == 1 or self.named:
                 return self.execute(context)
             cls.names, cls.question = [camera.name for camera in read], f"The text has {len(read)} cameras: name one of them"
+            cls.asked = "named"
         except InputError as error:
-            cls.names, cls.question = [], datablocks.sentence(error)
+            # Without the words of the shell: what can be chosen stands below it.
+            cls.names, (cls.question, _, answer) = [], datablocks.sentence(error).partition(_ANSWERED_BY)
+            cls.asked = next((name for name in READING if answer.startswith(name.replace("_", "-"))), "")
         return context.window_manager.invoke_props_dialog(self, width=_DIALOG_WIDTH)
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -143,11 +148,18 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
         for i, line in enumerate(lines):
             layout.label(text=line, icon="BLANK1" if i else "QUESTION", translate=False)
         layout.use_property_split = True
-        for name in ("named", "set_size", *READING):
+        names: tuple[str, ...] = ("set_size", *READING)
+        if self.question and self.asked:
+            layout.prop(self, self.asked)
+            layout.separator()
+            names = tuple(name for name in names if name != self.asked)
+        for name in names:
             layout.prop(self, name)
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
-        type(self).question = ""  # it is answered, and the panel of the last operation shows the same properties
+        type(self).question = type(self).asked = (
+            ""  # it is answered, and the panel of the last operation shows the same properties
+        )
         text = self.text or _clipboard()
         camera = formats.choose(self._cameras_of(text, camera_object, scene), self.named or None)
         before = _present(camera_object, scene)
@@ -289,10 +301,12 @@ def _clipboard() -> str:
 def draw(layout: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:
     """The row of these buttons, in the panel."""
     row = layout.row(align=True)
-    row.operator("viewcam.copy_camera", text="Copy", icon="COPYDOWN").camera = camera_object.name
-    row.menu("VIEWCAM_MT_copy_camera_as", text="", icon="DOWNARROW_HLT")
-    row.operator("viewcam.paste_camera", text="Paste", icon="PASTEDOWN").camera = camera_object.name
-    row.menu("VIEWCAM_MT_paste_camera_as", text="", icon="DOWNARROW_HLT")
+    copy, paste = row.row(align=True), row.row(align=True)
+    copy.operator("viewcam.copy_camera", text="Copy", icon="COPYDOWN").camera = camera_object.name
+    copy.menu("VIEWCAM_MT_copy_camera_as", text="", icon="DOWNARROW_HLT")
+    paste.enabled = camera_object.library is None
+    paste.operator("viewcam.paste_camera", text="Paste", icon="PASTEDOWN").camera = camera_object.name
+    paste.menu("VIEWCAM_MT_paste_camera_as", text="", icon="DOWNARROW_HLT")
 
 
 IN_MENUS = (VIEWCAM_OT_copy_camera, VIEWCAM_OT_paste_camera)  # a read-out is copied by its own button

@@ -72,12 +72,12 @@ def _draw_standing(layout: bpy.types.UILayout, camera_object: bpy.types.Object, 
     """The camera as it stands while its values are off, which may be stale, and the button that reads them off it."""
     column = layout.column(align=True)
     column.active = False
-    for label, texts in standing(camera_object, context.scene):
-        # One text: a long number takes the room that a short one beside it leaves.
-        panel_rows.described(column, context, label, ("   ".join(texts),), share=0.25)
+    values = standing(camera_object, context.scene)
+    for label, texts in values:
+        panel_rows.listed(column, context, label, texts, share=0.25)
     row = layout.row()
     row.use_property_split = row.use_property_decorate = False
-    row.enabled = camera_object.data.type == "PERSP"
+    row.enabled = bool(values)  # else it is no pinhole, as a notice says
     row.prop(camera_object.virtual_pinhole, "enabled", text="Use", toggle=True)
 
 
@@ -191,6 +191,7 @@ class _MovePanel(SubPanel):
     def draw(self, context: bpy.types.Context) -> None:
         camera_object: Any = datablocks.camera_in(context)
         column = self.layout.column()
+        column.enabled = camera_object.library is None
         for label, buttons in _MOVES.items():
             row = panel_rows.described(column, context, label, (), share=0.25)
             row = row.row(align=True) if "icon" in buttons[0][1] else panel_rows.buttons(row, context)

@@ -183,6 +183,18 @@ def described(
     return row
 
 
+def listed(column: bpy.types.UILayout, context: bpy.types.Context, label: str, texts: tuple[str, ...], share: float) -> None:
+    """A label and texts beside one another, where a long one takes the room that a short one leaves; or one below the other."""
+    line, room = "   ".join(texts), _width(context) - _BESIDE_TEXT
+    if readouts.fits(line, room if is_narrow(context) else (1.0 - share) * room):
+        described(column, context, label, (line,), share)
+    elif is_narrow(context):
+        described(column, context, label, texts, share)
+    else:
+        for number, text in enumerate(texts):
+            described(column, context, "" if number else label, (text,), share)
+
+
 def sentence(column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str | int = "NONE") -> None:
     """A sentence in lines that fit, never translated here. icon : one of Blender's by its name, or one of proof.mark."""
     below = {} if icon == "NONE" else {"icon": "BLANK1"}

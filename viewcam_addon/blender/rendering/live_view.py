@@ -1,18 +1,19 @@
 """The picture of a viewport, traced in a thread: surfaces at once, then light that refines, anew for each scene and view.
 
 Blender draws a viewport whenever it likes, and must not wait: `LiveView.follow` only says what shall be seen, and `picture` is
-what has come of it by then. What is asked for last ends what is under way. The scene is read as the viewport's graph has it,
-when Blender has told of a change of more than cameras; hierarchies are kept from one view to the next (tracer/render.py). The
-engine (engine.py) and the swipe over other engines (interface/swipe.py) each have one.
+what has come of it by then. A view's first picture is finished, so that a view that turns without a pause has pictures, and is
+coarse where a whole one would take longer than `_AT_ONCE`; what refines it ends when another is asked for. The scene is read as
+the viewport's graph has it, when Blender has told of a change of more than cameras; hierarchies are kept from one view to the
+next (tracer/render.py). The engine (engine.py) and the swipe over other engines (interface/swipe.py) each have one.
 
 The camera is that of the matrices with which Blender draws, so that outlines and handles lie on what is traced.
 
-Rejected: a child process (the scene would have to be written for each change), and coarse pictures first (at level `geometry`
-a whole one takes less than a twentieth of a second).
+Rejected: a child process (the scene would have to be written for each change).
 """
 
 import contextlib
 import threading
+import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 from weakref import WeakSet
@@ -32,12 +33,15 @@ from ..scenes import export
 from ..scenes.depsgraph import only_cameras_changed
 
 if TYPE_CHECKING:
-    from ...tracer.render import Keeper
+    from ...tracer.render import Keeper, Tracer
 
 Picture = NDArray[np.float32]
 
 _GEOMETRY = LEVELS[0]
 _SECONDS = 1 / 60  # between two looks whether there is another picture
+_AT_ONCE = 0.03  # seconds that a view's first picture may take
+_COARSE = 2  # pixels, the side of those of a coarse picture
+_PACE = 2.5e-7  # seconds that a pixel may take, where none has been traced yet
 
 
 class LiveView:
@@ -56,6 +60,8 @@ class LiveView:
         self.number, self.drawn, self.samples, self.message = 0, 0, 0, ""
         self._asked = threading.Condition()
         self._next: tuple[Scene, str, int] | None = None
+        self._pace = _PACE  # seconds that a pixel's surface took last
+        self._is_begun = False  # the view that is under way has no picture yet
         self._steps: list[int] = []  # samples of the pictures of light that are still to come
         self._rows = 0  # rows of the next one that are there
         self._is_at_work = self._is_closed = False
@@ -128,8 +134,8 @@ class LiveView:
             self._publish(picture.copy(), samples)
 
     def stop(self) -> bool:
-        """True if something else is asked for."""
-        return self._next is not None or self._is_closed
+        """True if what is under way is not wanted any more."""
+        return self._is_closed or (self._next is not None and not self._is_begun)
 
     def _work(self) -> None:
         from ...tracer.render import Keeper  # loads the tracer, which Blender's start need not wait for
@@ -138,7 +144,7 @@ class LiveView:
         while True:
             with self._asked:
                 self._is_at_work = self._next is not None
-                self._asked.wait_for(self.stop)
+                self._asked.wait_for(lambda: self._next is not None or self._is_closed)
                 if self._is_closed or self._next is None:
                     return
                 (scene, level, samples), self._next = self._next, None
@@ -150,14 +156,23 @@ class LiveView:
                     self._publish(None, 0, str(error))
 
     def _trace(self, scene: Scene, level: str, samples: int, keeper: "Keeper") -> None:
+        width, height = scene.camera.width, scene.camera.height
+        self._steps, self._rows, self._is_begun = [], 0, True
+        if self._pace * width * height > _AT_ONCE:
+            coarse = scene.camera.resized(-(-width // _COARSE), -(-height // _COARSE))
+            self._show_surfaces(keeper.tracer(replace(scene, camera=coarse)), coarse)
         tracer = keeper.tracer(scene)
-        self._steps, self._rows = [], 0
-        surfaces = tracer.render(self, ("Depth", "Facing"))
-        self._publish(lit_from_the_eye(surfaces), 0)
+        self._show_surfaces(tracer, scene.camera)
         if level != _GEOMETRY:
-            steps = refinement(samples, surfaces["Depth"].size) or (samples,)
+            steps = refinement(samples, width * height) or (samples,)
             self._steps = list(steps)
             tracer.render_light(level, samples, 0, self, steps=steps)
+
+    def _show_surfaces(self, tracer: "Tracer", camera: Pinhole) -> None:
+        started = time.perf_counter()
+        self._publish(lit_from_the_eye(tracer.render(self, ("Depth", "Facing"))), 0)
+        self._pace = (time.perf_counter() - started) / (camera.width * camera.height)
+        self._is_begun = False
 
     def _publish(self, picture: Picture | None, samples: int, message: str = "") -> None:
         if picture is not None:

@@ -49,7 +49,7 @@ _WORKBENCH = {
 }
 _DRAW = """
 import bpy
-bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 scene = bpy.context.scene
 scene.camera = bpy.data.objects.new("", bpy.data.cameras.new(""))
 scene.collection.objects.link(scene.camera)

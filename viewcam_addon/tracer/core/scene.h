@@ -278,15 +278,16 @@ class Scene {
         std::vector<size_t> first(members.size() + 1);
         for (size_t i = 0; i < members.size(); i++)
             first[i + 1] = first[i] + std::get<TriangleMesh>(geometries[objects[members[i]].geometry]).count;
-        auto place_of = [&](size_t triangle) { return size_t(std::upper_bound(first.begin(), first.end(), triangle) - first.begin()) - 1; };
+        Array<uint32_t> place(first.back());  // each triangle's object, among the members
+        for (size_t i = 0; i < members.size(); i++) std::fill(place.begin() + first[i], place.begin() + first[i + 1], uint32_t(i));
         auto corners_of = [&](size_t triangle, Vec3 corner[3]) {
-            size_t i = place_of(triangle);
+            size_t i = place[triangle];
             const Object& object = objects[members[i]];
             const TriangleMesh& mesh = std::get<TriangleMesh>(geometries[object.geometry]);
             for (int c = 0; c < 3; c++) corner[c] = object.to_world.point(mesh.corner(triangle - first[i], c));
         };
         auto name_of = [&](size_t triangle, uint32_t& object, uint32_t& primitive) {
-            size_t i = place_of(triangle);
+            size_t i = place[triangle];
             object = members[i];
             primitive = uint32_t(triangle - first[i]);
         };
