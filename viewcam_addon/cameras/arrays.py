@@ -61,7 +61,7 @@ _PRINTED_AROUND = re.compile(
 _NUMBERS_ALONE = re.compile(r"[\s\d.eE+\-,;()\[\]{}]*")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _LONGEST_ALONE = 2_000  # characters of a matrix that stands alone
-_LIKE_A_TURN = 1e-2  # that rows of a rotation with few digits may be off square, relative to their lengths' square
+_LIKE_A_TURN = 1e-2  # rows of a rotation with few digits may be off square, relative to their lengths' square
 # MATLAB's and Octave's way to show a variable, with the factor that they take out of its numbers; and a row that goes on.
 _SHOWN = re.compile(
     r"^([A-Za-z]\w{0,40})[ \t]*=[ \t]*\n(?:[ \t]*\n)*(?:[ \t]+(1\.0e[-+]\d+)[ \t]*\*[ \t]*\n(?:[ \t]*\n)*)?"

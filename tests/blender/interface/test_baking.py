@@ -16,9 +16,6 @@ from viewcam_addon.blender import versions
 from viewcam_addon.blender.interface import baking, panel
 from viewcam_addon.errors import InputError
 
-pytestmark = pytest.mark.slow
-
-
 CHANNELS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 
 
@@ -85,6 +82,7 @@ def without_the_addon():
         viewcam_addon.register()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pole", [pytest.param("CANONICAL", marks=pytest.mark.exhaustive), "HOLD"])
 def test_a_baked_flight_over_the_pole_renders_the_live_picture_without_the_addon(
     over_the_target, scene, render_positions, picture_error, without_the_addon, pole
@@ -107,6 +105,7 @@ def test_a_baked_flight_over_the_pole_renders_the_live_picture_without_the_addon
     assert error > 100 * tolerance, "keyframes of another frame would not have been noticed"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_keyframes_are_within_rounding_of_the_live_camera_and_never_flip(over_the_target, scene, mode, curves):
     over_the_target.rotation_mode = mode
@@ -128,6 +127,7 @@ def test_a_flip_that_up_asks_for_is_told_between_the_keyframes(over_the_target, 
     assert flight.ok and flight.between > 10 and flight.frame in (10.5, 11.5), flight.sentence()
 
 
+@pytest.mark.slow
 def test_more_keys_a_frame_follow_the_flight_more_closely(over_the_target, scene, curves):
     over_the_target.virtual_pinhole.pole = "HOLD"
     (flight,) = baking.bake([over_the_target], scene, 1, 9)
@@ -264,6 +264,7 @@ def test_motion_blur_gets_keyframes_before_and_behind_the_range(over_the_target,
     assert [point.co[0] for point in curves(over_the_target)["location", 0].keyframe_points] == list(range(4, 11))
 
 
+@pytest.mark.slow
 def test_keys_where_the_shutter_looks_give_the_same_motion_blur(over_the_target, scene, render_positions):
     """A shutter of half a frame is open from a quarter before to a quarter behind: four keyframes a frame hit both."""
     over_the_target.virtual_pinhole.pole = "HOLD"

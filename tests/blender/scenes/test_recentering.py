@@ -25,8 +25,6 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, scene_file
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def look(scene, camera_object):
@@ -153,6 +151,7 @@ UTM = (448262.25, 5411932.5, 42.0)
 ECEF = (4200952.5, 780362.0, 4720030.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [UTM, ECEF, (0.0, 0.0, 0.0)], ids=["UTM", "ECEF", "home"])
 def test_a_crowded_scene_anywhere_in_the_world_is_compared_to_a_thousandth_of_a_pixel(place, crowd, check):
     crowd(place)
@@ -389,6 +388,7 @@ def test_a_large_scale_or_a_small_one_moves_as_exactly(scale, look, check, add_m
     check()
 
 
+@pytest.mark.slow
 def test_the_command_as_its_users_type_it(look, scene, tmp_path, capfd, add_map):
     look(ECEF)
     add_map(ECEF)
@@ -460,6 +460,7 @@ def near_the_origin(entry):
     return entry.object, entry.status, "" if "lie exactly where" in entry.reason else entry.reason
 
 
+@pytest.mark.slow
 def test_the_ledger_is_that_of_the_file(crowd, scene, add, mesh_from, check):
     crowd(UTM)
     glass = bpy.data.materials.new("Glass")
@@ -493,6 +494,7 @@ def test_the_file_is_as_it_was(crowd, both_sides):
     assert file_state() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("room", "name"), [(cycles, "render"), (recentering, "_moved"), (recentering, "_camera"), (recentering, "_verify")]
 )
