@@ -122,7 +122,7 @@ def test_a_lens_that_is_known_stays_to_the_bit_and_the_viewport_says_so(posed_ca
 
 
 def test_large_errors_are_told_without_powers_of_ten(posed_camera, scene, settings):
-    settings.precision = 60.0
+    settings.precision = 5.0
     hand = Hand(posed_camera, scene)
     draw_the_edges(hand)
     text = " ".join(photo_matching.summary_of(hand.operator.result, posed_camera.data.lens))
