@@ -12,8 +12,8 @@ from pathlib import Path
 import bmesh
 import bpy
 import building as b
+import nodes
 import numpy as np
-import shading
 from staging import distance_for, fresh_scene, state_camera
 
 WIDTH, HEIGHT = 640, 360
@@ -59,7 +59,7 @@ def brushed_metal(name: str = "Brushed metal", code: str = "c9c4bc"):
             Normal=s.bump(grain, 0.15, 0.01),
         )
 
-    return shading.material(name, shade)
+    return nodes.material(name, shade)
 
 
 def coated_paint(name: str = "Coated paint", code: str = "a8231c"):
@@ -80,14 +80,12 @@ def coated_paint(name: str = "Coated paint", code: str = "a8231c"):
             Coat_Tint="fff2e0",
         )
 
-    return shading.material(name, shade)
+    return nodes.material(name, shade)
 
 
 def glass(name: str = "Glass", code: str = "f4fff8", roughness: float = 0.0, ior: float = 1.45):
     """Glass as a Principled surface that lets all light through."""
-    return shading.material(
-        name, lambda s: s.principled(Base_Color=code, Roughness=roughness, IOR=ior, Transmission_Weight=1.0)
-    )
+    return nodes.material(name, lambda s: s.principled(Base_Color=code, Roughness=roughness, IOR=ior, Transmission_Weight=1.0))
 
 
 def concrete(name: str = "Concrete", code: str = "9a948c"):
@@ -99,7 +97,7 @@ def concrete(name: str = "Concrete", code: str = "9a948c"):
             Base_Color=s.mix(noise, code, "6f6a64"), Roughness=0.85, Diffuse_Roughness=0.4, Normal=s.bump(noise, 0.6, 0.03)
         )
 
-    return shading.material(name, shade)
+    return nodes.material(name, shade)
 
 
 def boards(name: str = "Boards"):
@@ -121,7 +119,7 @@ def boards(name: str = "Boards"):
             Normal=s.bump(grain, 0.1, 0.01),
         )
 
-    return shading.material(name, shade)
+    return nodes.material(name, shade)
 
 
 def bricks(name: str, scale: float, rotation=(0.0, 0.0, 0.0)):
@@ -134,7 +132,7 @@ def bricks(name: str, scale: float, rotation=(0.0, 0.0, 0.0)):
         joint = wall.node.outputs["Fac"]
         return s.principled(Base_Color=wall, Roughness=0.8, Normal=s.bump(s.math("SUBTRACT", 1.0, joint), 0.6, 0.02))
 
-    return shading.material(name, shade)
+    return nodes.material(name, shade)
 
 
 # The scenes.
@@ -159,7 +157,7 @@ def dressed_studio():
         block = scene.objects[name]
         for slot in block.material_slots:
             slot.material = material
-    shading.environment(shading.outdoors(sun=0.0), turn=40.0, strength=0.6)
+    nodes.environment(nodes.outdoors(sun=0.0), turn=40.0, strength=0.6)
     return scene
 
 
@@ -172,12 +170,12 @@ def perfume():
     inside = [(0, 0.08), (0.5, 0.08), (0.53, 0.12), (0.53, 0.8), (0, 0.8)]
     b.turned("Scent", inside, glass("Scent", "f0b060", ior=1.36))
     b.turned("Cap", [(0, 1.35), (0.26, 1.35), (0.26, 1.75), (0.24, 1.78), (0, 1.78)], brushed_metal())
-    image = shading.label()
+    image = nodes.label()
 
     def shade(s):
         return s.principled(Base_Color=s.add("TexImage", image=image), Roughness=0.45, Coat_Weight=0.6, Coat_Roughness=0.05)
 
-    _sheet("Label", 0.5, 0.5, shading.material("Label", shade), (0, -0.62, 0.5), (90, 0, 0))
+    _sheet("Label", 0.5, 0.5, nodes.material("Label", shade), (0, -0.62, 0.5), (90, 0, 0))
     b.ball("Pearl", 0.22, b.glossy("Pearl", "efe2d8", 0.15), (-1.1, -0.4, 0.22))
     b.box("Box", (0.7, 0.7, 1.1), coated_paint("Lacquer", "1d2b4a"), (1.25, 0.35, 0), rotation=(0, 0, 24))
     b.softbox("Key", 120, "fff2e2", (-2.6, -1.6, 3.0), (0, 0, 0.6), 1.2, 1.8)
@@ -193,7 +191,7 @@ def roadster():
     paint = coated_paint()
     b.ball("Body", 0.55, paint, (0, 0, 0.55), scale=(1.9, 1.0, 0.75))
     b.ball("Cabin", 0.38, glass("Tinted glass", "4a5a60", 0.05), (0.05, 0, 0.95), scale=(1.3, 0.9, 0.6))
-    rubber = shading.material(
+    rubber = nodes.material(
         "Rubber", lambda s: s.principled(Base_Color="1b1b1d", Roughness=0.7, Specular_IOR_Level=0.3, Diffuse_Roughness=0.8)
     )
     chrome = b.glossy("Chrome", "e8e8ec", 0.06, metallic=1.0)
@@ -202,7 +200,7 @@ def roadster():
     for number, (x, y) in enumerate([(x, y) for x in (-0.65, 0.65) for y in (-0.5, 0.5)], 1):
         b.turned(f"Tyre {number}", tire, rubber, (x, y, 0.33), steps=48, rotation=(90, 0, 0))
         b.turned(f"Hub {number}", hub, chrome, (x, y, 0.33), steps=48, rotation=(90, 0, 0))
-    shading.environment(shading.studio_lights(), turn=70.0)
+    nodes.environment(nodes.studio_lights(), turn=70.0)
     return scene
 
 
@@ -217,7 +215,7 @@ def interior():
         [(4, 2.8, -2, 1.4), (1, 2.8, 2.5, 1.4), (2, 0.8, 1, 0.4), (2, 0.5, 1, 2.55)], 1
     ):
         _sheet(f"Left wall {number}", width, height, b.matte(f"Wall {number}", "c8c0b0"), (-2.6, y, z), (90, 0, 90))
-    pane = shading.material(
+    pane = nodes.material(
         "Pane",
         lambda s: s.mix_shaders(
             s.add("Fresnel", {"IOR": 1.45}),
@@ -232,7 +230,7 @@ def interior():
     b.turned(
         "Vase", [(0, 0), (0.1, 0), (0.16, 0.17), (0.07, 0.37), (0.1, 0.47)], glass(code="cfe6ff"), (0.35, 1.2, 0.78 + CLEAR)
     )
-    shade = shading.material(
+    shade = nodes.material(
         "Paper shade",
         lambda s: s.mix_shaders(0.5, s.add("BsdfTranslucent", {"Color": "f0dcb8"}), s.add("BsdfDiffuse", {"Color": "f0dcb8"})),
     )
@@ -240,7 +238,7 @@ def interior():
     lamp = bpy.data.lights.new("Bulb", "POINT")
     lamp.energy, lamp.color, lamp.shadow_soft_size = 25, (1.0, 0.75, 0.45), 0.06
     b.place("Bulb", lamp, location=(0.9, 1.2, 1.7))
-    shading.environment(shading.outdoors(sun=60.0, elevation=30.0, bearing=0.5, width=6.0), turn=180.0, strength=2.5)
+    nodes.environment(nodes.outdoors(sun=60.0, elevation=30.0, bearing=0.5, width=6.0), turn=180.0, strength=2.5)
     return scene
 
 
@@ -258,7 +256,7 @@ def street():
             Normal=s.bump(grit, s.range(wet, 0.4, 0.02), 0.03),
         )
 
-    _sheet("Road", 12, 40, shading.material("Asphalt", asphalt), (0, 8, 0))
+    _sheet("Road", 12, 40, nodes.material("Asphalt", asphalt), (0, 8, 0))
     for side in (-1, 1):
         b.box(
             f"House {side}",
@@ -275,17 +273,17 @@ def street():
     for number in range(20):
         side, row, floor = (-1, 1)[number % 2], number // 4, number // 2 % 2
         b.instance(f"Window {number}", kit, (2.68 * side, 1.0 + 3.2 * row, 1.3 + 2.4 * floor))
-    image = shading.leaf()
+    image = nodes.leaf()
 
     def sign(s):
         texture = s.add("TexImage", output="Color", image=image, extension="CLIP")
         return s.principled(Base_Color=texture, Roughness=0.4, Alpha=texture.node.outputs["Alpha"])
 
-    _sheet("Sign", 1.1, 1.1, shading.material("Sign", sign), (-1.5, 1.0, 2.6), (90, 0, 15))
+    _sheet("Sign", 1.1, 1.1, nodes.material("Sign", sign), (-1.5, 1.0, 2.6), (90, 0, 15))
     post = brushed_metal("Post")
     b.turned("Post", [(0, 0), (0.05, 0), (0.05, 3.2), (0, 3.2)], post, (-1.5, 1.05, 0), steps=24)
     b.ball("Bollard", 0.3, coated_paint("Bollard", "c87a1a"), (1.3, -1.0, 0.3))
-    shading.environment(shading.outdoors(sun=900.0, elevation=48.0, bearing=0.28), turn=-20.0)
+    nodes.environment(nodes.outdoors(sun=900.0, elevation=48.0, bearing=0.28), turn=-20.0)
     return scene
 
 
@@ -293,7 +291,7 @@ def foliage():
     """Instances of leaves that are cut out by their alpha and let light through, under a sun."""
     scene = _scene("foliage", (0.0, -4.5, 1.6), (0.0, 0.0, 0.9), 40.0)
     _sheet("Ground", 10, 10, concrete("Earth", "6b5238"), (0, 0, 0))
-    image = shading.leaf()
+    image = nodes.leaf()
 
     def shade(s):
         texture = s.add("TexImage", output="Color", image=image, extension="CLIP")
@@ -302,7 +300,7 @@ def foliage():
         return s.mix_shaders(texture.node.outputs["Alpha"], s.add("BsdfTransparent"), thin)
 
     kit = b.kit("Leaf kit")
-    leaf = _sheet("Leaf", 0.5, 0.7, shading.material("Leaf", shade), (0, 0.3, 0))
+    leaf = _sheet("Leaf", 0.5, 0.7, nodes.material("Leaf", shade), (0, 0.3, 0))
     bpy.context.scene.collection.objects.unlink(leaf)
     kit.objects.link(leaf)
     random = np.random.default_rng(3)
@@ -320,7 +318,7 @@ def foliage():
 def fairground():
     """Sixty lamps of all kinds over a floor with a normal map: more than a renderer asks one by one."""
     scene = _scene("fairground", (0.0, -6.0, 2.4), (0.0, 0.5, 0.5), 46.0)
-    image = shading.normals(3, 0.25)
+    image = nodes.normals(3, 0.25)
 
     def tiles(s):
         wide = s.add("Mapping", {"Vector": s.add("TexCoord", output="UV"), "Scale": (6.0, 6.0, 1.0)})
@@ -328,7 +326,7 @@ def fairground():
         checks = s.add("TexChecker", {"Vector": wide, "Color1": "6d6f78", "Color2": "2a2c34", "Scale": 2.0}, "Color")
         return s.principled(Base_Color=checks, Roughness=0.35, Normal=normal)
 
-    _sheet("Floor", 10, 10, shading.material("Tiles", tiles), (0, 1, 0))
+    _sheet("Floor", 10, 10, nodes.material("Tiles", tiles), (0, 1, 0))
     b.suzanne("Suzanne", b.glossy("Glaze", "d8d2c8", 0.3), (0, 0.4, 0.75), (0, 0, -15), 0.7)
     random = np.random.default_rng(5)
     for number in range(60):
@@ -360,7 +358,7 @@ def toys():
             Base_Color=s.mix(0.25, faded, "f4e8d0", "OVERLAY"), Roughness=0.3, Specular_IOR_Level=0.7, Coat_Weight=0.3
         )
 
-    paint = shading.material("Painted", painted)
+    paint = nodes.material("Painted", painted)
     for number, (x, y, size) in enumerate([(-1.2, 0.2, 0.5), (0.1, 0.0, 0.6), (1.3, 0.4, 0.45)], 1):
         toy = b.suzanne(f"Toy {number}", paint, (x, y, size), (0, 0, 20 * number - 40), size)
         colors = toy.data.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
@@ -407,11 +405,11 @@ def gallery():
         where = s.add("VectorMath", {"Vector": s.place((6, 6, 6))}, operation="FLOOR")
         return s.add("Invert", {"Color": s.add("TexWhiteNoise", {"Vector": where}, "Color"), "Fac": 0.3})
 
-    _sheet("Slab", 9, 6, shading.material("Marble", marble), (0, 0, 0))
+    _sheet("Slab", 9, 6, nodes.material("Marble", marble), (0, 0, 0))
     for number, make in enumerate((magic, cells, rust, sunset, static)):
-        material = shading.material(make.__name__, lambda s, make=make: s.principled(Base_Color=make(s), Roughness=0.5))
+        material = nodes.material(make.__name__, lambda s, make=make: s.principled(Base_Color=make(s), Roughness=0.5))
         b.ball(make.__name__, 0.5, material, (1.15 * number - 2.3, 0.5 * (number % 2), 0.5))
-    rough = shading.material(
+    rough = nodes.material(
         "Rough", lambda s: s.add("BsdfDiffuse", {"Color": s.add("Blackbody", {"Temperature": 4200.0}), "Roughness": 0.8})
     )
     b.ball("Clay", 0.28, rough, (0.0, -0.9, 0.28))
@@ -424,7 +422,7 @@ def gallery():
 def glassware():
     """Clear, frosted and tinted glass of each kind of node, before a striped wall."""
     scene = _scene("glassware", (0.0, -5.6, 1.5), (0.0, 0.0, 0.7), 36.0)
-    stripes = shading.material(
+    stripes = nodes.material(
         "Stripes",
         lambda s: s.add(
             "BsdfDiffuse",
@@ -440,8 +438,8 @@ def glassware():
         return s.principled(Base_Color="b8b0a4", Roughness=0.9, Sheen_Weight=0.6, Sheen_Roughness=0.4, Sheen_Tint="ffe8d0")
 
     _sheet("Wall", 8, 4, stripes, (0, 1.8, 2.0), (90, 0, 0))
-    _sheet("Table", 8, 6, shading.material("Cloth", cloth), (0, 0, 0))
-    nodes = {
+    _sheet("Table", 8, 6, nodes.material("Cloth", cloth), (0, 0, 0))
+    glasses = {
         "Clear": lambda s: s.add("BsdfGlass", {"Color": "ffffff", "Roughness": 0.0, "IOR": 1.5}),
         "Frosted": lambda s: s.add("BsdfGlass", {"Color": "e8fff4", "Roughness": 0.3, "IOR": 1.45}, distribution="MULTI_GGX"),
         "Ruby": lambda s: s.add("BsdfGlass", {"Color": "d8485a", "Roughness": 0.15, "IOR": 1.76}, distribution="GGX"),
@@ -459,12 +457,12 @@ def glassware():
         (0.26, 0.8),
         (0, 0.56),
     ]
-    for number, (name, shade) in enumerate(nodes.items()):
-        b.turned(name, goblet, shading.material(name, shade), (1.0 * number - 1.5, 0, CLEAR), steps=48)
+    for number, (name, shade) in enumerate(glasses.items()):
+        b.turned(name, goblet, nodes.material(name, shade), (1.0 * number - 1.5, 0, CLEAR), steps=48)
     b.ball(
         "Half glass",
         0.24,
-        shading.material(
+        nodes.material(
             "Half glass", lambda s: s.principled(Base_Color="a0c8e8", Transmission_Weight=0.5, Roughness=0.1, IOR=1.5)
         ),
         (0.1, -1.0, 0.24),
@@ -497,9 +495,9 @@ def metals():
         }
     makes["Brushed"] = None
     for number, (name, shade) in enumerate(makes.items()):
-        material = shading.material(name, shade) if shade else brushed_metal()
+        material = nodes.material(name, shade) if shade else brushed_metal()
         b.ball(name, 0.42, material, (1.0 * number - (len(makes) - 1) / 2, 0.3 * (number % 2), 0.42))
-    shading.environment(shading.studio_lights(), turn=-30.0, strength=1.5)
+    nodes.environment(nodes.studio_lights(), turn=-30.0, strength=1.5)
     return scene
 
 
@@ -507,7 +505,7 @@ def backdrop():
     """A portrait before a backdrop that only the camera sees, lit by an HDRI and by a neon tube that shines."""
     scene = _scene("backdrop", (0.0, -4.2, 1.2), (0.0, 0.0, 0.8), 40.0)
     b.ground("Stage", 8, 8, b.glossy("Stage", "3a3038", 0.2))
-    skin = shading.material(
+    skin = nodes.material(
         "Skin",
         lambda s: s.principled(
             Base_Color=s.mix(s.add("LayerWeight", {"Blend": 0.6}, "Fresnel"), "c08a70", "f0c8a8"),
@@ -519,7 +517,7 @@ def backdrop():
         ),
     )
     b.suzanne("Sitter", skin, (0, 0, 0.85), (0, 0, 12), 0.75)
-    tube = shading.material(
+    tube = nodes.material(
         "Neon",
         lambda s: s.add(
             "AddShader",
@@ -530,14 +528,14 @@ def backdrop():
         ),
     )
     b.turned("Tube", [(0, -0.6), (0.04, -0.6), (0.04, 0.6), (0, 0.6)], tube, (-1.15, 0.2, 0.95), steps=12, rotation=(0, 12, 0))
-    image = shading.outdoors(sun=150.0, elevation=25.0, bearing=0.1, width=5.0)
+    image = nodes.outdoors(sun=150.0, elevation=25.0, bearing=0.1, width=5.0)
 
     def surround(s):
         light = s.add("Background", {"Color": s.add("TexEnvironment", image=image), "Strength": 0.8})
         seen = s.add("Background", {"Color": "5a7a8a", "Strength": 0.7})
         return s.mix_shaders(s.add("LightPath", output="Is Camera Ray"), light, seen)
 
-    shading.world(surround)
+    nodes.world(surround)
     return scene
 
 
