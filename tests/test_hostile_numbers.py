@@ -9,6 +9,7 @@ The right answers below them are those of the same formulas at 300 bits and more
 import contextlib
 import inspect
 import math
+import sys
 from fractions import Fraction
 
 import mpmath
@@ -633,3 +634,9 @@ def test_the_view_plane_of_every_camera_that_blender_can_store_is_right(camera, 
         back = intrinsics.camera_data(plane, frame, camera.sensor_width, camera.sensor_height, camera.sensor_fit)
         sensor_back = back.sensor_height if camera.sensor_fit == "VERTICAL" else back.sensor_width
         assert is_near_fraction(back.lens / sensor_back, Fraction(camera.lens) / Fraction(sensor), 10)
+
+
+def test_masked_arrays_are_not_loaded_to_look_whether_there_are_any(monkeypatch):
+    monkeypatch.delitem(sys.modules, "numpy.ma")
+    monkeypatch.setattr(np.ma, "is_masked", lambda _: pytest.fail("numpy.ma is asked"))
+    assert checks.array("column", [0, 1]).tolist() == [0, 1]

@@ -8,6 +8,7 @@ Rejected: checks in every formula (they would hide it), and letting NaN travel t
 import itertools
 import math
 import operator
+import sys
 import warnings
 from collections.abc import Mapping, Set
 from numbers import Real
@@ -99,7 +100,8 @@ def array(name: str, values: ArrayLike) -> NDArray[np.float64]:
             with warnings.catch_warnings():  # a masked element in a list becomes nan, with a warning
                 warnings.simplefilter("ignore")
                 values = np.asarray(values)
-        if np.ma.is_masked(values):  # type: ignore[no-untyped-call] # NumPy has no type for it
+        # Nothing is masked where nobody has loaded what masks: to load it takes as long as to read a scene.
+        if (masks := sys.modules.get("numpy.ma")) and masks.is_masked(values):
             raise TypeError
         if values.dtype == object:
             values = np.array([_real(value) for value in values.flat], dtype=np.float64).reshape(values.shape)

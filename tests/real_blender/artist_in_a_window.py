@@ -422,21 +422,19 @@ def bake_and_turn_on_again():
         values().keyframe_insert("eye", frame=frame)
     bpy.context.scene.frame_end = 20
     yield from push("viewcam.bake_camera(")
+    yield from settle()
     press("RET", *NOWHERE)
-    for _ in range(20):
-        yield
-    assert not values().enabled and camera().animation_data.action, "nothing is baked"
+    yield from until(lambda: not values().enabled and camera().animation_data.action, "the baked camera")
     yield from push("virtual_pinhole.enabled")
     yield
     yield from picture("baked", SIDEBAR)
     (warning,) = warnings()
     assert warning.remedy and "virtual_pinhole" not in warning.sentence, warning
     yield from push("viewcam.delete_keyframes(")
+    yield from settle()
     assert len(warnings()) == 1, "keyframes are deleted before anybody is asked"
     press("RET", *NOWHERE)
-    yield
-    yield
-    assert warnings() == [], warnings()
+    yield from until(lambda: warnings() == [], "the end of the warning")
     camera().animation_data_clear()
     camera().data.animation_data_clear()
     yield

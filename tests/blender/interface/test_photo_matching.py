@@ -1,5 +1,6 @@
 """Match Photo: what is drawn on a picture, the camera that follows, and Escape."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -118,6 +119,14 @@ def test_a_lens_that_is_known_stays_to_the_bit_and_the_viewport_says_so(posed_ca
     assert np.allclose(cameras.read(posed_camera, scene).basis(), PHOTO.basis(), atol=1e-6)
     line = photo_matching.summary_of(hand.operator.result, posed_camera.data.lens)[0]
     assert line == "33.75 mm as it was,  d = 1800 px"
+
+
+def test_large_errors_are_told_without_powers_of_ten(posed_camera, scene, settings):
+    settings.precision = 5.0
+    hand = Hand(posed_camera, scene)
+    draw_the_edges(hand)
+    text = " ".join(photo_matching.summary_of(hand.operator.result, posed_camera.data.lens))
+    assert max(float(number.replace(",", "")) for number in re.findall(r"± ([\d.,]+) px", text)) >= 100 and "e+" not in text
 
 
 def test_a_free_principal_point_becomes_the_shift_and_escape_takes_it_back(posed_camera, scene, settings):

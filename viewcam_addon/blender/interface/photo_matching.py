@@ -19,6 +19,7 @@ import numpy as np
 from mathutils import Vector
 
 from ... import photo_match
+from ...comparison.statistics import plain
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
@@ -139,17 +140,17 @@ def summary_of(match: photo_match.Match, lens: float) -> list[str]:
     low, high = match.distance_between
     d = match.pinhole.distance[0]
     share = (high - low) / 2 / d
-    size = f"{lens:.4g} mm ± {100 * share:.2g} %,  d = {d:.5g} px ± {(high - low) / 2:.2g} px"
+    size = f"{lens:.4g} mm ± {plain(100 * share)} %,  d = {d:.5g} px ± {plain((high - low) / 2)} px"
     lines = [size if high > low else f"{lens:.4g} mm as it was,  d = {d:.5g} px"]
     if match.principal_point_error:
         middle = match.pinhole.width / 2, match.pinhole.height / 2
         off = zip(np.subtract(match.pinhole.principal_point, middle), match.principal_point_error, strict=True)
-        right, up = (f"{value:+.4g} ± {error:.2g} px" for value, error in off)
+        right, up = (f"{value:+.4g} ± {plain(error)} px" for value, error in off)
         lines.append(f"Principal point: {right} to the right of the middle, {up} above it")
     names = {"look_at": "look-at", "up": "roll", "distance": "lens", "eye": "eye", "principal_point": "principal point"}
-    lines.append("In the picture: " + ",  ".join(f"{names[name]} ± {value:.2g} px" for name, value in match.pixels.items()))
+    lines.append("In the picture: " + ",  ".join(f"{names[name]} ± {plain(value)} px" for name, value in match.pixels.items()))
     if match.error:
-        lines.append(f"What is drawn misses by {match.error:.2g} px")
+        lines.append(f"What is drawn misses by {plain(match.error)} px")
     return lines
 
 

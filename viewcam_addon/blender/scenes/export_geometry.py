@@ -114,7 +114,8 @@ def of_slots(mesh: Mesh, slots: Collection[int]) -> Mesh:
 
 def used_slots(mesh: bpy.types.Mesh, slot_count: int) -> set[int]:
     """The material slots that some face of a mesh uses; geometry nodes leave an unused first one."""
-    return set(np.unique(materials_of(mesh, slot_count)).tolist())
+    # np.unique would load masked arrays first, which takes as long as to read a scene.
+    return set(np.flatnonzero(np.bincount(materials_of(mesh, slot_count))).tolist())
 
 
 def materials_of(mesh: bpy.types.Mesh, slot_count: int) -> Array:
