@@ -124,25 +124,46 @@ def test_a_mixture_of_everything(take, make_material):
 def test_an_image_around_the_world(take, make_material, set_world, kind):
     """With a window in it, that scattered rays seldom find."""
     replace_monkey(make_material, f"ShaderNodeBsdf{kind}", Color=(0.9, 0.6, 0.4, 1), Roughness=0.4 * (kind == "Glossy"))
-    image = bpy.data.images.new("Room", 32, 16, float_buffer=True)
-    image.colorspace_settings.name = "Non-Color"
     pixels = np.random.default_rng(1).uniform(0, 0.3, (16, 32, 4)).astype(np.float32)
     pixels[11:13, 4:6, :3] = 80.0, 60.0, 30.0
+    check(take(arrange=lambda _: surround(set_world, pixels)))
+
+
+@pytest.mark.parametrize(
+    ("kind", "distribution"),
+    [("Glass", "MULTI_GGX"), ("Glass", "GGX"), ("Glass", "BECKMANN"), ("Refraction", "GGX"), ("Refraction", "BECKMANN")],
+)
+def test_rough_glass_under_an_image_of_the_sky_has_cycles_weights(take, make_material, set_world, kind, distribution):
+    """A third of its light would be too much, were light by half vectors that no facet has not weighed."""
+
+    def arrange(_):
+        for lamp in [each for each in bpy.data.objects if each.type == "LIGHT"]:
+            bpy.data.objects.remove(lamp)
+        material = make_material("Rough", f"ShaderNodeBsdf{kind}", Color=(0.9, 0.8, 0.7, 1), Roughness=0.8)
+        next(node for node in material.node_tree.nodes if "Roughness" in node.inputs).distribution = distribution
+        for name in ("Floor", "Monkey"):
+            bpy.data.objects[name].data.materials[0] = material
+        surround(set_world, np.full((16, 32, 4), 0.25, np.float32))
+
+    check(take(arrange=arrange))
+
+
+def surround(set_world, pixels):
+    """Put an image, turned, around the world. pixels : (height, width, 4)."""
+    height, width, _ = pixels.shape
+    image = bpy.data.images.new("Room", width, height, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
     image.pixels.foreach_set(pixels.ravel())
-
-    def wrap(_):
-        world = set_world((0, 0, 0), 1.0)
-        texture, mapping = (world.node_tree.nodes.new(f"ShaderNode{name}") for name in ("TexEnvironment", "Mapping"))
-        coordinates = world.node_tree.nodes.new("ShaderNodeTexCoord")
-        # Cycles' own map for sampling, made anew for each picture, is of megapixels otherwise, and takes seconds.
-        world.cycles.sampling_method, world.cycles.sample_map_resolution = "MANUAL", 256
-        texture.image, mapping.inputs["Rotation"].default_value = image, (0.3, 0.1, 2.0)
-        background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-        world.node_tree.links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
-        world.node_tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
-        world.node_tree.links.new(texture.outputs[0], background.inputs["Color"])
-
-    check(take(arrange=wrap))
+    world = set_world((0, 0, 0), 1.0)
+    texture, mapping = (world.node_tree.nodes.new(f"ShaderNode{name}") for name in ("TexEnvironment", "Mapping"))
+    coordinates = world.node_tree.nodes.new("ShaderNodeTexCoord")
+    # Cycles' own map for sampling, made anew for each picture, is of megapixels otherwise, and takes seconds.
+    world.cycles.sampling_method, world.cycles.sample_map_resolution = "MANUAL", 256
+    texture.image, mapping.inputs["Rotation"].default_value = image, (0.3, 0.1, 2.0)
+    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+    world.node_tree.links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+    world.node_tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
+    world.node_tree.links.new(texture.outputs[0], background.inputs["Color"])
 
 
 def look_into_another_world(world):

@@ -55,6 +55,13 @@ def sphere(rows):
     return np.stack([across * np.cos(turn), across * np.sin(turn), z]), 4 * np.pi / len(z)
 
 
+def can_be_refracted(came, directions, ratio):
+    """True where some facet refracts light from (3, n) directions below to the viewer. ratio : the index of refraction."""
+    bent = ratio * directions - came[:, None]
+    facet = bent * np.sign(bent[2])
+    return (came @ facet < 0) & ((directions * facet).sum(axis=0) < 0)
+
+
 def numbers(count, seed=0):
     return np.random.default_rng(seed).random((3, count))
 
@@ -73,6 +80,8 @@ def test_samples_fall_as_often_as_their_density_says(name, behind):
     drawn = ScatteredBy(ROUGH[name], came, (0, 0, 1), numbers(count), behind)
     directions, angle = sphere(rows)
     there = ScatteredBy(ROUGH[name], came, directions, np.zeros((3, directions.shape[1])), behind)
+    if name not in OPAQUE:  # beside the density of samples it has one of light that no facet refracts
+        there.pdf *= (directions[2] > 0) | can_be_refracted(came, directions, 1 / GLASSY["ior"] if behind else GLASSY["ior"])
 
     def cells(of):
         turn = np.arctan2(of[1], of[0]) / (2 * np.pi) % 1

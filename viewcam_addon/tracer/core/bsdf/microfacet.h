@@ -119,7 +119,8 @@ using MicrofacetReflection = MicrofacetReflectionOf<double>;
 // Refraction of what the Fresnel term does not reflect. ratio: see `fresnel`.
 //
 // As in Cycles, light from a lamp also comes in by half vectors that no facet can have which sends light down: so do the pictures
-// that this is compared with. What is found by scattered rays has none of it.
+// that this is compared with. What is found by scattered rays has none of it. How much of it counts is a matter of the weights between
+// the two, and so are these Cycles': it has one density for what facets reflect and refract, each in its share (bsdf_microfacet.h).
 struct MicrofacetTransmission : MicrofacetLobeOf<double> {
     static constexpr RayKind KIND = TRANSMISSION;
     static constexpr bool DELTA = false, IS_DIFFUSE = false;
@@ -152,8 +153,12 @@ struct MicrofacetTransmission : MicrofacetLobeOf<double> {
         Vec3 bent = wo * ratio + wi;
         double squared = dot(bent, bent);
         Vec3 h = bent / std::copysign(std::sqrt(squared), bent.z);
-        double out = dot(wo, h);
-        return out < 0 ? facets.pdf_visible(wi, h) * ratio * ratio * -out / squared : 0;
+        double out = dot(wo, h), jacobian = ratio * ratio * std::fabs(out) / squared;
+        if (dot(wi, h) > 0 && out < 0) return facets.pdf_visible(wi, h) * jacobian;
+        // No facet refracts there, and no sample comes of it: the density that Cycles weighs a light's sample by.
+        double in = std::fabs(dot(wi, h)), let_through = mean(gray(1) - reflectance(fresnel, in));
+        double both = std::holds_alternative<TotalReflection>(fresnel) ? 1 : 1 + albedo(reflectance(fresnel, wi.z)) / importance();
+        return let_through * both * facets.d(h) * in / (wi.z * (1 + facets.lambda(wi))) * jacobian;
     }
 };
 
