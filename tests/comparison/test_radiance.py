@@ -68,6 +68,20 @@ def test_rare_light_that_the_reference_has_missed_is_no_difference_and_hides_non
     assert not compared(1.1).passed
 
 
+def test_light_70_stops_below_the_brightest_is_no_difference_from_none_and_20_stops_below_it_is():
+    """Where no sample varies, so that any difference is certain."""
+
+    def compared(stops):
+        reference, tests = both()
+        for image in (reference, *tests):
+            image.passes["Combined"][5:16, 5:16, :3] = image.passes["Variance"][5:16, 5:16] = 0.0
+        reference.passes["Combined"][10, 10, :3] = 2.0**-stops
+        return radiance.compare(reference, tests, PINHOLE)
+
+    assert compared(70).passed, "\n".join(compared(70).lines())
+    assert not compared(20).passed
+
+
 def test_what_differs_beyond_doubt_is_not_traced_anew():
     def never():
         raise AssertionError("nobody has to ask")

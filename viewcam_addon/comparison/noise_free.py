@@ -38,6 +38,9 @@ _SHORT_NORMALS = (5, 2)
 _SHADED = ("Combined", "Diffuse Direct")
 _NOT_SCATTERED = ("Alpha", "Emission", "Environment")
 _UNLIT = (*_NOT_SCATTERED, "Diffuse Color", "Glossy Color", "Transmission Color")
+# Light of this share of the picture's brightest is nothing, whatever noise there is: 48 stops darker, where float32 rounds away
+# what float32 rounds away of the brightest. A renderer's powers of small numbers end there, or go on to 10⁻³⁸.
+_NOTHING = 2.0**-48
 # Errors are told relative to the value, or to this share of the mean where the value is less.
 _DARK = 1e-3
 
@@ -116,7 +119,7 @@ class Rounding:
         slope = np.max([tolerances.slopes(channel, self.belongs) for channel in channels], axis=0)
         value = np.abs(sides.reference).max(axis=-1)
         error = tolerances.radiance_error(value, self._brightest, self._samples)
-        floor = self._floor(sides.name, value)
+        floor = self._floor(sides.name, value) + _NOTHING * value.max(initial=0.0, where=np.isfinite(value))
         if self._rest is not None:
             floor = floor + self._rest.tolerance(sides)
         return Allowance(self._shift * slope, error, floor, self._shift)
