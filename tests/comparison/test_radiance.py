@@ -69,7 +69,7 @@ def test_rare_light_that_the_reference_has_missed_is_no_difference_and_hides_non
 
 
 def test_light_70_stops_below_the_brightest_is_no_difference_from_none_and_20_stops_below_it_is():
-    """Where no sample varies, so that any difference is certain."""
+    """No sample varies there, so that any difference is certain."""
 
     def compared(stops):
         reference, tests = both()
