@@ -68,6 +68,26 @@ def test_a_spot_brings_its_whole_matrix(add_lamp, export):
 
 
 @pytest.mark.parametrize(
+    ("kinds", "angle", "roughness", "is_told"),
+    [
+        (("SUN", "POINT"), 0.1, 0.8, True),
+        (("SUN", "POINT"), 0.1, 0.2, False),
+        (("SUN", "POINT"), 0.0, 0.8, False),
+        (("SUN",), 0.1, 0.8, False),
+    ],
+)
+def test_very_rough_glass_is_told_where_rays_meet_one_of_several_lights(
+    add, mesh_from, make_material, add_lamp, export, kinds, angle, roughness, is_told
+):
+    add(mesh_from("plane"), "Pane")
+    bpy.data.objects["Pane"].data.materials.append(make_material("Glass", "ShaderNodeBsdfGlass", Roughness=roughness))
+    for kind in kinds:
+        add_lamp(kind, **({"angle": angle} if kind == "SUN" else {"shadow_soft_size": 0.0}))
+    _, reasons = export()
+    assert ("refracts so roughly" in reasons.get("Pane", "")) == is_told, reasons
+
+
+@pytest.mark.parametrize(
     ("shape", "size", "ellipse"),
     [("SQUARE", (2, 2), False), ("RECTANGLE", (2, 3), False), ("DISK", (2, 2), True), ("ELLIPSE", (2, 3), True)],
 )

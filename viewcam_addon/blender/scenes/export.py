@@ -11,7 +11,7 @@ What has no counterpart is noted in the ledger, with the remedy that takes it ou
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -23,7 +23,7 @@ from ...pinhole import Pinhole
 from ...tracer.scene import Mesh, Object, Scene, Spheres, level_of
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Lamp, World
-from ...tracer.scene.materials import PLAIN, Picture
+from ...tracer.scene.materials import PLAIN, Material, Picture
 from .. import camera as cameras
 from .. import versions
 from . import cycles_attributes, export_geometry, features, film, lamps, linking, materials, world
@@ -195,13 +195,34 @@ def _scene(
     if notes_doubles:
         _note_doubles(objects, geometries, ledger)
     surfaces = {placed.name for placed in objects}
+    light = _shown_by_light(depsgraph, ledger, shading, surfaces) if shading else {}
+    if shading:
+        _note_weighed_light(objects, light["lamps"], light["world"], light["materials"], ledger)
     return Scene(
         **view,
         geometries={name: geometries[name] for name in dict.fromkeys(placed.geometry for placed in objects)},
         objects=linking.among(objects, surfaces),
-        **(_shown_by_light(depsgraph, ledger, shading, surfaces) if shading else {}),
+        **light,
         ledger=ledger.entries(),
     )
+
+
+def _note_weighed_light(
+    objects: list[Object], lamps: Sequence[Lamp], world: World | None, materials: dict[str, Material], ledger: Ledger
+) -> None:
+    """Note glass so rough that Cycles has light in it which only samples of lights find: with several lights, how much of that
+    counts is a matter of how often Cycles chooses which.
+    """
+    shining = sum(2 for placed in objects for name in placed.materials if name and materials[name].shines)
+    sky = world is not None and world.image is not None
+    met_by_rays = sky or shining or any(lamp.is_sized and lamp.multiple_importance for lamp in lamps)
+    if len(lamps) + sky + shining < 2 or not met_by_rays:
+        return
+    for placed in objects:
+        name = next((name for name in placed.materials if name and materials[name].refracts_very_roughly), None)
+        if name is not None:
+            reason = "refracts so roughly that Cycles' choice among several lights shows in it: up to 5 % more or less"
+            ledger.note(placed.name, "approximated", f"material {name!r} {reason}")
 
 
 def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> None:

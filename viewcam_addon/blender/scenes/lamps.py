@@ -211,8 +211,7 @@ def lamps_in(
             common["multiple_importance"] = light.cycles.use_multiple_importance_sampling
             lamp = KINDS[light.type].exported(name, light, matrix, strength, common, ledger)
             if lamp is not None:
-                is_sized = getattr(light, KINDS[light.type].size) > 0
-                receivers, blockers = links.of(placed, ledger, is_sized and common["multiple_importance"])
+                receivers, blockers = links.of(placed, ledger, lamp.is_sized and lamp.multiple_importance)
                 if pictures is not None and reading:
                     shading.add_pictures(reading, reading.alphas, pictures)
                 yield replace(lamp, receivers=receivers, blockers=blockers, emission=emission)

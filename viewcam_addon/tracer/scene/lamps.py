@@ -141,6 +141,11 @@ class Lamp:
         return dict(list(self._own.items())[2:])
 
     @property
+    def is_sized(self) -> bool:
+        """True if rays can run into it."""
+        return True
+
+    @property
     def is_dark(self) -> bool:
         """True if it gives no light at all."""
         return not any(self.strength)
@@ -159,6 +164,10 @@ class Sun(Lamp):
     towards: tuple[float, float, float] = values.value((0.0, 0.0, 1.0), _direction, "vector", 3)
     irradiance: tuple[float, float, float] = values.light()
     angle: float = values.angle(0.0)
+
+    @property
+    def is_sized(self) -> bool:
+        return self.angle > 0
 
     @property
     def to_world(self) -> NDArray[np.float64]:
@@ -183,6 +192,10 @@ class Point(Lamp):
     power: tuple[float, float, float] = values.light()
     radius: float = values.number(0.0)
     soft_falloff: bool = values.truth(False)
+
+    @property
+    def is_sized(self) -> bool:
+        return self.radius > 0
 
     @property
     def to_world(self) -> NDArray[np.float64]:
@@ -210,6 +223,10 @@ class Spot(Lamp):
     angle: float = values.angle(np.pi / 4)
     blend: float = values.number(0.15, most=1.0)
     soft_falloff: bool = values.truth(False)
+
+    @property
+    def is_sized(self) -> bool:
+        return self.radius > 0
 
     @property
     def is_dark(self) -> bool:
