@@ -55,7 +55,7 @@ _SCALARS = ("fx", "fy", "cx", "cy")
 _DIAGONAL = re.compile(r"\(\s*[1-4]\s*\)")
 # The words of consoles around the numbers of a matrix; and a text of numbers alone.
 _PRINTED_AROUND = re.compile(
-    r"\A<?Matrix [34]x4|>\s*\Z|\A[34]×4 \w+\{[^}\n]{0,40}\}:|(?:\b\w+\.)*\b(?:array|tensor|[Mm]atrix)\s*(?=\()"
+    r"\A<?Matrix [34]x4|>\s*\Z|\A[34]×4 \w+\{[^}\n]{0,40}\}:|(?:\b\w{1,40}\.){0,4}\b(?:array|tensor|[Mm]atrix)\s{0,9}(?=\()"
     r"|,\s*(?:dtype|device|requires_grad|grad_fn)\s*=\s*[\w.'\"<>:]{1,40}"
 )
 _NUMBERS_ALONE = re.compile(r"[\s\d.eE+\-,;()\[\]{}]*")
@@ -65,7 +65,7 @@ _LIKE_A_TURN = 1e-2  # rows of a rotation with few digits may be off square, rel
 # MATLAB's and Octave's way to show a variable, with the factor that they take out of its numbers; and a row that goes on.
 _SHOWN = re.compile(
     r"^([A-Za-z]\w{0,40})[ \t]*=[ \t]*\n(?:[ \t]*\n)*(?:[ \t]+(1\.0e[-+]\d+)[ \t]*\*[ \t]*\n(?:[ \t]*\n)*)?"
-    r"((?:[ \t]+[-+\d.eE \t]+(?:\n|\Z))+)",
+    r"((?:[ \t]+[-+\d.][-+\d.eE \t]*(?:\n|\Z))+)",
     re.MULTILINE,
 )
 _GOES_ON = re.compile(r"\.\.\.(?=[ \t]*(?:%[^\n]*)?$)", re.MULTILINE)

@@ -137,6 +137,7 @@ def graphs(image, straight):
             result[f"attribute {name} {word}"] = N("Attribute", output=word, attribute_name=name)
     result["color attribute"] = N("VertexColor", output="Color", layer_name="Byte")
     result["color attribute alpha"] = N("VertexColor", output="Alpha", layer_name="Tint")
+    result["alpha of no color attribute"] = N("VertexColor", output="Alpha", layer_name="Nothing")
     for word in ("Position", "Normal", "True Normal", "Incoming", "Backfacing", "Tangent", "Parametric"):
         result[f"geometry {word}"] = N("NewGeometry", output=word)
     for word in ("Pointiness", "Random Per Island"):

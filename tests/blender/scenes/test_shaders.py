@@ -104,6 +104,7 @@ VALUES = [
     node("mix_number", a=node("separate", color=CHECKS, output="y"), clamp_factor=False),
     node("combine_color", x=node("rgb_to_bw", color=CHECKS), z=node("object_info", output="object_index")),
     node("attribute", name="Paint", output="alpha"),
+    node("attribute", name="Paint", output="vertex_alpha"),
     node("wireframe", size=node("attribute", name="pointiness", output="number"), pixel_size=True),
     node("noise", scale=node("wave", profile="saw", kind="rings", rings="spherical"), kind="hetero_terrain", dimensions="4d"),
     node("checker", vector=node("texture_coordinate"), color1=node("gradient", kind="radial"), color2=GREEN, output="factor"),

@@ -126,8 +126,10 @@ def _shader(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.typ
 
 def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.types.NodeSocket:
     """The output of nodes that make a value; those are one that differ by their output alone."""
-    row = VALUE_NODES[node.type].blender[0]
-    key = node.type, tuple(each for each in node.inputs if each[0] != "output")
+    word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
+    rows = VALUE_NODES[node.type].blender
+    row = next((each for each in rows if word in each.outputs.values()), rows[0])
+    key = node.type, row.class_name, tuple(each for each in node.inputs if each[0] != "output")
     added = adder.values.get(key)
     if added is None:
         added = adder.values[key] = adder.add(row.class_name)
@@ -141,7 +143,7 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
         for name, theirs in row.flags.items():
             setattr(added, theirs, node[name])
         for name, theirs in row.names.items():
-            setattr(added, theirs, node[name])
+            setattr(added, theirs, "" if node[name] == row.unnamed else node[name])
         for name, theirs in row.numbers.items():
             setattr(added, theirs, type(getattr(added, theirs))(node[name][0]))
         if "image" in KINDS[node.type].inputs and node["image"] is not None:
@@ -157,7 +159,6 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
                 _want_as_before(added, theirs, node[name], row.before[name])
             elif KINDS[node.type].inputs[name] not in (UV, GENERATED, POSITION, *OWN) or name in dict(node.inputs):
                 _color(adder, socket, node[name], reading)
-    word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
     sockets = [socket for socket in added.outputs if row.outputs.get(socket.identifier, "") == word]
     return next((socket for socket in sockets if socket.enabled), sockets[0])
 

@@ -184,7 +184,7 @@ KINDS: dict[str, ValueNode] = {
         BlenderNode("TEX_COORD", "TexCoord", _words("UV", "Generated", "Object", "Normal", "Reflection", "Camera", "Window")),
     ),
     "attribute": _row(
-        {"name": NAME, "output": ("color", "vector", "number", "alpha")},
+        {"name": NAME, "output": ("color", "vector", "number", "alpha", "vertex_alpha")},
         BlenderNode(
             "ATTRIBUTE",
             "Attribute",
@@ -193,7 +193,11 @@ KINDS: dict[str, ValueNode] = {
             names={"name": "attribute_name"},
         ),
         BlenderNode(
-            "VERTEX_COLOR", "VertexColor", _words("Color", "Alpha"), names={"name": "layer_name"}, unnamed=VERTEX_COLOR
+            "VERTEX_COLOR",
+            "VertexColor",
+            {"Color": "color", "Alpha": "vertex_alpha"},  # which is 0, and not 1, where a mesh has no such attribute
+            names={"name": "layer_name"},
+            unnamed=VERTEX_COLOR,
         ),
         BlenderNode("UVMAP", "UVMap", {"UV": "vector"}, fixed={"from_instancer": False}, names={"name": "uv_map"}),
     ),

@@ -32,24 +32,30 @@ struct TextureCoordinateNode {
     }
 };
 
-// A mesh's attribute of a name: a color, a vector, their mean, or the fourth number, which is 1 where there is none.
+// A mesh's attribute of a name: a color, a vector, their mean, or the fourth number, which is 1 where there is none, and 0 as Cycles' node
+// of vertex colors has it on meshes without the attribute.
 struct AttributeNode {
     static constexpr const char* NAME = "attribute";
     static constexpr Gives GIVES = Gives::COLOR;
     static constexpr bool VARIES = true;
     std::string name;
-    enum { COLOR, VECTOR, NUMBER, ALPHA } output;
+    enum { COLOR, VECTOR, NUMBER, ALPHA, VERTEX_ALPHA } output;
 
     explicit AttributeNode(const Inputs& in)
         : name(in.choice("name")),
-          output(in.choice("output") == "color" ? COLOR : in.choice("output") == "vector" ? VECTOR : in.choice("output") == "number" ? NUMBER : ALPHA) {}
+          output(output_of(in.choice("output"))) {}
     Gives gives() const { return output == VECTOR ? Gives::VECTOR : GIVES; }
     Vec3 eval(const ShadingPoint& at) const {
         ShadingPoint::Values values = at.attribute(name);
-        if (output == ALPHA) return gray(values.fourth);
+        if (output == ALPHA || output == VERTEX_ALPHA) return gray(output == VERTEX_ALPHA && !values.width ? 0 : values.fourth);
         Vec3 value = values.width == 1 ? gray(values.first.x) : values.first;
         if (output == NUMBER && values.width == 2) return gray(value.x);  // as in Cycles
         return output == NUMBER ? gray((value.x + value.y + value.z) / 3) : value;
+    }
+
+   private:
+    static decltype(output) output_of(const std::string& name) {
+        return name == "color" ? COLOR : name == "vector" ? VECTOR : name == "number" ? NUMBER : name == "alpha" ? ALPHA : VERTEX_ALPHA;
     }
 };
 
