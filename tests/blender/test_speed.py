@@ -372,9 +372,9 @@ def key_the_pose(camera_object, number=0):
         camera_object.keyframe_insert("rotation_euler", frame=frame)
 
 
-# Calibrated: half of what it takes while each camera is placed, or followed, by itself (62 and 119 times on one machine, 55 and 89
-# on another). In one pass 4.2 takes 9 to 22 times Blender's own, by machine and what else runs. Below 2.5 it can't be: a camera that
-# is set as a frame changes is copied and evaluated by Blender a second time.
+# Calibrated: half of what it takes while each camera is placed, or followed, by itself (62 and 119 times on one machine, 55 and
+# 89 on another). In one pass 4.2 takes 9 to 22 times Blender's own, by machine and what else runs. Below 2.5 it can't be: a
+# camera that is set as a frame changes is copied and evaluated by Blender a second time.
 LARGEST_MULTIPLE_OF_KEYED = 30
 
 
