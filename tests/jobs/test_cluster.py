@@ -498,8 +498,9 @@ def test_without_dask_a_sentence_says_what_to_install(monkeypatch):
         pass
 
 
-if sys.platform == "win32":
-    pytest.skip("Windows has neither groups of processes nor SIGKILL, and /proc is Linux's", allow_module_level=True)
+needs_posix = pytest.mark.skipif(
+    sys.platform == "win32", reason="Windows has neither groups of processes nor SIGKILL, and /proc is Linux's"
+)
 # A batch on two workers in a process that can be killed. Arguments: the file, the folder, names of shots.
 COORDINATOR = """
 import sys
@@ -532,6 +533,7 @@ def offspring(process):
     return result
 
 
+@needs_posix
 @pytest.mark.exhaustive
 def test_a_script_that_has_workers_is_not_run_again_by_them(stand_in, blend, tmp_path):
     script = tmp_path / "script.py"  # as people write them: nothing asks for __main__
@@ -541,9 +543,9 @@ def test_a_script_that_has_workers_is_not_run_again_by_them(stand_in, blend, tmp
     assert done.returncode == 0 and done.stdout == "run\n", done.stdout + done.stderr
 
 
+@needs_posix
 @pytest.mark.parametrize(
-    "how",
-    [signal.SIGKILL, *(pytest.param(how, marks=pytest.mark.exhaustive) for how in ("finished", signal.SIGINT, signal.SIGTERM))],
+    "how", ["SIGKILL", *(pytest.param(how, marks=pytest.mark.exhaustive) for how in ("finished", "SIGINT", "SIGTERM"))]
 )
 def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, processes, how):
     """Also when the coordinator is killed, or when Ctrl-C reaches the whole group."""
@@ -563,10 +565,10 @@ def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, 
             assert processes.until(lambda: stand_in.diary("waits")), "the slow shot was never begun"
             family = offspring(batch.pid)
             assert len(family) >= 4, "two workers and two Blenders"
-            if how == signal.SIGKILL:
+            if how == "SIGKILL":
                 batch.kill()
             else:
-                os.killpg(batch.pid, how)
+                os.killpg(batch.pid, getattr(signal, how))
                 os.kill(int(stand_in.diary("waits")[0][-1]), signal.SIGKILL)  # the slow shot shall not take a minute
         output, _ = batch.communicate(timeout=60)
         status = batch.returncode
@@ -578,6 +580,6 @@ def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, 
         return [process for process in family | blenders if processes.run(process)]
 
     assert processes.until(lambda: not left()), f"still running: {left()}"
-    assert status == {"finished": 0, signal.SIGKILL: -9, signal.SIGINT: 130, signal.SIGTERM: 143}[how], output
+    assert status == {"finished": 0, "SIGKILL": -9, "SIGINT": 130, "SIGTERM": 143}[how], output
     assert output == b""
     assert set(os.listdir(os.getcwd())) == before, "something was left in the user's folder"
