@@ -206,7 +206,7 @@ def swipe():
     yield
     package = type(scene.virtual_pinhole_reference).__module__.removesuffix("blender.render_settings")
     module = sys.modules[f"{package}blender.interface.swipe"]
-    displays = sys.modules[f"{package}blender.rendering.displayed"]
+    files = sys.modules[f"{package}blender.rendering.picture_files"]
     with bpy.context.temp_override(window=window(), area=area, region=part):
         before = datablocks()
         assert bpy.ops.viewcam.swipe_reference("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
@@ -222,7 +222,7 @@ def swipe():
     light, alpha = np.split(running.live.picture, [3], axis=-1)
     straight = np.divide(light, alpha, out=np.zeros_like(light), where=alpha > 0)
     behind = np.array(bpy.context.preferences.themes[0].view_3d.space.gradients.high_gradient)
-    expected = displays.displayed(scene, straight)[..., :3] * alpha + behind * (1 - alpha)
+    expected = files.displayed(scene, straight)[..., :3] * alpha + behind * (1 - alpha)
     line = round(running.line())
     rows, columns = slice(60, part.height - 80), slice(120, line - 20)  # between header, tools and words
     left = np.abs(screen[rows, columns, :3] - expected[rows, columns, :3])

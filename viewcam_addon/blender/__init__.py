@@ -11,7 +11,6 @@ def _rooms() -> list[ModuleType]:
     from . import animation, own_picture, preferences, properties, render_settings, resolution
     from .interface import (
         baking,
-        camera_files,
         clipboard,
         converting,
         file_menu,
@@ -44,7 +43,6 @@ def _rooms() -> list[ModuleType]:
         engine,
         render_panels,
         file_menu,
-        camera_files,
         view_menu,
         *followers,
     ]

@@ -22,7 +22,7 @@ from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import preferences
 from viewcam_addon.blender.interface import gizmos, overlay, swipe, viewport
 from viewcam_addon.blender.rendering import live_view
-from viewcam_addon.blender.rendering.displayed import displayed
+from viewcam_addon.blender.rendering.picture_files import displayed
 from viewcam_addon.pinhole import Pinhole
 
 SOURCES = Path(overlay.__file__).parents[1]

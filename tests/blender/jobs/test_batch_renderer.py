@@ -15,9 +15,9 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import cameras, cli
 from viewcam_addon.blender import versions
-from viewcam_addon.blender.jobs import persistent_data, pictures
+from viewcam_addon.blender.jobs import persistent_data
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
-from viewcam_addon.blender.rendering import exr, rasters
+from viewcam_addon.blender.rendering import exr, picture_files, rasters
 from viewcam_addon.blender.scenes import depsgraph, export
 from viewcam_addon.cameras import Camera, Options
 from viewcam_addon.errors import InputError
@@ -403,13 +403,13 @@ def test_shots_without_a_problem_have_none(stage):
 
 
 def test_a_file_that_blender_did_not_finish_is_an_error_of_the_system(stage, tmp_path, monkeypatch):
-    real = pictures._save
+    real = picture_files._save
 
     def half(scene, path):
         real(scene, path)
         path.write_bytes(path.read_bytes()[:1000])
 
-    monkeypatch.setattr(pictures, "_save", half)
+    monkeypatch.setattr(picture_files, "_save", half)
     with BlenderRenderer() as renderer, pytest.raises(OSError, match="did not finish"):
         renderer.render(LEFT, tmp_path / "a.exr", tmp_path / "a.png")
 

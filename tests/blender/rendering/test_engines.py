@@ -21,7 +21,7 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import another_blender, temporary_settings, versions
 from viewcam_addon.blender.jobs import renderer as jobs
-from viewcam_addon.blender.rendering import cycles, displayed, rasters
+from viewcam_addon.blender.rendering import cycles, picture_files, rasters
 from viewcam_addon.blender.scenes import depsgraph
 from viewcam_addon.blender.temporary_settings import numbered_indices, overridden
 from viewcam_addon.errors import InputError
@@ -349,7 +349,7 @@ def test_a_video_with_an_alpha_channel_is_given_back_with_its_codec(crowded):
     video.format = video.codec = "WEBM"  # 4.2 makes it MKV as it comes back to videos, which knows no alpha
     settings.color_mode = "RGBA"
     with overridden() as overrides:
-        cycles.override_whole(overrides, settings)
+        picture_files.override_formats(overrides, crowded)
         versions.set_multilayer_file(settings)
     kept = (settings.file_format, video.format, video.codec, settings.color_mode)
     assert kept == ("FFMPEG", "WEBM", "WEBM", "RGBA")
@@ -482,7 +482,7 @@ def test_without_a_driver_there_is_one_sentence_and_no_file(ball, scene, tmp_pat
 
 def displayed_bytes(scene, folder, light):
     np.save(folder / "light.npy", light)
-    displayed.write_png(scene, folder / "light.npy")
+    picture_files.write_png(scene, folder / "light.npy")
     assert [path.name for path in folder.iterdir()] == ["light.png"]
     image = bpy.data.images.load(str(folder / "light.png"))
     pixels = np.empty(light.shape[0] * light.shape[1] * 4, np.float32)

@@ -1,7 +1,7 @@
 """The image of a comparison, and the Image Editor that shows it: Cycles, the tracer and what differs, side by side or swiped.
 
 Where not all that is in the picture is modeled, both sides show stand-ins and say so, and the artist's own picture is beside
-them. Light is as the scene's view transform displays it (rendering/displayed.py), and geometry shaded from its passes.
+them. Light is as the scene's view transform displays it (rendering/picture_files.py), and geometry shaded from its passes.
 
 It is one datablock of its own, packed: a file that is saved while an editor shows it keeps it, and names no folder that ends
 with Blender. Names and the legend of the colors are drawn over it, in the editor's own pixels, and are no part of it.
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...comparison import pictures
 from ...comparison.statistics import plain
-from ..rendering.displayed import stored
+from ..rendering.picture_files import stored
 from .comparing import Outcome
 
 NAME = "Virtual Pinhole Proof"

@@ -17,8 +17,8 @@ from bpy.app.handlers import persistent
 
 from ...errors import InputError
 from .. import datablocks
-from ..rendering.displayed import displayed
 from ..rendering.live_view import LiveView
+from ..rendering.picture_files import displayed
 from . import proof_image, viewport
 
 _SECONDS = 1 / 30  # between two looks at view and scene

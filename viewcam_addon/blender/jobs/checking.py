@@ -32,11 +32,11 @@ from ...pinhole import Pinhole
 from ...tracer.scene import LedgerEntry, Scene, least_level, scene_file
 from ...tracer.scene.film import LEVELS, SAMPLES, seeds
 from .. import datablocks
-from ..rendering import cycles, displayed, exr
+from ..rendering import cycles, exr, picture_files
 from ..scenes import features
 from ..scenes.export import Lighting
 from ..temporary_settings import numbered_indices
-from . import persistent_data, pictures
+from . import persistent_data
 from .scene_files import SceneFiles
 from .stage import Stage, staged
 
@@ -151,7 +151,7 @@ class Checker:
                 self._render(stage, exported, part, tests, everything)
                 if not keep:  # the page has to be the same bytes each time
                     for file in filter(Path.exists, (*tests, everything)):
-                        exr.strip(file, pictures.is_passing)
+                        exr.strip(file, picture_files.is_passing)
                 rendered += time.perf_counter() - begun
                 sides = tests[:1] if level == LEVELS[0] else tests
                 whole = everything if everything.exists() else None
@@ -163,7 +163,7 @@ class Checker:
                 self._forecast(comparison["undecided"], total, total - taken, time.perf_counter() - begun)
                 taken, total = total, comparison["undecided"]["following"]
         for path in sorted(Path(written.sides).glob("*.npy")) if written and written.sides else ():
-            displayed.write_png(scene, path)
+            picture_files.write_png(scene, path)
         result = {"result": comparison["result"], "lines": comparison["lines"], "level": level}
         result["seconds"] = {"rendered": rendered, "traced": traced}
         if "find" in comparison["result"]:

@@ -18,9 +18,10 @@ import bpy
 from ... import intrinsics
 from ...jobs.job import Job
 from .. import datablocks, resolution, versions
+from ..rendering import picture_files
 from ..rendering.engine import VIEWCAM_RenderEngine
 from ..temporary_settings import Overrides
-from . import origins, persistent_data, pictures
+from . import origins, persistent_data
 
 _ENGINES = {"CYCLES": "CYCLES", "EEVEE": versions.EEVEE, "VIEWCAM": "VIEWCAM", "WORKBENCH": "BLENDER_WORKBENCH"}
 
@@ -64,7 +65,7 @@ class JobSettings:
         self._drop_at_cameras = persistent_data.is_driven_by_camera()
         for node in _file_outputs(scene):
             overrides.set(node, "mute", True)
-        pictures.override_formats(overrides, scene)
+        picture_files.override_formats(overrides, scene)
         for camera_object in (each for each in scene.objects if each.type == "CAMERA"):
             overrides.enter(resolution.lens_kept(camera_object, scene))
         self._of_file = {owner_name: getattr(*owner_name) for owner_name in self._properties()}

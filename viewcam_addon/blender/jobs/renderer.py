@@ -32,11 +32,12 @@ from ...tracer.scene import LedgerEntry, Scene
 from .. import camera as cameras
 from .. import datablocks
 from ..opening import opened
+from ..rendering import picture_files
 from ..rendering.engine import VIEWCAM_RenderEngine
 from ..scenes.depsgraph import render_still
 from ..scenes.export import survey
 from ..temporary_settings import Overrides, numbered_indices, overridden
-from . import obstacles, origins, persistent_data, pictures
+from . import obstacles, origins, persistent_data
 from .checking import Checker
 from .job_settings import JobSettings
 from .labeling import ShotLabels
@@ -140,7 +141,7 @@ class BlenderRenderer:
         if image and preview:
             if self.scene.render.engine == VIEWCAM_RenderEngine.bl_idname:
                 warnings += VIEWCAM_RenderEngine.warnings
-            pictures.write(self.scene, image, preview)
+            picture_files.write(self.scene, image, preview)
         evaluated = self.scene.camera.evaluated_get(datablocks.depsgraph_of(self.scene))
         self._taken = cameras.read(evaluated, self.scene)
         camera = record(self._taken, datablocks.camera_data_of(evaluated))

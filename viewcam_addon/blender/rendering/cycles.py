@@ -24,6 +24,7 @@ from ..scenes.depsgraph import render_still
 from ..scenes.ledger import Remedy
 from ..temporary_settings import Overrides, overridden, still_of_one_layer
 from .exr import is_whole
+from .picture_files import override_formats
 
 _SAMPLING = {
     "device": "CPU",
@@ -198,27 +199,5 @@ def _override_file(overrides: Overrides, scene: bpy.types.Scene, path: os.PathLi
     overrides.set(scene.render, "filepath", versions.literal_path(Path(path).absolute()))
     overrides.set(scene.render, "use_file_extension", False)
     overrides.set(scene.render, "use_overwrite", True)
-    settings = scene.render.image_settings
-    override_whole(overrides, settings)
-    settings.color_management = "FOLLOW_SCENE"
-    versions.set_multilayer_file(settings)
-
-
-def override_whole(overrides: Overrides, settings: bpy.types.ImageFormatSettings) -> None:
-    """Give back all settings of the file together, since the kind of file changes what the others may be, those of videos too.
-
-    A file may hold one that its kind of file does not know, which reads as "": nobody can set that, Blender chooses another.
-    """
-    first = ("media_type", "file_format")  # Blender sets others of a video as it comes back to it, and these its colors
-    owners = (settings, settings.id_data.render.ffmpeg)
-    before = [(owner, p.identifier, p.type) for owner in owners for p in owner.bl_rna.properties if not p.is_readonly]
-    before.sort(key=lambda each: first.index(each[1]) if each[1] in first else 2 + (each[0] == settings))
-    values = [getattr(owner, name) for owner, name, _ in before]
-
-    def give_back() -> None:
-        for (owner, name, kind), value in zip(before, values, strict=True):
-            is_unknown = kind == "ENUM" and value == ""
-            if not is_unknown and getattr(owner, name) != value:
-                setattr(owner, name, value)
-
-    overrides.afterwards(give_back)
+    override_formats(overrides, scene)
+    versions.set_multilayer_file(scene.render.image_settings)

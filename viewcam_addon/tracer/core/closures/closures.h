@@ -1,4 +1,4 @@
-// Closures: the simple ones, and at the end the list of all.
+// The closures but for the principled one, and at the end the list of all.
 #pragma once
 #include <concepts>
 #include <string_view>
@@ -6,6 +6,68 @@
 #include "principled.h"
 
 namespace viewcam::VIEWCAM_ISA {
+
+// Diffuse reflection, rough or Lambert's.
+struct DiffuseClosure {
+    static constexpr const char* NAME = "diffuse";
+    static constexpr uint32_t KINDS = DIFFUSE;  // the kinds of rays that its lobes scatter
+    Color color, roughness, normal;
+
+    explicit DiffuseClosure(const Inputs& in) : color(in["color"]), roughness(in["roughness"]), normal(in["normal"]) {}
+    bool is_wide() const { return true; }
+    template <class At> void add_to(BSDFAt<At>& bsdf, const At& at, Vec3Of<NumberOf<At>> weight) const {
+        Vec3Of<NumberOf<At>> rgb = at.color(color);
+        add_diffuse(bsdf, at, rgb * weight, at.normal(normal), at.number(roughness), rgb);
+    }
+};
+
+// Light that is let through and spread as evenly as by diffuse reflection.
+struct TranslucentClosure {
+    static constexpr const char* NAME = "translucent";
+    static constexpr uint32_t KINDS = TRANSMISSION;
+    Color color, normal;
+
+    explicit TranslucentClosure(const Inputs& in) : color(in["color"]), normal(in["normal"]) {}
+    bool is_rough() const { return true; }
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
+        bsdf.add(Translucent{at.color(color) * weight, at.specular_normal(normal)});
+    }
+};
+
+// Dielectrics, smooth and rough.
+struct GlassClosure {
+    static constexpr const char* NAME = "glass";
+    static constexpr uint32_t KINDS = GLOSSY | TRANSMISSION;
+    Color color, ior, roughness, normal;
+    Distribution distribution;
+
+    explicit GlassClosure(const Inputs& in)
+        : color(in["color"]), ior(in["ior"]), roughness(in["roughness"]), normal(in["normal"]), distribution(in.choice("distribution")) {}
+    bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
+        Vec3 rgb = at.color(color);
+        double ratio = at.ratio(max(at.number(ior), LEAST_IOR));
+        add_glass(bsdf, at, weight, at.specular_normal(normal), distribution.facets(at.number(roughness)), ratio, DielectricFresnel{ratio}, rgb, rgb,
+                  distribution.multiple);
+    }
+};
+
+// Surfaces that refract only. They reflect nothing but where all is reflected, and there they are black.
+struct RefractionClosure {
+    static constexpr const char* NAME = "refraction";
+    static constexpr uint32_t KINDS = TRANSMISSION;
+    Color color, ior, roughness, normal;
+    Distribution distribution;
+
+    explicit RefractionClosure(const Inputs& in)
+        : color(in["color"]), ior(in["ior"]), roughness(in["roughness"]), normal(in["normal"]), distribution(in.choice("distribution")) {}
+    bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
+        double ratio = at.ratio(max(at.number(ior), LEAST_IOR));
+        add_refraction(bsdf, at, at.color(color) * weight, at.specular_normal(normal), distribution.facets(at.number(roughness)), TotalReflection{ratio},
+                       ratio);
+    }
+};
 
 // Light that a surface gives off, to both sides.
 struct EmissionClosure {

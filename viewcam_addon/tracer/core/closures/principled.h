@@ -3,8 +3,7 @@
 // A layer leaves to those below it what its albedo does not take. As in Cycles (measured with 4.2, 4.5, 5.0 and 5.2 under a sun
 // without a size). Subsurface scattering and thin films have no lobes here.
 #pragma once
-#include "diffuse.h"
-#include "glass.h"
+#include "lobes.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -87,7 +86,7 @@ struct PrincipledClosure {
     }
 
    private:
-    static constexpr double NEGLIGIBLE = 1e-5, LEAST_IOR = 1e-5, MOST_TINT = 1e40;
+    static constexpr double NEGLIGIBLE = 1e-5, MOST_TINT = 1e40;
 
     bool emits_nothing() const { return emission_color.is_black() || emission_strength.is_black(); }
     // The factors of an albedo and of a lobe by scattering more than once.

@@ -1,9 +1,23 @@
-// Reflection and refraction by facets, as closures add them: of a mirror where the facets are too small to tell.
+// The lobes that several closures add: diffuse reflection, and reflection and refraction by facets, which are mirrors where the
+// facets are too small to tell.
 #pragma once
 #include "../bsdf/albedo.h"
+#include "../bsdf/diffuse.h"
 #include "shading_point.h"
 
 namespace viewcam::VIEWCAM_ISA {
+
+constexpr double LEAST_IOR = 1e-5;
+
+// albedo: as of OrenNayar.
+template <class At, class T>
+[[gnu::always_inline]] inline void add_diffuse(BSDFOf<T>& bsdf, const At& at, const Vec3Of<T>& color, const Vec3Of<T>& normal, T roughness, const Vec3Of<T>& albedo) {
+    constexpr double SMOOTH = 1e-5;
+    Mask<T> smooth(roughness < SMOOTH);
+    if (any(smooth)) bsdf.add(LambertOf<T>{select(smooth, color, Vec3Of<T>{}), normal});
+    if (all(smooth)) return;
+    bsdf.add(OrenNayarOf<T>(select(smooth, Vec3Of<T>{}, color), normal, -at.incoming, unit_range(roughness), albedo, at.version >= CYCLES_4_3));
+}
 
 // Facets, and along what they are stretched: 0 where they are alike all round.
 template <class T> struct FacetsOf : MicrofacetsOf<T> {
@@ -87,6 +101,19 @@ inline void add_refraction(BSDF& bsdf, const ShadingPoint& at, Vec3 color, Vec3 
 template <class At, class T>
 inline MultipleScatteringOf<T> multiple_reflection(const At& at, Vec3Of<T> normal, const MicrofacetsOf<T>& facets, Vec3Of<T> mean) {
     return MultipleScatteringOf<T>::of(ggx_albedo<T>(roughness_of(facets), -dot(normal, at.incoming)), mean);
+}
+
+// Adds what a dielectric reflects and refracts. ratio: see `refracted`. reflected, transmitted: the colors of both.
+// multiple: whether light that facets scatter more than once counts.
+inline void add_glass(BSDF& bsdf, const ShadingPoint& at, Vec3 weight, Vec3 normal, const Facets& facets, double ratio, const Fresnel& fresnel,
+                      Vec3 reflected, Vec3 transmitted, bool multiple) {
+    if (multiple && !at.is_smooth(facets)) {
+        AlbedoOf<double> single = glass_albedo(roughness_of(facets), -dot(normal, at.incoming), ratio);
+        MultipleScattering more = MultipleScattering::of(single, unit_range(transmitted));
+        weight = weight * more.albedo * more.lobe;
+    }
+    add_reflection(bsdf, at, weight * reflected, normal, facets, fresnel);
+    add_refraction(bsdf, at, weight * transmitted, normal, facets, fresnel, ratio);
 }
 
 }  // namespace viewcam::VIEWCAM_ISA

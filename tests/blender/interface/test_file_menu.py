@@ -3,6 +3,7 @@ import math
 import re
 import struct
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ import viewcam_addon
 from viewcam_addon import cameras as formats
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import findings
-from viewcam_addon.blender.interface import camera_files, clipboard, file_menu
+from viewcam_addon.blender.interface import clipboard, file_menu
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.cameras import Camera, Options, distortion, naming
 from viewcam_addon.jobs.job import Job
@@ -314,10 +315,19 @@ def test_undo_takes_an_import_back_in_one_step(scene, tmp_path):
 
 
 def test_a_dropped_file_goes_to_the_import(registered_addon):
-    handler = camera_files.VIEWCAM_FH_cameras
-    assert handler.bl_import_operator == camera_files.VIEWCAM_OT_import_cameras.bl_idname
+    handler = file_menu.VIEWCAM_FH_cameras
+    assert handler.bl_import_operator == file_menu.VIEWCAM_OT_import_cameras.bl_idname
     assert all(re.fullmatch(r"\.\w+", suffix) for suffix in handler.bl_file_extensions.split(";"))
     assert not {".glb", ".gltf", ".usd"} & {*handler.bl_file_extensions.split(";")}
+
+
+@pytest.mark.parametrize("name", ["import_cameras", "export_cameras"])
+def test_all_options_are_drawn_beside_the_browsers_files(registered_addon, name):
+    drawn = []
+    layout = SimpleNamespace(prop=lambda _owner, name: drawn.append(name))
+    getattr(file_menu, f"VIEWCAM_OT_{name}").draw(SimpleNamespace(layout=layout), bpy.context)
+    options = getattr(bpy.ops.viewcam, name).get_rna_type().properties
+    assert {*drawn} == {each.identifier for each in options if not each.is_hidden} - {"rna_type", "filepath"}
 
 
 COLUMNS, ROWS = (each.ravel() for each in np.meshgrid(np.linspace(25, 615, 7), np.linspace(25, 335, 5)))
