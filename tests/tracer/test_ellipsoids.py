@@ -130,8 +130,8 @@ def test_a_spheres_shown_normal_is_its_normal(make_scene, make_spheres):
 def test_a_ray_that_touches_an_ellipsoid_where_its_box_does_meets_what_it_meets_without_boxes(
     make_spheres, random_matrix, seed, log_condition, log_distance
 ):
-    """An object's own rounding of a ray may move it to the other side of the box's plane. A thing far away makes boxes so coarse
-    that they leave out nothing close by: that is the oracle."""
+    """An object's own rounding of a ray may move it to the other side of the box's plane. A thing far away makes boxes so
+    coarse that they leave out nothing close by: that is the oracle."""
     rng = np.random.default_rng(seed)
     geometries, objects, origins, directions = {"far": make_spheres([[0, 0, 0]], 1.0)}, [], [], []
     for number in range(12):
@@ -161,7 +161,8 @@ def test_a_ray_that_touches_an_ellipsoid_where_its_box_does_meets_what_it_meets_
     away[:3, 3] = 1e6
     boxes, no_boxes = depths(), depths(Object("far", "far", away))
     differ = np.flatnonzero(boxes != no_boxes)
-    assert not differ.size, f"{differ.size} of {len(boxes)} rays, one at {boxes[differ[0]]!r} and {no_boxes[differ[0]]!r} without boxes"
+    pairs = list(zip(boxes[differ], no_boxes[differ], strict=True))
+    assert not pairs, f"{len(pairs)} of {len(boxes)} rays: {pairs[0][0]!r}, and without boxes {pairs[0][1]!r}"
 
 
 def exact_depth(center, radius, x, y):
