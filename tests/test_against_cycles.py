@@ -1,7 +1,7 @@
 """Whole pictures beside Cycles', as a user compares them: `viewcam check` at level geometry, and at 1024 samples of light.
 
-Pictures of light are small, for 1024 samples of each pixel on both sides take their time; a bias of a hundredth of a tile's light
-is found all the same (tests/comparison shows which is). Each check of light runs in a process of its own.
+Pictures of light are small, for 1024 samples of each pixel on both sides take their time; a bias of a hundredth of a tile's
+light is found all the same (tests/comparison shows which is). Each check of light runs in a process of its own.
 
 VIEWCAM_MODELS names the folder of scanned and modeled meshes, as users import them.
 """

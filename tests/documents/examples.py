@@ -1,8 +1,8 @@
 """The examples of README.md and docs/, and how each is run as its reader would run it.
 
 A block of sh is as many examples as it has commands. They run in the page's order, in a folder for each page where `viewcam`
-and `blender` are the ones under test, and the files that the pages speak of are small scenes (in_blender.py). Any other block is an
-example as a whole: programs are run, lists of shots and scenes rendered.
+and `blender` are the ones under test, and the files that the pages speak of are small scenes (in_blender.py). Any other block
+is an example as a whole: programs are run, lists of shots and scenes rendered.
 
 A page is a test, for what stands further down in it needs what was done above. Pages of `blender`'s commands are followed in
 the real Blender (tests/real_blender/test_suite.py), all others with a wheel (test_examples.py): each page once.

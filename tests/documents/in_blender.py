@@ -1,4 +1,4 @@
-"""What the pages assume, with `bpy` or by `blender -b --python in_blender.py --`:
+"""Makes and runs what the pages assume, with `bpy` or by `blender -b --python in_blender.py --`:
 
 in_blender.py FOLDER                  makes the files that they speak of, small
 in_blender.py FILE.blend PROGRAM.py   runs a program of theirs with a scene and its camera
