@@ -48,8 +48,8 @@ def written(scene, tmp_path):
 
 
 @pytest.fixture
-def shown(scene, camera_object, read_passes, tmp_path):
-    """shown(image) → (4, 3), the pixels as Cycles shows them on a surface that shines."""
+def render_pixels(scene, camera_object, read_passes, tmp_path):
+    """render_pixels(image) → (4, 3), the pixels as Cycles shows them on a surface that shines."""
     camera_object.data.type, camera_object.data.ortho_scale, camera_object.location = "ORTHO", 4, (0, 0, 1)
     bpy.ops.mesh.primitive_plane_add(size=4)
     material = bpy.data.materials.new("Shining")
@@ -85,7 +85,7 @@ def linear(picture):
 
 @pytest.mark.parametrize("kind", ["bytes", "floats", *FILES])
 @pytest.mark.parametrize("space", ["sRGB", "Linear Rec.709", "Non-Color"])
-def test_colors_beside_an_alpha_are_those_that_cycles_shows(kind, space, written, shown):
+def test_colors_beside_an_alpha_are_those_that_cycles_shows(kind, space, written, render_pixels):
     path = written(*FILES[kind]) if kind in FILES else None
     for alpha_mode, packed in itertools.product(("STRAIGHT", "PREMUL", "CHANNEL_PACKED", "NONE"), (False, True)):
         image = bpy.data.images.load(path) if path else new_image(kind == "floats", space)
@@ -97,7 +97,7 @@ def test_colors_beside_an_alpha_are_those_that_cycles_shows(kind, space, written
         if images.obstacle(image):
             assert kind == "WebP" and not packed and bpy.app.version < (4, 5)
             continue
-        theirs, ours = shown(image), linear(images.picture_of(image))
+        theirs, ours = render_pixels(image), linear(images.picture_of(image))
         # Half a byte's step, decoded where colors are brightest.
         assert theirs.any() and np.abs(theirs - ours).max() < 1.2 / 255, (alpha_mode, packed, theirs, ours)
         bpy.data.images.remove(image)
