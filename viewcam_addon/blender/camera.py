@@ -361,10 +361,10 @@ class CameraSync:
 
         has_new_data : false where its lens can't be another one.
         """
-        camera_object, (channels, *lens) = self.camera_object, self._state
-        if camera_object.matrix_basis != self._matrix or camera_object.rotation_mode != channels.mode:
-            return False
-        return not has_new_data or [*conversion.lens_state_of(camera_object.data)] == lens
+        camera_object = self.camera_object
+        if has_new_data:
+            return conversion.state_of(camera_object) == self._state
+        return camera_object.matrix_basis == self._matrix and camera_object.rotation_mode == self._state[0].mode
 
     def _is_free(self, state: tuple) -> bool:
         """True if nothing keeps the values of a camera that Blender has moved from following."""

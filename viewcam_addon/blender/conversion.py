@@ -106,14 +106,10 @@ def store(block: bpy.types.bpy_struct, **properties: float | tuple[float, ...]) 
 
 
 def state_of(camera_object: bpy.types.Object) -> tuple:
-    """All of the camera that `place` reads or sets, what carries it aside: its channels, and those of its lens."""
-    return pose.channels_of(camera_object), *lens_state_of(camera_object.data)
-
-
-def lens_state_of(camera: bpy.types.Camera) -> tuple:
-    """All of a camera's data that `place` reads or sets, its type first."""
+    """All of the camera that `place` reads or sets, what carries it aside."""
+    camera = camera_object.data
     sensor = (camera.sensor_width, camera.sensor_height, camera.sensor_fit, camera.virtual_pinhole_sensor[:])
-    return camera.type, camera.lens, camera.shift_x, camera.shift_y, *sensor
+    return pose.channels_of(camera_object), camera.type, camera.lens, camera.shift_x, camera.shift_y, *sensor
 
 
 def evaluated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object:
