@@ -155,7 +155,7 @@ light-5.2 = -k "not (cornell or roadster or fairground or gallery or glassware o
 light-4.5 = -k "cornell or perfume"
 
 test-light-%: .venvs/%/ready
-	$(call PYTEST,.venvs/$*) tests/test_light_against_cycles.py -m light $(light-$*)
+	$(call PYTEST,.venvs/$*) tests/test_against_cycles.py -m light $(light-$*)
 
 .venvs/%/ready: $(PROJECT)
 	python=$$(.ci/python $(python-$*)) || { echo "Blender $*'s wheel needs Python $(python-$*), and there is none on the PATH or in pyenv"; exit 1; }; \

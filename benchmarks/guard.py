@@ -140,10 +140,7 @@ def _measure(names: Sequence[str], sabotage: Callable[[], None] | None) -> Ratio
 
 def _geometry() -> float:
     scene = _ground(_TRIANGLES, (1920, 1080))
-    yardstick = Yardstick(scene)
-    directions = yardstick.eye_rays(0.5, 0.5)
-    eyes = yardstick.eyes(directions)
-    return _share(lambda: yardstick.trace(eyes, directions), Tracer(scene).render)
+    return _share(Yardstick(scene).of_geometry(), Tracer(scene).render)
 
 
 def _light(level: str) -> float:
@@ -189,40 +186,43 @@ class Yardstick:
                 TriangleMesh(self._embree, (vertices - eye).astype(np.float32), mesh.triangles)
         self._embree.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))  # builds the hierarchy
 
-    def eye_rays(self, px: float | NDArray[np.float64], py: float | NDArray[np.float64]) -> Rays:
+    def of_geometry(self) -> Callable[[], None]:
+        """A function that traces the eye's rays through the pixels' centers."""
+        directions = self._eye_rays(0.5, 0.5)
+        eyes = np.zeros_like(directions)
+        return lambda: self._trace(eyes, directions)
+
+    def of_light(self, samples: int, sun: Sun = _WIDE_SUN) -> Callable[[], None]:
+        """A function that traces the rays of so many samples of each pixel, the eye's and those towards a sun."""
+        rng = np.random.default_rng(0)
+        pixels = self._camera.width * self._camera.height
+        directions = np.concatenate([self._eye_rays(*rng.random((2, pixels))) for _ in range(samples)])
+        eyes, points = np.zeros_like(directions), self._points(directions)
+        towards = self._towards(sun, len(points))
+
+        def trace() -> None:
+            self._trace(eyes, directions)
+            self._trace(points, towards, "OCCLUDED")
+
+        return trace
+
+    def _eye_rays(self, px: float | NDArray[np.float64], py: float | NDArray[np.float64]) -> Rays:
         """Directions through points of all pixels, row by row."""
         rows, columns = np.divmod(np.arange(self._camera.width * self._camera.height), self._camera.width)
         return self._camera.ray_directions(columns, rows, px, py).astype(np.float32)
 
-    def eyes(self, directions: Rays) -> Rays:
-        return np.zeros_like(directions)
-
-    def points(self, directions: Rays) -> Rays:
+    def _points(self, directions: Rays) -> Rays:
         """Points where rays from the eye meet the mesh, a little before it; those that meet nothing are left out."""
-        actual = self._embree.run(self.eyes(directions), directions, output=True)
+        actual = self._embree.run(np.zeros_like(directions), directions, output=True)
         met = actual["geomID"] >= 0
         return directions[met] * (actual["tfar"][met, None] * np.float32(1 - 1e-4))
 
-    def towards(self, sun: Sun, count: int) -> Rays:
+    def _towards(self, sun: Sun, count: int) -> Rays:
         """Directions into the disc of a sun."""
         aside = np.random.default_rng(1).normal(size=(count, 3)) * math.tan(sun.angle / 4)
         return (np.array(sun.towards) + aside).astype(np.float32)
 
-    def of_light(self, samples: int) -> Callable[[], None]:
-        """A function that traces the rays of so many samples of each pixel, the eye's and those of shadows."""
-        rng = np.random.default_rng(0)
-        pixels = self._camera.width * self._camera.height
-        directions = np.concatenate([self.eye_rays(*rng.random((2, pixels))) for _ in range(samples)])
-        eyes, points = self.eyes(directions), self.points(directions)
-        towards = self.towards(_WIDE_SUN, len(points))
-
-        def trace() -> None:
-            self.trace(eyes, directions)
-            self.trace(points, towards, "OCCLUDED")
-
-        return trace
-
-    def trace(self, origins: Rays, directions: Rays, query: str = "INTERSECT") -> None:
+    def _trace(self, origins: Rays, directions: Rays, query: str = "INTERSECT") -> None:
         """All rays, in tiles over all cores."""
 
         def tile(first: int) -> None:

@@ -6,7 +6,7 @@ models whole: matte, perfect mirror, clear glass, emission.
 """
 
 import building as b
-from staging import fresh_scene, state_camera
+from building import fresh_scene, state_camera
 
 SIZE = 2.0
 

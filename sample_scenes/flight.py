@@ -9,8 +9,8 @@ import math
 import bmesh
 import bpy
 import building as b
+from building import fresh_scene, state_camera
 from nodes import Nodes, use_nodes
-from staging import fresh_scene, state_camera
 
 FRAMES, GATES, GATE_STEP = 48, 7, 7.0
 

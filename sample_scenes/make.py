@@ -10,8 +10,8 @@ import importlib
 from pathlib import Path
 
 import bpy
+import building
 import materials
-import staging
 
 import viewcam_addon
 
@@ -42,7 +42,7 @@ def make(name: str, folder: Path, picture_samples: int | None) -> None:
     module = build or importlib.import_module(name)
     scene = (build or module.build)()
     path = folder / f"{name}.blend"
-    staging.save(scene, module.__doc__, path)
+    building.save(scene, module.__doc__, path)
     print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB")
     if picture_samples:
         scene.cycles.samples = picture_samples

@@ -14,7 +14,7 @@ import bpy
 import building as b
 import nodes
 import numpy as np
-from staging import distance_for, fresh_scene, state_camera
+from building import distance_for, fresh_scene, state_camera
 
 WIDTH, HEIGHT = 640, 360
 # The height of glass above a table: where both lie in one plane, which a ray meets first is float32's chance.

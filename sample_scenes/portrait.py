@@ -7,8 +7,8 @@ The picture has 480 × 1080 pixels, each 1.5 times as wide as high, and so is se
 import math
 
 import building as b
+from building import fresh_scene, state_camera
 from nodes import Nodes, use_nodes
-from staging import fresh_scene, state_camera
 
 BAY, STORY, DEPTH = 3.2, 4.1, 1.1  # the façade's arches, in meters
 BAYS, STORIES = 6, 6

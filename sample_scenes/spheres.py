@@ -8,8 +8,8 @@ point cloud of one point, scaled differently along each axis, and so an ellipsoi
 import math
 
 import building as b
+from building import fresh_scene, state_camera
 from nodes import Nodes, use_nodes
-from staging import fresh_scene, state_camera
 
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 SPACING = 0.053  # the n-th pearl lies at SPACING · √n from the middle

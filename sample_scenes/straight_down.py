@@ -7,8 +7,8 @@ The eye stands over the look-at point and up is (0, 0, 1), so that u does not ex
 import math
 
 import building as b
+from building import fresh_scene, state_camera
 from nodes import Nodes, use_nodes
-from staging import fresh_scene, state_camera
 
 TABLE_HEIGHT = 0.74
 HALF_FORK = [(-0.09, 0.006), (-0.02, 0.0035), (0.02, 0.004), (0.035, 0.012), (0.085, 0.0125), (0.085, 0.0085), (0.045, 0.0075)]

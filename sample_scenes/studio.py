@@ -10,8 +10,8 @@ import math
 import bmesh
 import bpy
 import building as b
+from building import fresh_scene, state_camera
 from nodes import Nodes, use_nodes
-from staging import fresh_scene, state_camera
 
 GATE_CENTER, GATE_RADIUS = (1.5, 1.66), 1.25
 SUN_ELEVATION, SUN_BEARING = 34, 222

@@ -8,9 +8,9 @@ import math
 
 import bmesh
 import building as b
+from building import distance_for, fresh_scene, state_camera
 from mathutils import Euler
 from nodes import Nodes, use_nodes
-from staging import distance_for, fresh_scene, state_camera
 
 EYE = (0.0, -5000.0, -40.0)
 

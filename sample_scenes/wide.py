@@ -8,8 +8,8 @@ import math
 
 import bpy
 import building as b
+from building import distance_for, fresh_scene, state_camera
 from nodes import Nodes, use_nodes
-from staging import distance_for, fresh_scene, state_camera
 
 BAY, ROW = 3.0, 4.2  # meters from column to column and from arcade to arcade
 BAYS, ROWS = 35, 6

@@ -7,8 +7,9 @@ loaded scene of Mitsuba), and no file. The *whole job*: from the loaded scene to
 - tracer.py, cycles.py, mitsuba3.py: the contestants, each in a process of its own.
 - references.py: what errors are measured against, made by two of them together, and how far off it is itself.
 - standings.py: from points to the time that an error takes, and who is ahead.
-- figures.py: both figures of a picture, and their charts.
-- stills.py, against_mitsuba.py, geometry.py: the sweeps. `python -m benchmarks speed` measures and draws all of them.
+- stills.py: both figures of a picture, and their charts; with against_mitsuba.py and geometry.py the sweeps.
+
+`python -m benchmarks speed` measures and draws all of them.
 """
 
 import functools

@@ -11,11 +11,10 @@ from pathlib import Path
 
 from ..charts import Chart
 from ..race import Contestant
-from . import figures, mitsuba3, references, tracer
+from . import mitsuba3, references, tracer
 from .contest import Method
-from .figures import Still
 from .mitsuba3 import LLVM, SCALAR
-from .stills import OUR_METHODS, OURS, prepare_cycles, start_contestant
+from .stills import FRESH, OUR_METHODS, OURS, Still, charts_of, prepare_cycles, start_contestant
 
 STILL = Still(
     "mitsuba",
@@ -61,4 +60,4 @@ def charts(quick: bool) -> tuple[Chart, ...]:
             sides[variant]["fresh"] = mitsuba3.fresh(expected, variant, threads)
         methods = tuple(method for method in METHODS if method.side in sides)
         reference = references.reference(still.name, scene, sides, still.samples)
-        return figures.charts(still, figures.FRESH, sides, methods, reference, quick, path)
+        return charts_of(still, FRESH, sides, methods, reference, quick, path)

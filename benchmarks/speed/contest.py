@@ -98,7 +98,7 @@ def measure(
 
 
 def _takes_part(method: Method, least: Callable[[], float], effort: Effort) -> bool:
-    """Warm up; whether a method can be measured in a reasonable time, once what it loads, compiles or builds is there."""
+    """Warm up; true if a method can be measured in a reasonable time, once what it loads, compiles or builds is there."""
     if least() <= _HOPELESS * effort.longest or (seconds := least()) <= _HOPELESS * effort.longest:
         return True
     print(f"{method.name} is left out: {seconds:.0f} s for its least effort", flush=True)

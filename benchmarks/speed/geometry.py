@@ -18,11 +18,12 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.scene import scene_file
 
 from ..charts import Chart, Curve
-from . import bare_embree, contest, tracer
+from ..guard import Yardstick
+from ..race import Runner, timed
+from . import contest, tracer
 from .contest import Effort, Method
-from .figures import PICTURE, WHOLE, Figure
 from .standings import Contested, measured
-from .stills import CYCLES, OURS, prepare_cycles, start_contestant
+from .stills import CYCLES, OURS, PICTURE, WHOLE, Figure, prepare_cycles, start_contestant
 
 _WANTED = {PICTURE: 12.0, WHOLE: 6.0}
 _LEAST_SHARE = {"geometry": 0.6, "direct": 0.8}
@@ -108,10 +109,20 @@ def _share(level: str, scene_name: str, size: tuple[int, int], rounds: int) -> C
             start_contestant(blender, prepare_cycles, scene_name, level, size, scene, threads)  # writes the scene
         start = functools.partial(start_contestant, processes)
         picture = start(tracer.prepare, scene, level, threads)["picture"]
-        yardstick = start(bare_embree.prepare, scene, samples)["picture"]
+        yardstick = start(_prepare_embree, scene, samples)["picture"]
         shares = [yardstick() / picture("samples", max(samples, 1), number, path) for number in range(rounds + 1)]
     median = statistics.median(shares[1:])  # the first round is to warm up
     return Claim(f"share of bare Embree's ray rate at {level}", median, _LEAST_SHARE[level])
+
+
+def _prepare_embree(scene_path: Path, samples: int) -> dict[str, Runner]:
+    """Embree's work on the same rays, made beforehand, and nothing else.
+
+    samples : the samples of each pixel, the eye's rays and those to the first lamp, a sun; 0 for the pixels' centers alone.
+    """
+    scene = scene_file.read(scene_path)
+    yardstick = Yardstick(scene)
+    return {"picture": timed(yardstick.of_light(samples, scene.lamps[0]) if samples else yardstick.of_geometry())}
 
 
 def distance_from_centers(camera: Pinhole, path: Path) -> float:

@@ -1,8 +1,8 @@
 """The examples of README.md and docs/, and how each is run as its reader would run it.
 
 A block of sh is as many examples as it has commands. They run in the page's order, in a folder for each page where `viewcam`
-and `blender` are the ones under test, and the files that the pages speak of are small scenes (scenes.py). Any other block is an
-example as a whole: programs are run, lists of shots and scenes rendered.
+and `blender` are the ones under test, and the files that the pages speak of are small scenes (in_blender.py). Any other block
+is an example as a whole: programs are run, lists of shots and scenes rendered.
 
 A page is a test, for what stands further down in it needs what was done above. Pages of `blender`'s commands are followed in
 the real Blender (tests/real_blender/test_suite.py), all others with a wheel (test_examples.py): each page once.
@@ -143,7 +143,7 @@ class Reader:
         self._environment = {**os.environ, **environment, "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}"}
         self._files = folder / "files"
         self._files.mkdir()
-        self._must([*python, str(HERE / "scenes.py"), str(self._files)], folder)
+        self._must([*python, str(HERE / "in_blender.py"), str(self._files)], folder)
         for page, language, name in (("docs/batch.md", "csv", "shots.csv"), ("docs/scene-file.md", "json", "scene.json")):
             first = next(each for each in examples() if (each.page, each.language) == (page, language))
             (self._files / name).write_text(first.text, encoding="utf-8")
@@ -188,7 +188,7 @@ class Reader:
             text = text.replace("from viewcam_addon", f"from {self._package}")
             text = text.replace("import viewcam_addon as", f"import {self._package} as")
         (folder / "example.py").write_text(text, encoding="utf-8")
-        self._must([*self._python, str(HERE / "program.py"), "shot.blend", "example.py"], folder)
+        self._must([*self._python, str(HERE / "in_blender.py"), "shot.blend", "example.py"], folder)
 
     def _render_list(self, example: Example, folder: Path) -> None:
         name = f"shots.{example.language}"

@@ -35,7 +35,7 @@ def test_what_is_not_run_is_still_in_the_pages_and_has_a_reason():
 
 def test_every_page_is_read_and_most_of_it_is_run():
     assert {"README.md", "docs/batch.md", "docs/light.md", "docs/baking.md"} <= {each.page for each in ALL}
-    assert examples.pages(real=True) == ["README.md", "docs/baking.md", "docs/pipelines.md"]
+    assert examples.pages(real=True) == ["README.md", "docs/baking.md"]
     run = [each for each in ALL if examples.is_run(each)]
     assert len(run) >= 30 and {"sh", "python", "csv", "json", "jsonl"} <= {each.language for each in run}
 

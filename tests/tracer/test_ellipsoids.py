@@ -124,6 +124,47 @@ def test_a_spheres_shown_normal_is_its_normal(make_scene, make_spheres):
     assert np.abs(cosine - passes["Facing"][hit][:, 0]).max() <= 4 * FLOAT32
 
 
+@settings(max_examples=60)
+@given(seed=SEEDS, log_condition=st.integers(0, 4), log_distance=st.integers(0, 13))
+@example(seed=0, log_condition=2, log_distance=13)
+def test_a_ray_that_touches_an_ellipsoid_where_its_box_does_meets_what_it_meets_without_boxes(
+    make_spheres, random_matrix, seed, log_condition, log_distance
+):
+    """An object's own rounding of a ray may move it to the other side of the box's plane. A thing far away makes boxes so
+    coarse that they leave out nothing close by: that is the oracle."""
+    rng = np.random.default_rng(seed)
+    geometries, objects, origins, directions = {"far": make_spheres([[0, 0, 0]], 1.0)}, [], [], []
+    for number in range(12):
+        matrix = random_matrix(rng)
+        matrix[:3, :3] @= np.diag(10.0 ** rng.uniform(-log_condition, 0, 3))
+        center = rng.normal(size=3) * 10.0 ** rng.uniform(0, log_distance)
+        middle = rng.normal(size=3) * 3
+        matrix[:3, 3] = middle - matrix[:3, :3] @ center
+        name = f"spheres {number}"
+        geometries[name] = make_spheres([center], rng.uniform(0.3, 2))
+        objects.append(Object(name, name, matrix))
+        linear = matrix[:3, :3] * geometries[name].radii[0]
+        for axis in range(3):
+            touching = linear @ linear[axis] / np.linalg.norm(linear[axis])  # the point that is farthest along the axis
+            along = rng.normal(size=(40, 3))
+            along[:, axis] = 0
+            inward = np.linalg.norm(linear[axis]) * rng.uniform(-1, 1, (40, 1)) * 10.0 ** rng.uniform(-16, 0, (40, 1))
+            origins.append(middle + touching - along - inward * np.eye(3)[axis])
+            directions.append(along)
+    origins, directions = np.concatenate(origins), np.concatenate(directions)
+
+    def depths(*more):
+        core = CoreScene(Scene(CAMERA, geometries, (*objects, *more)), 1)
+        return core.closest(core.rays(origins, directions))[0]
+
+    away = np.eye(4)
+    away[:3, 3] = 1e6
+    boxes, no_boxes = depths(), depths(Object("far", "far", away))
+    differ = np.flatnonzero(boxes != no_boxes)
+    pairs = list(zip(boxes[differ], no_boxes[differ], strict=True))
+    assert not pairs, f"{len(pairs)} of {len(boxes)} rays: {pairs[0][0]!r}, and without boxes {pairs[0][1]!r}"
+
+
 def exact_depth(center, radius, x, y):
     """Depth at which the ray (x, y, −1) from the origin meets a sphere, of these very numbers; inf if it does not."""
     with mpmath.workdps(60):

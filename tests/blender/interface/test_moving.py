@@ -11,7 +11,7 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import preferences
-from viewcam_addon.blender.interface import dragging, kept, moving, selection, viewport
+from viewcam_addon.blender.interface import dragging, moving, selection, viewport
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 
@@ -431,7 +431,7 @@ REACH = math.dist((7, -6, 5), (0, 0, 1))
 @pytest.mark.parametrize("kind", [dragging.ORBIT, dragging.DOLLY, dragging.DOLLY_ZOOM, dragging.TRUCK])
 def test_a_drag_moves_visibly_there_and_back_and_canceling_restores_every_bit(posed_camera, scene, kind):
     bpy.context.view_layer.update()
-    before, start = kept.state(posed_camera), cameras.stated(posed_camera, scene)
+    before, start = dragging.state(posed_camera), cameras.stated(posed_camera, scene)
     drag = dragging.Drag(posed_camera, scene, kind)
     drag.move(80, 20)
     bpy.context.view_layer.update()
@@ -442,7 +442,7 @@ def test_a_drag_moves_visibly_there_and_back_and_canceling_restores_every_bit(po
     drag.move(33, 7, precise=True)
     drag.cancel()
     bpy.context.view_layer.update()
-    assert kept.state(posed_camera) == before
+    assert dragging.state(posed_camera) == before
 
 
 def test_a_dolly_zoom_keeps_the_size_at_the_look_at_point(posed_camera, scene):

@@ -10,7 +10,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender.interface import kept, photo_matching
+from viewcam_addon.blender.interface import dragging, photo_matching
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 
@@ -39,7 +39,7 @@ class Hand:
     def __init__(self, camera_object, scene):
         self.operator = SimpleNamespace(
             camera_object=camera_object,
-            before=kept.state(camera_object),
+            before=dragging.state(camera_object),
             drawing=photo_matching.begun(camera_object, bpy.context),
             result=None,
             sentence="",
@@ -84,7 +84,7 @@ def draw_the_edges(hand, photo=PHOTO):
 
 
 def test_edges_dragged_over_a_picture_turn_the_camera_and_set_its_lens_and_the_eye_stays(posed_camera, scene, settings):
-    before = kept.state(posed_camera)
+    before = dragging.state(posed_camera)
     units = scene.unit_settings.scale_length, scene.unit_settings.system
     hand = Hand(posed_camera, scene)
     draw_the_edges(hand)
@@ -133,7 +133,7 @@ def test_a_free_principal_point_becomes_the_shift_and_escape_takes_it_back(posed
     photo = replace(PHOTO, distance=1200.0, principal_point=(830.0, 600.0))
     settings.is_principal_point_free = True
     settings.length, settings.precision, scene.cursor.location = 4.0, 0.1, (-2, -1, 0)
-    before = kept.state(posed_camera)
+    before = dragging.state(posed_camera)
     hand = Hand(posed_camera, scene)
     draw_the_edges(hand, photo)
     bpy.context.view_layer.update()
@@ -145,7 +145,7 @@ def test_a_free_principal_point_becomes_the_shift_and_escape_takes_it_back(posed
     np.testing.assert_allclose((posed_camera.data.shift_x, posed_camera.data.shift_y), (130 / 1920, -60 / 1920), atol=1e-6)
     lines = photo_matching.summary_of(hand.operator.result, posed_camera.data.lens)
     assert lines[1].startswith("Principal point: -130 ± ") and " +60 ± " in lines[1], lines
-    assert hand.event("ESC") == {"CANCELLED"} and kept.state(posed_camera) == before
+    assert hand.event("ESC") == {"CANCELLED"} and dragging.state(posed_camera) == before
 
 
 @pytest.mark.parametrize("enabled", [True, False])
@@ -153,21 +153,21 @@ def test_escape_brings_all_back_to_the_bit(posed_camera, scene, settings, enable
     posed_camera.virtual_pinhole.enabled = enabled
     posed_camera.location.x += 0.125  # not where its values are
     bpy.context.view_layer.update()
-    before = kept.state(posed_camera)
+    before = dragging.state(posed_camera)
     hand = Hand(posed_camera, scene)
     draw_the_edges(hand)
-    assert kept.state(posed_camera) != before
+    assert dragging.state(posed_camera) != before
     assert hand.event("ESC") == {"CANCELLED"}
-    assert kept.state(posed_camera) == before
+    assert dragging.state(posed_camera) == before
 
 
 def test_what_says_nothing_yet_leaves_the_camera_and_enter_is_then_escape(posed_camera, scene, settings):
-    before = kept.state(posed_camera)
+    before = dragging.state(posed_camera)
     hand = Hand(posed_camera, scene)
     hand.event("X")
     hand.drag((100, 100), (900, 200))
-    assert hand.operator.sentence.startswith("Too few edges") and kept.state(posed_camera) == before
-    assert hand.event("RET") == {"CANCELLED"} and kept.state(posed_camera) == before
+    assert hand.operator.sentence.startswith("Too few edges") and dragging.state(posed_camera) == before
+    assert hand.event("RET") == {"CANCELLED"} and dragging.state(posed_camera) == before
 
 
 def test_a_rectangle_of_known_sides_at_the_cursor_gives_all_of_the_camera(posed_camera, scene, settings):

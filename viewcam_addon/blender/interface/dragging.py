@@ -1,7 +1,8 @@
 """Moves of the camera that follow the mouse: orbit, dolly, dolly zoom, truck, or a typed number in the mouse's place.
 
 `Drag` is what goes on, and knows no event; the operator in moving.py feeds it. Every change starts from the camera as it was,
-so that nothing adds up, and canceling gives it back to the bit (kept.py).
+so that nothing adds up. Canceling gives that back to the bit (`state`, `restore`), and auto keying keys what has changed
+(`key_changes`), of a handle's drag (gizmos.py) and of a match (photo_matching.py) as well.
 """
 
 import contextlib
@@ -14,14 +15,20 @@ from ... import moves
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import targets
-from . import kept
+from .. import datablocks, storage, targets, versions
 
 ORBIT, DOLLY, DOLLY_ZOOM, TRUCK = "ORBIT", "DOLLY", "DOLLY_ZOOM", "TRUCK"
 NAMES = {ORBIT: "Orbit", DOLLY: "Dolly", DOLLY_ZOOM: "Dolly Zoom", TRUCK: "Truck"}
 _TURN = math.radians(0.5)  # for a pixel of the mouse, as a viewport's turntable
 _CLOSER = 0.005  # share of the distance to the look-at point, for a pixel
 _PRECISE = 0.1
+
+# The properties that moving a camera changes besides its values.
+_CHANNELS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
+_LENS = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height", "virtual_pinhole_sensor", "dof.focus_distance")
+
+# Other looks at the values, which are no values of their own.
+_LOOKS = (*datablocks.LOOKS, "field_of_view")
 
 
 def moved(pinhole: Pinhole, kind: str, amount: tuple[float, float]) -> Pinhole:
@@ -63,7 +70,7 @@ class Drag:
                 raise InputError(f"the {words} follows {name!r}, and can't be dragged: clear that object first")
         stated = cameras.stated(camera_object, scene)
         self.start = stated or cameras.as_it_stands(camera_object, scene, in_use=False)
-        self._before = kept.state(camera_object)
+        self._before = state(camera_object)
         self._camera, self._scene, self._kind = camera_object, scene, kind
         self._mouse, self.amount, self.text = (0.0, 0.0), (0.0, 0.0), ""
         self.findings: list[str] = []
@@ -80,10 +87,10 @@ class Drag:
         self._follow()
 
     def confirm(self) -> None:
-        kept.key_changes(self._camera, self._before, self._scene)
+        key_changes(self._camera, self._before, self._scene)
 
     def cancel(self) -> None:
-        kept.restore(self._camera, self._before)
+        restore(self._camera, self._before)
 
     def _follow(self) -> None:
         self.amount = self._by_mouse()
@@ -101,3 +108,44 @@ class Drag:
         if self._kind == TRUCK:
             return -x * reach / self.start.distance[0], -y * reach / self.start.distance[1]
         return reach * (math.exp(-_CLOSER * (x + y)) - 1), 0.0
+
+
+def state(camera_object: bpy.types.Object) -> dict[str, object]:
+    """All that a drag or a match changes, by its path from the camera, other looks at the values included."""
+    stored = camera_object.virtual_pinhole.bl_rna.properties
+    values = [each.identifier for each in stored if not each.is_readonly and each.type != "POINTER"]
+    paths = [*_CHANNELS, *(f"data.{name}" for name in _LENS)]
+    paths += [f"virtual_pinhole.{name}" for name in values]
+    state = {path: camera_object.path_resolve(path) for path in paths}
+    return {
+        path: tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
+        for path, value in state.items()
+    }
+
+
+def restore(camera_object: bpy.types.Object, before: dict[str, object]) -> None:
+    """Bring all of it back; callbacks hear nothing."""
+    present = state(camera_object)
+    with storage.without_callbacks():
+        for path, value in before.items():
+            owner, _, name = path.rpartition(".")
+            if present[path] != value and not (owner == "virtual_pinhole" and name in _LOOKS):
+                setattr(camera_object.path_resolve(owner) if owner else camera_object, name, value)
+
+
+def key_changes(camera_object: bpy.types.Object, before: dict[str, object], scene: bpy.types.Scene) -> None:
+    """Insert keyframes for what has changed and has keyframes, where auto keying is on: as Blender's own fields get them.
+
+    That is values, and channels of the camera itself, which would win over the values at the next frame.
+    """
+    tools = scene.tool_settings
+    if not tools.use_keyframe_insert_auto:
+        return
+    options = {"INSERTKEY_REPLACE"} if tools.auto_keying_mode == "REPLACE_KEYS" else set()
+    present = state(camera_object)
+    for block, owner in ((camera_object, ""), (camera_object.data, "data.")):
+        curves = versions.action_curves(block)
+        if curves and not block.animation_data.action.library:
+            for path in dict.fromkeys(curve.data_path for curve in curves):
+                if f"{owner}{path}" in before and present[f"{owner}{path}"] != before[f"{owner}{path}"]:
+                    block.keyframe_insert(path, options=options)

@@ -27,9 +27,9 @@ from ... import diagram as diagrams
 from ...pinhole import Triple
 from .. import datablocks
 from . import overlay
-from .kept import key_changes
-from .kept import restore as _restore
-from .kept import state as _state
+from .dragging import key_changes
+from .dragging import restore as _restore
+from .dragging import state as _state
 
 _TWEAK = "GIZMOGROUP_OT_gizmo_tweak"
 _LOOKED_AT = 0.01  # seconds between two looks at whether a drag has ended

@@ -20,7 +20,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, preferences, targets
-from . import dragging, kept, readouts, selection, viewport
+from . import dragging, readouts, selection, viewport
 from .operators import CameraOperator
 
 
@@ -31,10 +31,10 @@ class _Move(CameraOperator):
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         pinhole = _pinhole(camera_object, scene)
-        before = kept.state(camera_object)
+        before = dragging.state(camera_object)
         for finding in cameras.apply(camera_object, self.moved(pinhole, camera_object, scene), scene):
             self.report({"WARNING"}, finding)
-        kept.key_changes(camera_object, before, scene)
+        dragging.key_changes(camera_object, before, scene)
 
 
 def _pinhole(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:

@@ -24,7 +24,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, targets
-from . import kept, overlay, panel_rows, readouts
+from . import dragging, overlay, panel_rows, readouts
 from .operators import CameraOperator
 from .panel_rows import BelowSidebar, SubPanel
 
@@ -238,7 +238,7 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
         except InputError as error:
             self.report({"ERROR"}, datablocks.sentence(error))
             return {"CANCELLED"}
-        self.before, self.sentence = kept.state(self.camera_object), ""
+        self.before, self.sentence = dragging.state(self.camera_object), ""
         self.result: Any = None  # a Match
         self.frame: Any = None  # left, bottom, right and top of the picture in the region, once it has been drawn
         _drawn = self
@@ -296,7 +296,7 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
             self.sentence = ""
         except InputError as error:
             self.result, self.sentence = None, datablocks.sentence(error)
-            kept.restore(self.camera_object, self.before)
+            dragging.restore(self.camera_object, self.before)
 
     def _tell(self, context: bpy.types.Context) -> None:
         axis = f"   Axis: {self.drawing.axis}" if self.drawing.kind == EDGES else ""
@@ -310,7 +310,7 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
         if context.area:
             context.area.tag_redraw()
         if canceled:
-            kept.restore(self.camera_object, self.before)
+            dragging.restore(self.camera_object, self.before)
             return {"CANCELLED"}
         self.report({"INFO"}, summary_of(self.result, self.camera_object.data.lens)[0])
         return {"FINISHED"}
@@ -463,7 +463,7 @@ def register() -> None:
 def unregister() -> None:
     global _drawn
     if _drawn:  # Blender takes a modal operator that is unregistered away without its cancel()
-        kept.restore(_drawn.camera_object, _drawn.before)
+        dragging.restore(_drawn.camera_object, _drawn.before)
         bpy.context.workspace.status_text_set(None)
     _drawn = None
     bpy.types.SpaceView3D.draw_handler_remove(_handler(), "WINDOW")

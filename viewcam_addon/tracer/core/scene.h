@@ -3,9 +3,9 @@
 // Rendering space has the world's axes and an origin near camera and scene (`origin`), so that scenes in map coordinates lose
 // no digits; pbrt calls it "camera-world space". Python has checked whatever comes here (native.py): nothing is checked twice.
 //
-// Meshes that only one object places, and others where that takes little memory, are merged in rendering space: one hierarchy for
-// all that the same kinds of rays see. Whatever else is an instance: the ray is taken into its space, where its geometry's own
-// hierarchy was built once.
+// Geometries that only one object places, and others where that takes little memory, are merged in rendering space: one hierarchy of
+// triangles and one of spheres for all that the same kinds of rays see. Whatever else is an instance: the ray is taken into its space,
+// where its geometry's own hierarchy was built once.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -92,7 +92,7 @@ class Scene {
         std::vector<uint32_t> placed;
         for (uint32_t i = 0; i < objects.size(); i++) (merged[i] ? still[objects[i].visible] : placed).push_back(i);
         merged_.clear();
-        for (auto& [visible, members] : still) merged_.push_back({visible, merge(members)});
+        for (auto& [visible, members] : still) merged_.push_back(merge(visible, members));
         build_geometries(placed);
         instances_ = build_bvh(placed.size(), [&](size_t i) { return world_bounds(objects[placed[i]]); }, 1, threads);
         for (uint32_t& leaf : instances_.leaves) leaf = placed[leaf];
@@ -102,7 +102,7 @@ class Scene {
     Hit closest(const Ray& ray, RayKind kind, uint32_t but = NONE) const {
         Nearest nearest{ray.t_max, 0, but};
         for (const Merged& merged : merged_)
-            if (merged.visible & kind) merged.triangles.intersect<false>(ray, NONE, nearest);
+            if (merged.visible & kind) merged.intersect<false>(ray, nearest);
         intersect_instances<false>(ray, kind, nearest);
         return hit(nearest, ray);
     }
@@ -110,7 +110,7 @@ class Scene {
     bool occluded(const Ray& ray, RayKind kind = SHADOW) const {
         Nearest nearest{ray.t_max};
         for (const Merged& merged : merged_)
-            if (merged.visible & kind && merged.triangles.intersect<true>(ray, NONE, nearest)) return true;
+            if (merged.visible & kind && merged.intersect<true>(ray, nearest)) return true;
         return intersect_instances<true>(ray, kind, nearest);
     }
     // The first hit of a ray, and all others up to `within` times as far beyond, the nearest first; of equal distances as
@@ -119,7 +119,7 @@ class Scene {
         NearestOnes nearest{ray.t_max, within, std::move(hits)};
         nearest.hits.clear();
         for (const Merged& merged : merged_)
-            if (merged.visible & kind) merged.triangles.intersect<false>(ray, NONE, nearest);
+            if (merged.visible & kind) merged.intersect<false>(ray, nearest);
         intersect_instances<false>(ray, kind, nearest);
         hits = std::move(nearest.hits);
         std::erase_if(hits, [&](const Hit& hit) { return hit.t > nearest.t; });
@@ -144,7 +144,7 @@ class Scene {
     // The surfaces at hits, with all that light needs to know there. magnitudes: receive what a renderer's relative rounding
     // applies to there, world units, if wanted.
     void interactions(const Ray* const* rays, const Hit* hits, int count, Interaction* points, double* magnitudes = nullptr) const {
-        TriangleHit triangles[4];
+        SurfaceHit triangles[4];
         Interaction* to[4];
         int pending = 0;
         auto finish_triangles = [&] {
@@ -171,11 +171,29 @@ class Scene {
         if (pending) finish_triangles();
         for (int i = 0; i < count; i++) name(points[i], hits[i].object, hits[i].primitive);
     }
-    // The surfaces of four triangles, of which not all may be others.
-    void interactions(const TriangleSurfaces& surfaces, const TriangleHit (&hits)[4], Interaction (&points)[4]) const {
-        Interaction* const to[] = {&points[0], &points[1], &points[2], &points[3]};
-        surfaces.interactions(to);
-        for (int i = 0; i < 4; i++) name(points[i], uint32_t(hits[i].object - objects.data()), hits[i].triangle);
+    // The surfaces where four rays meet triangles, or four meet spheres. t: along the rays. points: all that is known there, if wanted.
+    [[gnu::always_inline]] SurfacePoint<double4> surfaces(const SurfaceHit (&hits)[4], const Vec3x4& origins, const Vec3x4& directions,
+                                                          double4& t, Interaction* points) const {
+        auto number = [&](int i) { return uint32_t(hits[i].object - objects.data()); };
+        if (hits[0].mesh) {
+            TriangleSurfaces surfaces(hits, 4, origins, directions);
+            t = surfaces.t();
+            if (points) {
+                Interaction* const to[] = {&points[0], &points[1], &points[2], &points[3]};
+                surfaces.interactions(to);
+                for (int i = 0; i < 4; i++) name(points[i], number(i), hits[i].primitive);
+            }
+            return surfaces.points();
+        }
+        Interaction spheres[4];
+        for (int i = 0; i < 4; i++) {
+            spheres[i] = interaction({lane(origins, i), lane(directions, i)}, {0, number(i), hits[i].primitive});
+            if (points) points[i] = spheres[i];
+        }
+        auto vectors = [&](auto of) { return gather4([&](int i) { return of(spheres[i]); }); };
+        t = vectors([](auto& point) { return point.t; });
+        return {vectors([](auto& point) { return point.position; }), vectors([](auto& point) { return point.normal; }),
+                vectors([](auto& point) { return point.shading; }), vectors([](auto& point) { return point.offset; })};
     }
     Interaction interaction(const Ray& ray, const Hit& hit) const {
         const Ray* rays[] = {&ray};
@@ -230,7 +248,7 @@ class Scene {
     // The bytes of all hierarchies, beside the arrays that came from Python.
     size_t bytes() const {
         size_t sum = instances_.bytes() + objects.size() * sizeof(Object) + slots.size() * sizeof(Slot);
-        for (const Merged& merged : merged_) sum += merged.triangles.bytes();
+        for (const Merged& merged : merged_) sum += merged.triangles.bytes() + merged.spheres.bytes();
         for (const TriangleBvh& bvh : triangles_) sum += bvh.bytes();
         for (const Shape& shape : geometries)
             if (auto spheres = std::get_if<Spheres>(&shape)) sum += spheres->bvh.bytes();
@@ -249,8 +267,13 @@ class Scene {
     struct Merged {
         uint32_t visible;
         TriangleBvh triangles;
+        SphereBvh spheres;
+
+        template <bool ANY, class HitRecord> bool intersect(const Ray& ray, HitRecord& nearest) const {
+            return triangles.intersect<ANY>(ray, NONE, nearest) || spheres.intersect<ANY>(ray, nearest);
+        }
     };
-    // Triangles that are written out although an instance could stand for them: a ray then meets one hierarchy instead of many.
+    // Triangles and spheres that are written out although an instance could stand for them: a ray then meets one hierarchy instead of many.
     static constexpr size_t WRITTEN_OUT = 1 << 19;
     // A matrix that may enlarge roundings more than this would cost an instance's rays digits that can be seen.
     static constexpr double ILL_CONDITIONED = 0x1p16;
@@ -259,8 +282,8 @@ class Scene {
         std::vector<size_t> extra(geometries.size()), order;
         std::vector<bool> small(geometries.size()), merged(objects.size());
         for (size_t i = 0; i < geometries.size(); i++)
-            if (auto mesh = std::get_if<TriangleMesh>(&geometries[i]); mesh && users[i]) {
-                extra[i] = (users[i] - 1) * mesh->count;
+            if (users[i]) {
+                extra[i] = (users[i] - 1) * std::visit([](const auto& shape) { return shape.count; }, geometries[i]);
                 order.push_back(i);
             }
         std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return extra[a] < extra[b]; });
@@ -268,13 +291,21 @@ class Scene {
         for (size_t i : order) small[i] = (sum += extra[i]) <= WRITTEN_OUT || !extra[i];
         for (size_t i = 0; i < objects.size(); i++) {
             const Object& object = objects[i];
-            bool is_mesh = std::holds_alternative<TriangleMesh>(geometries[object.geometry]);
-            merged[i] = is_mesh && (small[object.geometry] || object.condition > ILL_CONDITIONED);
+            bool is_mesh = std::holds_alternative<TriangleMesh>(geometries[object.geometry]), ill = object.condition > ILL_CONDITIONED;
+            merged[i] = is_mesh ? small[object.geometry] || ill : small[object.geometry] && !ill;
         }
         return merged;
     }
 
-    TriangleBvh merge(const std::vector<uint32_t>& members) const {
+    Merged merge(uint32_t visible, const std::vector<uint32_t>& still) const {
+        Merged merged{visible, {}, {}};
+        std::vector<SphereBvh::Member> round;
+        std::vector<uint32_t> members;  // that have triangles
+        for (uint32_t i : still) {
+            auto spheres = std::get_if<Spheres>(&geometries[objects[i].geometry]);
+            spheres ? round.push_back({spheres, &objects[i], i}) : members.push_back(i);
+        }
+        merged.spheres.build(round, threads);
         std::vector<size_t> first(members.size() + 1);
         for (size_t i = 0; i < members.size(); i++)
             first[i + 1] = first[i] + std::get<TriangleMesh>(geometries[objects[members[i]].geometry]).count;
@@ -291,9 +322,8 @@ class Scene {
             object = members[i];
             primitive = uint32_t(triangle - first[i]);
         };
-        TriangleBvh triangles;
-        triangles.build(first.back(), corners_of, name_of, threads);
-        return triangles;
+        merged.triangles.build(first.back(), corners_of, name_of, threads);
+        return merged;
     }
 
     void build_geometries(const std::vector<uint32_t>& placed) {
@@ -357,7 +387,11 @@ class Scene {
     template <bool ANY> void intersect(const Rays& rays, int count, RayKind kind, Hits& nearest) const {
         for (int i = 0; i < count; i += 4) store(nearest.t + i, load<double4>(rays.t_max + i)), store(nearest.name + i, long4{});
         for (const Merged& merged : merged_)
-            if (merged.visible & kind) intersect_packets<ANY>(merged.triangles, rays, count, nearest);
+            if (merged.visible & kind) {
+                intersect_packets<ANY>(merged.triangles, rays, count, nearest);
+                if (!merged.spheres.is_empty())
+                    for (int i = 0; i < count; i++) intersect_one<ANY>(nearest, i, [&](Nearest& hit) { return merged.spheres.intersect<ANY>(rays.ray(i), hit); });
+            }
         if (instances_.root == NOTHING) return;
         for (int i = 0; i < count; i++)
             intersect_one<ANY>(nearest, i, [&](Nearest& hit) { return intersect_instances<ANY>(rays.ray(i), kind, hit); });

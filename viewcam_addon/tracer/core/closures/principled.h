@@ -36,10 +36,10 @@ struct PrincipledClosure {
         return emission_color.mean(textures) * emission_strength.mean(textures) * share;
     }
 
-    // Four points of it at once have none of what stands above the metal, nor glass.
+    // Four points of it at once have no sheen, emission or glass.
     bool is_wide() const {
-        bool layered = !(sheen_weight.is_black() && coat_weight.is_black() && emits_nothing() && transmission.is_black());
-        return !layered && !lets_through() && anisotropy.is_none() && !distribution.beckmann;
+        bool plain = sheen_weight.is_black() && emits_nothing() && transmission.is_black();
+        return plain && !lets_through() && anisotropy.is_none() && !distribution.beckmann;
     }
     template <class At> void add_to(BSDFAt<At>& bsdf, const At& at, Vec3Of<NumberOf<At>> weight) const {
         using T = NumberOf<At>;
@@ -53,9 +53,10 @@ struct PrincipledClosure {
                 bsdf.let_through(weight * (1 - share));
                 weight *= share;
             }
-            weight = below_coat(bsdf, at, below_sheen(bsdf, at, weight, shading));
-            bsdf.emit(weight * at.color(emission_color) * at.number(emission_strength));
+            weight = below_sheen(bsdf, at, weight, shading);
         }
+        weight = below_coat(bsdf, at, weight);
+        if constexpr (IS_ONE<At>) bsdf.emit(weight * at.color(emission_color) * at.number(emission_strength));
         if (T share = unit_range(at.number(metallic)); any(share > NEGLIGIBLE)) {
             Mask<T> metal(share > NEGLIGIBLE);
             auto fresnel = F82Of<T>::of(clamped, unit_range(tint));
@@ -111,25 +112,33 @@ struct PrincipledClosure {
         return below(weight, lobe.color);
     }
     // Adds the coat; what it leaves to the layers below.
-    Vec3 below_coat(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
-        double share = max(at.number(coat_weight), 0.0);
-        if (!(share > NEGLIGIBLE)) return weight;
-        Vec3 normal = at.specular_normal(coat_normal);  // not the base's where it has none
-        double cosine = -dot(normal, at.incoming), eta = max(at.number(coat_ior), 1.0);
-        Facets facets = facets_of(at.number(coat_roughness));
-        Scattering<double> scattered;
-        double reflected = fresnel(cosine, eta);
+    template <class At> Vec3Of<NumberOf<At>> below_coat(BSDFAt<At>& bsdf, const At& at, Vec3Of<NumberOf<At>> weight) const {
+        using T = NumberOf<At>;
+        T share = max(at.number(coat_weight), T{});
+        Mask<T> coated(share > NEGLIGIBLE);
+        if (!any(coated)) return weight;
+        Vec3Of<T> normal = at.specular_normal(coat_normal);  // not the base's where it has none
+        T cosine = -dot(normal, at.incoming), eta = max(at.number(coat_ior), splat<T>(1)), reflected = fresnel(cosine, eta);
+        FacetsOf<T> facets = facets_of(at.number(coat_roughness));
+        Scattering<T> scattered;
         if (at.version >= CYCLES_4_3) {
-            scattered = Scattering<double>::of(multiple_reflection(at, normal, facets, gray(mean_fresnel(eta))));
-            if (eta > 1) reflected = mix(f0_of(eta), 1, fresnel_progress_seen(eta, roughness_of(facets), cosine));
+            scattered = Scattering<T>::of(multiple_reflection(at, normal, facets, gray(mean_fresnel(eta))));
+            T seen = mix(f0_of(eta), splat<T>(1), fresnel_progress_seen<T>(eta, roughness_of(facets), cosine));
+            reflected = select(Mask<T>(eta > 1.0), seen, reflected);
         }
-        add_reflection(bsdf, at, weight * share * scattered.lobe, normal, facets, DielectricFresnel{eta});
-        Vec3 left = below(weight, weight * share * scattered.albedo * reflected), tint = max(at.color(coat_tint), 0);
-        if (tint.x == 1 && tint.y == 1 && tint.z == 1) return left;
+        add_reflection(bsdf, at, select(coated, weight * share * scattered.lobe, Vec3Of<T>{}), normal, facets, DielectricFresnelOf<T>{eta});
+        Vec3Of<T> left = below(weight, weight * share * scattered.albedo * reflected), tint = max(at.color(coat_tint), 0);
+        if (all(Mask<T>(tint.x == 1.0) & Mask<T>(tint.y == 1.0) & Mask<T>(tint.z == 1.0))) return select(coated, left, weight);
         // The way through it, both ways as one: without end along a coat that does not bend light.
-        double depth = 1 / std::sqrt(max(1 - (1 - cosine * cosine) / (eta * eta), 1e-300));
-        auto absorbed = [&](double t) { return mix(1, t > 0 ? min(pow(t, depth), MOST_TINT) : 0, share); };
-        return left * Vec3{absorbed(tint.x), absorbed(tint.y), absorbed(tint.z)};
+        T depth = 1.0 / sqrt(max(1.0 - (1.0 - cosine * cosine) / (eta * eta), splat<T>(1e-300)));
+        auto power = [](double t, double depth) { return t > 0 ? min(pow(t, depth), MOST_TINT) : 0; };
+        auto absorbed = [&](T t) {
+            if constexpr (IS_ONE<At>)
+                return mix(1, power(t, depth), share);
+            else
+                return mix(splat<T>(1), gather4([&](int i) { return power(t[i], depth[i]); }), share);
+        };
+        return select(coated, left * Vec3Of<T>{absorbed(tint.x), absorbed(tint.y), absorbed(tint.z)}, weight);
     }
 
     // The weight that a layer leaves to what is below it, the same share of all channels.

@@ -26,8 +26,8 @@
 // only some kinds of rays see, a material that asks which kind has come, a lamp without shadows): how much of it a picture has
 // is its renderer's own weights of multiple importance sampling, which elsewhere make no difference.
 //
-// Where paths come to surfaces of meshes whose materials are wide (Material::is_wide), four of one material go on at a time, at every
-// depth: surface, light, lobes and the next ray are computed in vectors, whatever the other paths of the block have met (WidePaths).
+// Where paths come to materials that are wide (Material::is_wide), four of one material go on at a time, on triangles or on spheres, at
+// every depth: surface, light, lobes and the next ray are computed in vectors, whatever the other paths of the block have met (WidePaths).
 // Formulas that both ways share are templates over one number or four, so that a path has the same bits either way.
 //
 // Rejected: splitting a path at glass, which makes work where light is faint.
@@ -174,10 +174,12 @@ class PathIntegrator {
             return count++;
         }
     };
-    // Where a path has come to a wide material: on a triangle, of which nothing has been computed yet.
+    // Where a path has come to a wide material, of which nothing has been computed yet.
     struct WidePoint {
-        TriangleHit hit;
+        SurfaceHit hit;
         uint32_t material;
+
+        bool goes_along_with(const WidePoint& other) const { return material == other.material && !hit.mesh == !other.hit.mesh; }
     };
     // Up to four paths at such points, of one material. A lane that has none goes along with one that has.
     struct WidePaths {
@@ -327,8 +329,8 @@ class PathIntegrator {
         if (coincident_ > 0) return false;
         const Object& object = scene_.objects[hit.object];
         auto mesh = std::get_if<TriangleMesh>(&scene_.geometries[object.geometry]);
-        if (!mesh) return false;
-        uint32_t material = scene_.slots[object.first_slot + uint32_t(mesh->materials[hit.primitive])].material;
+        const int32_t* slots = mesh ? mesh->materials : std::get<Spheres>(scene_.geometries[object.geometry]).materials;
+        uint32_t material = scene_.slots[object.first_slot + uint32_t(slots[hit.primitive])].material;
         if (!wide_[material]) return false;
         point = {{mesh, &object, nullptr, hit.primitive}, material};
         return true;
@@ -583,22 +585,22 @@ class PathIntegrator {
     void scatter_wide(int depth, int& onwards, Block& block) const {
         for (uint64_t left = std::exchange(block.wide, 0); left;) {
             WidePaths four;
-            uint32_t material = block.wide_points[std::countr_zero(left)].material;
+            const WidePoint& first = block.wide_points[std::countr_zero(left)];
             int count = 0;
             for (uint64_t others = left; others && count < 4; others &= others - 1) {
                 int slot = std::countr_zero(others);
-                if (block.wide_points[slot].material != material) continue;
+                if (!block.wide_points[slot].goes_along_with(first)) continue;
                 four.slots[count++] = slot;
                 left &= ~(uint64_t(1) << slot);
             }
             four.lanes = (1u << count) - 1;
             for (; count < 4; count++) four.slots[count] = four.slots[0];
-            scatter_wide(four, scene_.illumination.materials[material], depth, onwards, block);
+            scatter_wide(four, scene_.illumination.materials[first.material], depth, onwards, block);
         }
     }
     void scatter_wide(WidePaths& four, const Material& made_of, int depth, int& onwards, Block& block) const {
         static constexpr Path eye{};
-        TriangleHit hits[4];
+        SurfaceHit hits[4];
         Vec3x4 origin, direction;
         for (int i = 0; i < 4; i++) {
             int slot = four.slots[i];
@@ -621,20 +623,19 @@ class PathIntegrator {
             direction = gather4([&](int i) { return four.paths[i]->ray.direction; });
             four.weight = gather4([&](int i) { return four.paths[i]->weight; });
         }
-        TriangleSurfaces surfaces(hits, 4, origin, direction);
-        four.at = surfaces.points();
+        Interaction points[4];
+        double4 t;
+        four.at = scene_.surfaces(hits, origin, direction, t, made_of.varies() ? points : nullptr);
         four.incoming = depth == 1 ? normalize(direction) : direction;
         if (has_pixels_) four.footprint = gather4([&](int i) {
             Interaction point;
-            point.position = lane(four.at.position, i), point.t = surfaces.t()[i], point.object = uint32_t(hits[i].object - scene_.objects.data());
+            point.position = lane(four.at.position, i), point.t = t[i], point.object = uint32_t(hits[i].object - scene_.objects.data());
             return shading(point, *four.paths[i], {}, depth - 1).footprint();
         });
         if (!made_of.varies()) {
             BSDFOf<double4> bsdf = made_of.bsdf(ShadingPoints{four.at, four.incoming, scene_.illumination.version, nullptr});
             return scatter_wide(four, bsdf, depth, onwards, block);
         }
-        Interaction points[4];
-        scene_.interactions(surfaces, hits, points);
         auto point = [&](int i) { return shading(points[i], *four.paths[i], lane(four.incoming, i), depth - 1); };
         const ShadingPoint each[] = {point(0), point(1), point(2), point(3)};
         BSDFOf<double4> bsdf = made_of.bsdf(ShadingPoints{four.at, four.incoming, scene_.illumination.version, each});
@@ -655,10 +656,10 @@ class PathIntegrator {
         auto number = [&](SobolSampler::Purpose purpose) { return sampler_.number(keys, numbers, SobolSampler::dimension(depth, purpose)); };
         auto pair = [&](SobolSampler::Purpose purpose) { return sampler_.pair(keys, numbers, SobolSampler::dimension(depth, purpose)); };
         auto point_of = [&](int i) {
-            const TriangleHit& hit = block.wide_points[four.slots[i]].hit;
+            const SurfaceHit& hit = block.wide_points[four.slots[i]].hit;
             Interaction point;
             static_cast<SurfacePoint<double>&>(point) = lane(four.at, i);
-            point.object = uint32_t(hit.object - scene_.objects.data()), point.primitive = hit.triangle;
+            point.object = uint32_t(hit.object - scene_.objects.data()), point.primitive = hit.primitive;
             return point;
         };
         // The lanes that have lobes of a kind; of these, where rays can bring anything, and those on which the path ends.

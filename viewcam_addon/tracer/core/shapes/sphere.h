@@ -113,19 +113,100 @@ inline bool passes(const LocalRay& local, Vec3 center, double radius, double con
     return dot(way, d) < -doubt * (std::fabs(d.x) + std::fabs(d.y) + std::fabs(d.z)) || dot(beside, beside) > reach * reach * dot(d, d);
 }
 
+// Offers the sphere `i` of an object to `nearest` where a ray meets it nearer. ray: in rendering space. local: in the object's.
+template <class HitRecord>
+bool offer_sphere(const Spheres& spheres, size_t i, const Object& object, uint32_t number, const Ray& ray, const LocalRay& local, HitRecord& nearest) {
+    if (passes(local, spheres.center(i), spheres.radii[i], object.condition)) return false;
+    double t = UnitSphere(spheres, object, i, ray, local).distance();
+    return t > ray.t_min && t < INFINITE && nearest.offer(t, number, uint32_t(i));
+}
+
+// The spheres of an instance, by the hierarchy of its geometry.
 template <bool ANY, class HitRecord> bool intersect_spheres(const Spheres& spheres, const Object& object, const Ray& ray, uint32_t number, HitRecord& nearest) {
     if (object.flat) return false;
     LocalRay local = object.to_object(ray);
     return traverse<ANY>(spheres.bvh, local, nearest.t, local.origin_error, [&](uint32_t leaf, BoxRay& box) {
-        uint32_t i = spheres.bvh.leaves[leaf];
-        if (passes(local, spheres.center(i), spheres.radii[i], object.condition)) return false;
-        double t = UnitSphere(spheres, object, i, ray, local).distance();
-        if (!(t > ray.t_min) || t == INFINITE || !nearest.offer(t, number, i)) return false;
-        if (ANY) return true;
-        box.limit(nearest.t);
-        return false;
+        if (!offer_sphere(spheres, spheres.bvh.leaves[leaf], object, number, ray, local, nearest)) return false;
+        if (!ANY) box.limit(nearest.t);
+        return ANY;
     });
 }
+
+// The spheres of several objects, in one hierarchy in rendering space; each is met in its own object's space.
+//
+// So a ray's own rounding there, and that of the object's matrix, move a sphere out of its box. In world units all of it is below
+// 64 · 2⁻⁵³ · condition · (the ray's origin + what is rounded of the object): of the origin 10 roundings, of the direction 4 over the
+// way to the sphere, of the inverse's determinant 6. The boxes are grown by that.
+class SphereBvh {
+   public:
+    struct Member {
+        const Spheres* spheres;
+        const Object* object;
+        uint32_t number;  // the object's
+    };
+
+    void build(const std::vector<Member>& members, int threads) {
+        members_ = members;
+        std::vector<size_t> first(members.size() + 1);
+        for (size_t m = 0; m < members.size(); m++) {
+            const auto& [spheres, object, number] = members[m];
+            first[m + 1] = first[m] + spheres->count;
+            condition_ = max(condition_, object->condition);
+            for (size_t i = 0; i < spheres->count; i++) size_ = max(size_, size(members[m], i));
+        }
+        Array<Name> names(first.back());
+        for (size_t m = 0; m < members.size(); m++)
+            for (size_t i = first[m]; i < first[m + 1]; i++) names[i] = {uint32_t(m), uint32_t(i - first[m])};
+        bvh_ = build_bvh(names.size(), [&](size_t i) { return bounds(members[names[i].member], names[i].sphere); }, 1, threads);
+        names_ = Array<Name>(bvh_.leaf_count());
+        for (size_t leaf = 0; leaf < names_.size(); leaf++) names_[leaf] = names[bvh_.leaves[leaf]];
+        bvh_.leaves = Array<uint32_t>();
+    }
+    bool is_empty() const { return bvh_.root == NOTHING; }
+    size_t bytes() const { return bvh_.bytes() + names_.size() * sizeof(Name); }
+
+    template <bool ANY, class HitRecord> bool intersect(const Ray& ray, HitRecord& nearest) const {
+        if (is_empty()) return false;
+        double origin_error = 64 * DOUBLE_ROUNDING * condition_ * (size_ + max_component(abs(ray.origin)));
+        uint32_t member = NONE;
+        LocalRay local;
+        return traverse<ANY>(bvh_, ray, nearest.t, origin_error, [&](uint32_t leaf, BoxRay& box) {
+            Name name = names_[leaf];
+            const auto& [spheres, object, number] = members_[name.member];
+            if (name.member != member) local = object->to_object(ray), member = name.member;
+            if (!offer_sphere(*spheres, name.sphere, *object, number, ray, local, nearest)) return false;
+            if (!ANY) box.limit(nearest.t);
+            return ANY;
+        });
+    }
+
+   private:
+    struct Name {
+        uint32_t member, sphere;
+    };
+
+    // The size of what is rounded of a sphere's place.
+    static double size(const Member& of, size_t i) {
+        return max_component(abs(of.object->to_world.translation())) + of.object->stretched(max_component(abs(of.spheres->center(i))) + of.spheres->radii[i]);
+    }
+    static Bounds bounds(const Member& of, size_t i) {
+        Bounds box;
+        double radius = of.spheres->radii[i];
+        if (!(radius > 0)) return box;
+        double rounding = 64 * DOUBLE_ROUNDING * of.object->condition * size(of, i);
+        auto half = [&](const double* row) { return radius * std::sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]) + rounding; };
+        const auto& m = of.object->to_world.m;
+        Vec3 middle = of.object->to_world.point(of.spheres->center(i)), reach{half(m[0]), half(m[1]), half(m[2])};
+        box.add(middle - reach);
+        box.add(middle + reach);
+        return box;
+    }
+
+    std::vector<Member> members_;
+    Bvh bvh_;
+    Array<Name> names_;  // by leaf
+    double condition_ = 0, size_ = 0;  // the largest of all
+};
 
 // The surface of a sphere where a ray hits it. As in Cycles, the normal of an ellipsoid too is the direction from its center;
 // `cosine` is that of the true one. The point lies inside by what its rounding may be, from where nothing of the sphere is seen.

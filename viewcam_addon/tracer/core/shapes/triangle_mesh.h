@@ -156,23 +156,23 @@ class TriangleBvh {
     }
 };
 
-// A triangle that a ray was found to hit.
-struct TriangleHit {
+// A triangle of a mesh, or a sphere where there is none, that a ray was found to hit.
+struct SurfaceHit {
     const TriangleMesh* mesh;
     const Object* object;
     const Ray* ray;
-    uint32_t triangle;
+    uint32_t primitive;
 };
 
 // Where up to four rays meet the triangles that they were found to hit, and all about the surfaces there, four at once: what is
 // found of one is the same whatever goes along with it.
 class TriangleSurfaces {
    public:
-    TriangleSurfaces(const TriangleHit* hits, int count)
+    TriangleSurfaces(const SurfaceHit* hits, int count)
         : TriangleSurfaces(hits, count, gather4([&](int i) { return hits[i < count ? i : 0].ray->origin; }),
                            gather4([&](int i) { return hits[i < count ? i : 0].ray->direction; })) {}
     // origins, directions: of the rays.
-    [[gnu::always_inline]] TriangleSurfaces(const TriangleHit* hits, int count, const Vec3x4& origins, const Vec3x4& directions)
+    [[gnu::always_inline]] TriangleSurfaces(const SurfaceHit* hits, int count, const Vec3x4& origins, const Vec3x4& directions)
         : count_(count), origin_(origins), direction_(directions) {
         for (int i = 0; i < 4; i++) hits_[i] = hits[i < count ? i : 0], on_one_ &= hits_[i].object == hits_[0].object;
         translation_ = {of_objects([](auto& object) { return object.to_world.m[0][3]; }),
@@ -183,7 +183,7 @@ class TriangleSurfaces {
             for (int column = 0; column < 3; column++)
                 linear[row][column] = of_objects([=](auto& object) { return object.to_world.m[row][column]; });
         for (int c = 0; c < 3; c++)
-            corner_[c] = product(linear, gather4([&](int i) { return hits_[i].mesh->corner(hits_[i].triangle, c); })) + translation_;
+            corner_[c] = product(linear, gather4([&](int i) { return hits_[i].mesh->corner(hits_[i].primitive, c); })) + translation_;
         first_ = corner_[1] - corner_[0];
         second_ = corner_[2] - corner_[0];
         Vec3x4 third = corner_[2] - corner_[1];
@@ -224,7 +224,7 @@ class TriangleSurfaces {
         Vec3x4 normal = normal_ * (side / size_);
         if (bits(solid) != 15) normal = select(solid, normal, -(direction_ / length(direction_)));
         Vec3x4 shading = normal;
-        if (any([](const TriangleHit& hit) { return hit.mesh->corner_normals; })) {
+        if (any([](const SurfaceHit& hit) { return hit.mesh->corner_normals; })) {
             Vec3x4 smooth = smooth_normal();
             double4 size = length(smooth);
             shading = select(long4(size > splat4(0.0)), smooth * (side / size), normal);
@@ -238,7 +238,7 @@ class TriangleSurfaces {
         unsigned turned = bits(long4(side() < splat4(0.0)));
         for (int i = 0; i < count_; i++) {
             const TriangleMesh& mesh = *hits_[i].mesh;
-            uint32_t triangle = hits_[i].triangle;
+            uint32_t triangle = hits_[i].primitive;
             Interaction& to = *targets[i];
             static_cast<SurfacePoint<double>&>(to) = lane(points, i);
             to.t = t_[i], to.cosine = cosine[i];
@@ -320,7 +320,7 @@ class TriangleSurfaces {
                 inverse[row][column] = of_objects([=](auto& object) { return object.inverse[row][column]; });
         long4 mirrored = long4(of_objects([](auto& object) { return double(object.mirrored); }) > splat4(0.0));
         auto turned = [&](const Vec3x4& normal) __attribute__((always_inline)) {
-            if (any([](const TriangleHit& hit) { return hit.object->flat; }))
+            if (any([](const SurfaceHit& hit) { return hit.object->flat; }))
                 return gather4([&](int i) { return hits_[i].object->turned_normal(lane(normal, i)); });
             Vec3x4 turned = transposed_product(inverse, normal);
             return select(mirrored, -turned, turned);
@@ -330,7 +330,7 @@ class TriangleSurfaces {
         for (int c = 0; c < 3; c++) {
             corner[c] = gather4([&](int i) {
                 const float* normals = hits_[i].mesh->corner_normals;
-                return normals ? TriangleMesh::corner_value(normals, hits_[i].triangle, c) : Vec3{};
+                return normals ? TriangleMesh::corner_value(normals, hits_[i].primitive, c) : Vec3{};
             });
             Vec3x4 placed = turned(corner[c]);
             double4 size = length(placed);
@@ -340,7 +340,7 @@ class TriangleSurfaces {
         return bits(shared) ? select(shared, turned(smooth), smooth) : smooth;
     }
 
-    TriangleHit hits_[4];
+    SurfaceHit hits_[4];
     int count_;
     bool on_one_ = true;  // on one object
     Vec3x4 origin_, direction_, translation_;  // the rays'; the objects' places

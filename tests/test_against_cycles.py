@@ -1,7 +1,9 @@
-"""Whole pictures of light, as a user compares them: `viewcam check` at 1024 samples says "same within noise".
+"""Whole pictures beside Cycles', as a user compares them: `viewcam check` at level geometry, and at 1024 samples of light.
 
-The pictures are small, for 1024 samples of each pixel on both sides take their time; a bias of a hundredth of a tile's light is
-found all the same (tests/compare shows which is). Each check runs in a process of its own.
+Pictures of light are small, for 1024 samples of each pixel on both sides take their time; a bias of a hundredth of a tile's
+light is found all the same (tests/comparison shows which is). Each check of light runs in a process of its own.
+
+VIEWCAM_MODELS names the folder of scanned and modeled meshes, as users import them.
 """
 
 import json
@@ -18,13 +20,13 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "sample_scenes"))
 import materials
 
 from viewcam_addon.blender import camera
+from viewcam_addon.cli import main
 from viewcam_addon.pinhole import Pinhole
-
-pytestmark = pytest.mark.light
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "sample_scenes"
 SAMPLES = 1024
+MODELS = ("spot", "teapot", "stanford-bunny")
 
 # The scenes that artists work on every day: materials, worlds and instances that the tracer does not model, under one matte
 # material.
@@ -42,17 +44,50 @@ def check(blend, folder, *options):
     return json.loads(result.read_text(encoding="utf-8"))
 
 
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("smooth", [True, False], ids=["smooth", "flat"])
+def test_an_imported_model_is_the_same_picture(models_folder, fresh_blender, tmp_path, name, smooth):
+    bpy.ops.wm.obj_import(filepath=str(models_folder / f"{name}.obj"))
+    model = bpy.context.selected_objects[0]
+    model.data.polygons.foreach_set("use_smooth", [smooth] * len(model.data.polygons))
+    bpy.context.view_layer.update()
+    corners = np.array([model.matrix_world @ corner.co for corner in model.data.vertices])
+    middle, size = (corners.min(axis=0) + corners.max(axis=0)) / 2, np.ptp(corners, axis=0).max()
+
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 640, 480
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.camera.data.clip_start, scene.camera.data.clip_end = size / 100, size * 100
+    scene.collection.objects.link(scene.camera)
+    bpy.context.view_layer.update()
+    warnings = camera.apply(
+        scene.camera, Pinhole(middle + size * np.array([1.1, -1.9, 0.9]), middle, (0, 0, 1), 900, 640, 480), scene
+    )
+    assert warnings == []
+
+    blend, result = tmp_path / f"{name}.blend", tmp_path / "result.json"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    status = main(["check", str(blend), "--json", str(result)])
+    record = json.loads(result.read_text())
+    assert status == 0, record["sentence"]
+    assert record["hits"]["reference"] > 30_000, "the model must fill a good part of the picture"
+
+
+@pytest.mark.light
 @pytest.mark.parametrize(("name", "size"), [("cornell", "48x48"), ("studio", "64x36")])
 @pytest.mark.parametrize("level", ["direct", "path"])
 def test_sample_scene_is_the_same_within_noise(name, size, level, tmp_path):
     check(SCENES / f"{name}.blend", tmp_path, "--level", level, "--size", size)
 
 
+@pytest.mark.light
 @pytest.mark.parametrize("name", EVERYDAY)
 def test_everyday_scene_of_clay_is_the_same_within_noise(name, tmp_path):
     check(SCENES / f"{name}.blend", tmp_path, "--level", "path", "--clay", "--size", EVERYDAY[name])
 
 
+@pytest.mark.light
 @pytest.mark.parametrize("name", materials.BUILDERS)
 def test_scene_of_artists_materials_is_exported_whole_and_the_same_within_noise(name, fresh_blender, tmp_path):
     materials.BUILDERS[name]()
@@ -62,7 +97,8 @@ def test_scene_of_artists_materials_is_exported_whole_and_the_same_within_noise(
     assert not [entry for entry in result["ledger"] if entry["status"] != "exported"], result["ledger"]
 
 
-@pytest.mark.parametrize("name", ["spot", "teapot", "stanford-bunny"])
+@pytest.mark.light
+@pytest.mark.parametrize("name", MODELS)
 def test_model_between_a_mirror_and_a_glass_ball_is_the_same_within_noise(name, models_folder, fresh_blender, tmp_path):
     fresh_blender.ops.wm.obj_import(filepath=str(models_folder / f"{name}.obj"))
     stage(bpy.context.selected_objects[0], bpy.context.scene)

@@ -1,7 +1,13 @@
-"""The files that the pages speak of, small: `python scenes.py FOLDER`, or `blender -b --python scenes.py -- FOLDER`."""
+"""Makes and runs what the pages assume, with `bpy` or by `blender -b --python in_blender.py --`:
+
+in_blender.py FOLDER                  makes the files that they speak of, small
+in_blender.py FILE.blend PROGRAM.py   runs a program of theirs with a scene and its camera
+"""
 
 import os
+import runpy
 import sys
+import traceback
 from pathlib import Path
 
 import bpy
@@ -42,7 +48,7 @@ def make_shot(path):
     save(path, 64, 36)
 
 
-def main(folder):
+def make_files(folder):
     if not hasattr(bpy.types.Object, "virtual_pinhole"):
         sys.path.append(str(CORNELL.parents[1]))
         import viewcam_addon
@@ -54,7 +60,22 @@ def main(folder):
     save(folder / "sample_scenes" / "cornell.blend", 16, 16)
 
 
+def run(blend, program):
+    """The status with which a program ends."""
+    bpy.ops.wm.open_mainfile(filepath=os.path.abspath(blend))
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 1920, 1080  # the README's camera is for this size
+    try:
+        runpy.run_path(program, {"scene": scene, "camera_object": scene.camera})
+    except BaseException:
+        traceback.print_exc()
+        return 1
+    return 0
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[-1]))
+    first, *program = sys.argv[sys.argv.index("--") + 1 if "--" in sys.argv else 1 :]
+    status = run(first, *program) if program else make_files(Path(first)) or 0
     sys.stdout.flush()
-    os._exit(0)  # as __main__.py does, and why
+    sys.stderr.flush()
+    os._exit(status)  # as __main__.py does, and why
