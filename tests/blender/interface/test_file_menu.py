@@ -806,7 +806,7 @@ class Asking(ReadingOptions):
         self.drawn.append(text)
 
     def click(self):
-        """What it does: "asks", where it shows a dialog, or "pastes"."""
+        """Click it; "asks" where it shows a dialog, else "pastes"."""
         self.execute = lambda _context: {"FINISHED"}
         dialog = SimpleNamespace(invoke_props_dialog=lambda *_, **__: {"RUNNING_MODAL"})
         context = SimpleNamespace(window_manager=dialog)
