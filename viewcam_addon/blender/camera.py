@@ -87,7 +87,7 @@ class CameraSync:
         # The camera's state and its stored values as they were last seen to agree; None where nobody has looked.
         self._state: Any = None  # a tuple, and CameraValues; None until it is first seen
         self._values: Any = None
-        self._matrix: Matrix | None = None  # that of the channels of this state
+        self._matrix: Matrix | None = None  # the one that the channels of this state make
         self._raw: tuple | None = None  # as Blender holds these values, once a frame has looked
         # The picture in which they decide all of the camera, each by itself, so that `carry` may bring it; None in no picture.
         self._carried_in: intrinsics.Frame | None = None
