@@ -345,19 +345,20 @@ def test_no_label_of_the_panel_reads_as_the_subjects_distance(posed_camera):
     assert "Distance" not in result
 
 
-def test_the_box_does_not_tick_where_the_camera_is_no_pinhole(posed_camera):
-    def is_offered():
-        layout = Layout()
-        panel.VIEWCAM_PT_sidebar.draw_header(SimpleNamespace(layout=layout), bpy.context)
-        ((_, name, _, row, _),) = layout.drawn
-        return name == "enabled" and row.is_all("enabled")
+def box_is_offered():
+    layout = Layout()
+    panel.VIEWCAM_PT_sidebar.draw_header(SimpleNamespace(layout=layout), bpy.context)
+    ((_, name, _, row, _),) = layout.drawn
+    return name == "enabled" and row.is_all("enabled")
 
+
+def test_the_box_does_not_tick_where_the_camera_is_no_pinhole(posed_camera):
     group = posed_camera.virtual_pinhole
     cases = ("PERSP", False, True), ("ORTHO", False, False), ("PANO", False, False), ("ORTHO", True, True)
     for kind, ticked, offered in cases:
         posed_camera.data.type, group.enabled = "PERSP", ticked
         posed_camera.data.type = kind
-        assert is_offered() == offered, f"{kind}, ticked: {ticked}"
+        assert box_is_offered() == offered, f"{kind}, ticked: {ticked}"
 
 
 NARROWEST = 202  # pixels, below which Blender hides the sidebar
@@ -448,6 +449,7 @@ def test_a_camera_that_is_no_pinhole_is_not_offered_to_be_used(posed_camera, emp
         posed_camera.parent = empty("Stretched", scale=scale)
         bpy.context.view_layer.update()
         assert properties_drawn(panel.VIEWCAM_PT_sidebar)["enabled"].is_all("enabled") == offered, scale
+        assert box_is_offered() == offered, f"the box in the header, {scale}"
 
 
 def test_what_a_constraint_or_a_driver_places_is_read_only_with_a_word_why(posed_camera, empty):

@@ -46,7 +46,7 @@ class _MainPanel(CameraPanel):
         if camera_object is None:
             return
         group, row = camera_object.virtual_pinhole, self.layout.row()
-        row.enabled = camera_object.data.type == "PERSP" or group.enabled
+        row.enabled = group.enabled or bool(standing(camera_object, context.scene))
         row.prop(group, "enabled", text="")
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
