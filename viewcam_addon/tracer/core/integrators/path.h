@@ -835,14 +835,14 @@ class PathIntegrator {
             all += density;
             if (!(hidden_from & (lobe.IS_DIFFUSE ? lobe.KIND | DIFFUSE : lobe.KIND)) && !no_facet(lobe)) seeing += density;
         });
-        double found = all > 0 ? seeing / all : 0;
+        double carried = all > 0 ? seeing / all : 0;
         ScatteredLight sum;
         bsdf.each(direction, [&](const auto& lobe, Vec3 light, double) {
             uint32_t hiding = lobe.IS_DIFFUSE ? hidden_from & DIFFUSE : refracts ? (hidden_from & BOTH) == BOTH : hidden_from & lobe.KIND;
             double ours = hidden_from & lobe.KIND ? 0 : 1;
             auto off = [&](double pdf) {
                 double asked = power_heuristic(pdf, all);
-                return std::fabs((hiding ? 0 : asked) + (1 - asked) * found - ours);
+                return std::fabs((hiding ? 0 : asked) + (1 - asked) * carried - ours);
             };
             (lobe.IS_DIFFUSE ? sum.diffuse : sum.other) += light * (no_facet(lobe) ? double(is_chosen) : max(off(pdfs.x), off(pdfs.y)));
         });
