@@ -34,7 +34,6 @@ from viewcam_addon.blender.interface import (
     render_panels,
     scene_cameras,
     swipe,
-    view_menu,
 )
 from viewcam_addon.image import SETTINGS
 from viewcam_addon.labels import KINDS
@@ -926,7 +925,7 @@ def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(regi
         return SimpleNamespace()
 
     layout = SimpleNamespace(operator=operator, menu=menus.append, separator=lambda: None)
-    view_menu.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
+    panel.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
     classes = (*moving.CLASSES, *operators.CLASSES, *baking.CLASSES, *clipboard.IN_MENUS, *scene_cameras.OPERATORS)
     classes += (*photo_matching.OPERATORS, *swipe.CLASSES)
     assert set(entries) == {each.bl_idname for each in classes} and menus == ["VIEWCAM_MT_copy_camera_as"]
@@ -938,9 +937,9 @@ def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(regi
 def test_the_menu_stands_under_view_cameras(registered_addon):
     menus = []
     layout = SimpleNamespace(menu=menus.append, separator=lambda: None)
-    view_menu._draw(SimpleNamespace(layout=layout), bpy.context)
+    panel._draw_menu(SimpleNamespace(layout=layout), bpy.context)
     assert menus == ["VIEWCAM_MT_cameras"] and hasattr(bpy.types, menus[0])
-    assert view_menu._draw in bpy.types.VIEW3D_MT_view_cameras._dyn_ui_initialize()
+    assert panel._draw_menu in bpy.types.VIEW3D_MT_view_cameras._dyn_ui_initialize()
 
 
 def test_the_menu_goes_with_the_add_on(registered_addon):
