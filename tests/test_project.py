@@ -79,7 +79,7 @@ BLENDER_ROOMS = {
     "render_settings": "",
     "preferences": "render_settings",
     "datablocks": "versions",
-    "pose": "",
+    "pose": "versions",
     "conversion": "findings datablocks pose",
     "storage": "versions datablocks",
     "targets": "versions datablocks pose storage",

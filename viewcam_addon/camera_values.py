@@ -23,7 +23,7 @@ from . import checks, intrinsics
 from . import roll as rolls
 from .errors import InputError
 from .intrinsics import Frame
-from .pinhole import Pinhole, Triple, ViewPlane, basis, make_views
+from .pinhole import Pinhole, Triple, ViewPlane, basis_of_views
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -136,8 +136,8 @@ class CameraValues:
         factors : new numbers by name, some of FACTORS.
         """
         values = object.__new__(CameraValues)
-        numbers = {"eye": eye, "look_at": look_at, "up": up, "distance": distance, "precision": precision}
-        values.__dict__.update(self.__dict__ | numbers | factors)
+        values.__dict__.update(self.__dict__)
+        values.__dict__.update(eye=eye, look_at=look_at, up=up, distance=distance, precision=precision, **factors)
         return values
 
     def stating(
@@ -241,12 +241,12 @@ def moved_poses(
     after[is_moved, 0] = eyes[is_moved]
     after[:, 1] += after[:, 0] - poses[:, 0]
     after[is_turned, 1] = (after[:, 0] - np.array(reach)[:, None] * axes[:, :, 2])[is_turned]
-    turned = np.flatnonzero(is_turned & make_views(*after.swapaxes(0, 1)))
+    turned = np.flatnonzero(is_turned)
     for up in (None, up_axis):
         if len(turned):
             after[turned, 2] = after[turned, 2] if up is None else up
-            v = basis(*after[turned].swapaxes(0, 1))[1]
-            turned = turned[np.abs(v - axes[turned, :, 1]).max(axis=-1) > rounding]
+            (_, v, _), valid = basis_of_views(*after[turned].swapaxes(0, 1))
+            turned = turned[valid & (np.abs(v - axes[turned, :, 1]).max(axis=-1) > rounding)]
     after[turned, 2] = axes[turned, :, 1]
     return after
 

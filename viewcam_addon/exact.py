@@ -17,6 +17,7 @@ some machines, 53 on others).
 """
 
 import functools
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 
 Number = float | NDArray[np.float64]
 Vector = tuple[float, float, float] | NDArray[np.float64]
+Components = tuple[float, ...] | NDArray[np.float64]
 Exponent = int | NDArray[np.intc]
 Index = int | NDArray[np.intp]
 
@@ -38,6 +40,7 @@ LARGEST_PART = 2.0**1000
 # The axes that make each component of a cross product: of single vectors one by one, of arrays at once.
 _NEXT, _AFTER_NEXT = np.array([1, 2, 0]), np.array([2, 0, 1])
 _EACH = tuple(zip(_NEXT.tolist(), _AFTER_NEXT.tolist(), strict=True))
+_BOTH_WAYS = np.concatenate([_NEXT, _AFTER_NEXT]), np.concatenate([_AFTER_NEXT, _NEXT])
 
 
 def two_sum(a: Number, b: Number) -> tuple[Number, Number]:
@@ -99,7 +102,9 @@ def cross(a: Vector, b_high: Vector, b_low: Vector) -> tuple[Vector, Vector, boo
     zeros = [not x if isinstance(x, float) else not x.any() for x in a]
     if zeros.count(True) == 2:
         i = zeros.index(False)
-        if np.all(np.abs(a[i]) == 0.5):  # as of an up that is an axis: no product rounds
+        if (
+            abs(a[i]) == 0.5 if isinstance(a[i], float) else (np.abs(a[i]) == 0.5).all()
+        ):  # as of an up that is an axis: no product rounds
             return _along_axis(i, a[i], b_high), _along_axis(i, a[i], b_low), True
     if not isinstance(a[0], float):
         high, low, settled = sum_terms(_cross_terms(a, b_high, b_low, _NEXT, _AFTER_NEXT))
@@ -131,16 +136,17 @@ def cross_of_perpendicular(a_high: Vector, a_low: Vector, b_high: Vector, b_low:
     Two perpendicular vectors lose nothing in their product as a whole, so the second-order terms need no care.
     """
 
-    def component(j: Index, k: Index) -> Number:
-        first, first_error = two_product(a_high[j], b_high[k])
-        second, second_error = two_product(a_high[k], b_high[j])
-        total, total_error = two_sum(first, -second)
-        mixed = a_high[j] * b_low[k] + a_low[j] * b_high[k] - a_high[k] * b_low[j] - a_low[k] * b_high[j]
-        return total + (total_error + (first_error - second_error) + mixed)
+    def product(j: Index, k: Index) -> tuple[Number, Number, Number]:
+        return *two_product(a_high[j], b_high[k]), a_high[j] * b_low[k] + a_low[j] * b_high[k]
+
+    def component(first: Sequence[Number], second: Sequence[Number]) -> Number:
+        total, total_error = two_sum(first[0], -second[0])
+        return total + (total_error + (first[1] - second[1]) + (first[2] - second[2]))
 
     if not isinstance(a_high[0], float):
-        return component(_NEXT, _AFTER_NEXT)
-    return tuple(component(j, k) for j, k in _EACH)
+        products = product(*_BOTH_WAYS)
+        return component([each[:3] for each in products], [each[3:] for each in products])
+    return tuple(component(product(j, k), product(k, j)) for j, k in _EACH)
 
 
 def length(a: Vector) -> Number:
@@ -164,14 +170,21 @@ def scaled_to_one(*vectors: Vector) -> list[Vector]:
     return [np.ldexp(vector, -exponent) for vector in vectors]
 
 
-def largest_component(a: Vector) -> Number:
+def joined(*vectors: Vector) -> Components:
+    """The components of vectors one after the other, so that what is asked of all of them is asked once."""
+    if isinstance(vectors[0][0], float):
+        return tuple(itertools.chain(*vectors))
+    return np.concatenate(vectors)
+
+
+def largest_component(a: Components) -> Number:
     """max |aᵢ|, elementwise."""
     if isinstance(a[0], float):
         return max(map(abs, a))
     return np.abs(a).max(axis=0)
 
 
-def are_factors(vector: Vector, scaled: Vector) -> bool | NDArray[np.bool_]:
+def are_factors(vector: Components, scaled: Components) -> bool | NDArray[np.bool_]:
     """True where every component of `scaled`, which was `vector` before, is 0 or large enough for `cross`."""
     if not isinstance(vector[0], float):
         return ((vector == 0) | (np.abs(scaled) >= SMALLEST_FACTOR)).all(axis=0)

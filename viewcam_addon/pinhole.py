@@ -357,16 +357,24 @@ def basis(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike) -> tuple[Array, Arr
         _check_pose(*pose)
         return tuple(np.array(axis) for axis in _axes_of_one(pose[2], *_view_of_one(*pose)))
     leading, (e, l, up) = e.shape[:-1], (vector.reshape(-1, 3) for vector in (e, l, up))
-    _check_poses(e, l, up)
-    axes, safe = np.empty((3, *e.shape)), np.empty(len(e), bool)
+    axes, valid = basis_of_views(e, l, up)
+    if not valid.all():
+        _check_poses(e, l, up)
+    return tuple(axes.reshape(3, *leading, 3))
+
+
+def basis_of_views(e: Array, l: Array, up: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """(3, n, 3) and (n,): `basis` of n poses, (n, 3) each, and true where they make views; elsewhere it is anything."""
+    axes, valid = np.empty((3, *e.shape)), np.empty(len(e), bool)
     with np.errstate(all="ignore"):  # values that leave float64's range here are done again, one by one, below
         for batch in (slice(first, first + _AT_ONCE) for first in range(0, len(e), _AT_ONCE)):
             poses = (vector[batch].T.copy() for vector in (e, l, up))
-            axes[:, batch].swapaxes(1, 2)[:], safe[batch] = _basis_of_many(*poses)
-    for i in np.flatnonzero(~safe):
-        pose = [tuple(vector[i].tolist()) for vector in (e, l, up)]
-        axes[:, i] = _axes_of_one(pose[2], *_view_of_one(*pose))
-    return tuple(axes.reshape(3, *leading, 3))
+            axes[:, batch].swapaxes(1, 2)[:], valid[batch] = _basis_of_many(*poses)
+    for i in [] if valid.all() else np.flatnonzero(~valid):
+        if make_views(e[i], l[i], up[i]):
+            pose = [tuple(vector[i].tolist()) for vector in (e, l, up)]
+            axes[:, i], valid[i] = _axes_of_one(pose[2], *_view_of_one(*pose)), True
+    return axes, valid
 
 
 def canonical_axes(up: Triple, looking_down: bool) -> tuple[Triple, Triple, Triple]:
@@ -422,7 +430,7 @@ def _basis_of_many(e: Array, l: Array, up: Array) -> tuple[tuple, Array]:
     """(u, v, w) of (3, n) arrays, each such an array, and (n,) bool: where they can be relied on."""
     _, apart, across, safe = _view(e, l, up)
     across = tuple(exact.scaled_to_one(*across))
-    return _orthonormal(apart, across), _is_moderate(e, l) & safe & (exact.largest_component(across[0]) > 0)
+    return _orthonormal(apart, across), _is_moderate(e, l) & safe & across[0].any(axis=0)
 
 
 def _view(e: exact.Vector, l: exact.Vector, up: exact.Vector) -> tuple[exact.Vector, Pair, Pair, bool | Array]:
@@ -431,13 +439,13 @@ def _view(e: exact.Vector, l: exact.Vector, up: exact.Vector) -> tuple[exact.Vec
     apart = tuple(exact.scaled_to_one(high, low))
     (unit_up,) = exact.scaled_to_one(up)
     *across, settled = exact.cross(unit_up, *apart)
-    safe = exact.are_factors(high, apart[0]) & exact.are_factors(low, apart[1]) & exact.are_factors(up, unit_up)
+    safe = exact.are_factors(exact.joined(high, low, up), exact.joined(*apart, unit_up))
     return unit_up, apart, tuple(across), safe & settled
 
 
 def _is_moderate(e: exact.Vector, l: exact.Vector) -> bool | Array:
     """True where e − l can't overflow."""
-    return (exact.largest_component(e) < exact.LARGEST_PART) & (exact.largest_component(l) < exact.LARGEST_PART)
+    return exact.largest_component(exact.joined(e, l)) < exact.LARGEST_PART
 
 
 def _orthonormal(apart: Pair, across: Pair) -> tuple[exact.Vector, exact.Vector, exact.Vector]:

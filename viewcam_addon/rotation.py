@@ -32,8 +32,8 @@ def euler(rotation: Array, order: str) -> Array:
     Of the two triples of angles that give the same rotation, the one of the smaller sum, which float32 also stores better.
     """
     triple, other = _triples(rotation, order)
-    sums = np.abs(triple).sum(-1, keepdims=True), np.abs(other).sum(-1, keepdims=True)
-    return np.where(sums[0] <= sums[1], triple, other)
+    # The angles of the two differ from a half turn by one another's, so that their sums make 3π.
+    return np.where(np.abs(triple).sum(-1, keepdims=True) <= 1.5 * math.pi, triple, other)
 
 
 def _triples(m: Array, order: str, before: Sequence[float] | None = None) -> tuple[Array, Array]:
@@ -173,8 +173,12 @@ def straightened(axes: Array) -> Array:
 
 def skew(matrix: Array) -> Array:
     """The largest |cosine| between two columns of (..., 3, 3) matrices: 0 if they are perpendicular. Returns (...)."""
-    columns = matrix / np.linalg.norm(matrix, axis=-2, keepdims=True)
-    return np.abs((columns.swapaxes(-2, -1) @ columns)[..., [0, 0, 1], [1, 2, 2]]).max(axis=-1)
+    return _largest_cosine(matrix / np.linalg.norm(matrix, axis=-2, keepdims=True))
+
+
+def _largest_cosine(axes: Array) -> Array:
+    """`skew` of axes of length one."""
+    return np.abs((axes.swapaxes(-2, -1) @ axes)[..., [0, 0, 1], [1, 2, 2]]).max(axis=-1)
 
 
 def axes_of(matrices: Array) -> tuple[Array, Array, Array]:
@@ -185,7 +189,7 @@ def axes_of(matrices: Array) -> tuple[Array, Array, Array]:
     with np.errstate(all="ignore"):
         axes = matrices[..., :3, :3] / np.linalg.norm(matrices[..., :3, :3], axis=-2, keepdims=True)
         volumes = np.where(np.isfinite(matrices).all(axis=(-2, -1)), np.linalg.det(axes), np.nan)
-        return axes, volumes, skew(axes)
+        return axes, volumes, _largest_cosine(axes)
 
 
 def largest_error(matrices: Array, axes: Array) -> Array:

@@ -377,7 +377,7 @@ def flight_of(crowd, scene):
 
 def test_cameras_that_are_carried_together_stand_to_the_bit_where_each_by_itself_would(crowd, scene, monkeypatch):
     together = flight_of(crowd, scene)
-    monkeypatch.setattr(CameraSync, "carry", lambda cameras, _scene, _depsgraph: [sync for sync, _ in cameras])
+    monkeypatch.setattr(CameraSync, "carry", lambda cameras, _scene, _depsgraph: [sync for sync, *_ in cameras])
     alone = flight_of(crowd, scene)
     for frame, *flight in zip(FRAMES, together, alone, strict=True):
         for each, state, expected in zip(crowd, *flight, strict=True):
@@ -485,7 +485,7 @@ def test_the_values_of_many_keyed_cameras_are_those_that_each_by_itself_would_ha
     assert all(CameraSync.of(each)._values == storage.load(each) for each in flock)
     scene.frame_set(1)
     cameras.forget_all()
-    monkeypatch.setattr(CameraSync, "carry", lambda cameras, _scene, _depsgraph: [sync for sync, _ in cameras])
+    monkeypatch.setattr(CameraSync, "carry", lambda cameras, _scene, _depsgraph: [sync for sync, *_ in cameras])
     alone = [scene.frame_set(frame) or numbers_of(flock) for frame in FRAMES]
     size = 1 + np.abs(alone).max(axis=(0, 2), keepdims=True)
     assert np.abs((np.array(together) - alone) / size).max() <= 2 * findings.LARGEST_TURN
@@ -514,6 +514,33 @@ def test_keyframes_of_a_value_count_from_the_next_frame_on_and_no_longer_than_th
         scene.frame_set(6)
         scene.frame_set(7)
         assert tuple(group.eye) == tuple(flock[0].location) and group.eye[0] == 7
+
+
+def test_another_action_counts_from_the_next_frame_on(flock, scene):
+    """Without an update in between: its curves are looked through, not those of the action before it."""
+    group, data = flock[0].virtual_pinhole, flock[0].animation_data
+    unkeyed, keyed = data.action, data.action.copy()
+    data.action = keyed
+    group.eye = (1, 2, 3)
+    group.keyframe_insert("eye", frame=1)
+    for frame, action in enumerate((unkeyed, keyed, unkeyed), 4):
+        data.action = action
+        scene.frame_set(2 * frame)
+        scene.frame_set(2 * frame + 1)
+        assert tuple(group.eye) == tuple(flock[0].matrix_world.translation), action.name
+        assert (tuple(group.eye) == (1, 2, 3)) == (action == keyed)
+
+
+def test_channels_that_a_script_makes_deltas_move_no_keyed_camera(crowd, scene):
+    """Their matrices say nothing of it, and there is no update before the next frame."""
+    expected = flight_of(crowd, scene)[1]
+    scene.frame_set(FRAMES[0])
+    for each in crowd[5:]:
+        each.delta_location, each.location = each.location.copy(), (0, 0, 0)
+    scene.frame_set(FRAMES[1])
+    for each, (there, *_), (channels, *_) in zip(crowd, expected, states(crowd), strict=True):
+        places = [np.add(state[0].location, state[0].delta_location) for state in (there, (channels[0],))]
+        assert places[1] == pytest.approx(places[0], abs=1e-5), each.name
 
 
 def test_a_view_that_did_not_follow_its_camera_would_be_noticed(flock, scene, monkeypatch):

@@ -22,7 +22,7 @@ BY_BLENDER = {
     "on_frame_change",
     "_edit_of",
 }  # called by Blender as it evaluates, and as a property is stored
-MOST = 28
+MOST = 29
 
 
 def walk_of(action):

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 INSIDE = Path(__file__).with_name("inside_blender.py")
 # The newest is the real one's, and 5.0 installs as 4.5 does.
 WHEELS = {version: ROOT / ".venvs" / version / "bin" / "python" for version in ("4.2", "4.5")}
-LONGEST = {Path(__file__).with_name(f"test_{name}.py") for name in ("suite", "tour", "window")}
+LONGEST = {Path(__file__).with_name(f"test_{name}.py") for name in ("suite", "window")}
 PACKAGES = ("pytest", "pytest-timeout", "hypothesis", "mpmath", "distributed", "cryptography")
 PLATFORMS = {("Linux", "x86_64"): "linux-x64", ("Darwin", "arm64"): "macos-arm64", ("Darwin", "x86_64"): "macos-x64"}
 

@@ -9,19 +9,20 @@ import dataclasses
 import importlib
 import json
 import sys
+from pathlib import Path
 
 import bpy
 
-EXTENSION = "bl_ext.user_default.virtual_pinhole"
+sys.path.append(str(Path(__file__).parent))
+from inside_blender import enable, write_geometry
+
 FRAMES = range(1, 251)
 SECOND = 126  # the first frame of the second camera
 
 
 def room(name):
     """A module of the installed extension, enabled."""
-    if EXTENSION not in bpy.context.preferences.addons:
-        bpy.ops.preferences.addon_enable(module=EXTENSION)
-    return importlib.import_module(f"{EXTENSION}.viewcam_addon.{name}")
+    return importlib.import_module(f"{enable().__name__}.{name}")
 
 
 def make(file, json_file):
@@ -49,18 +50,11 @@ def make(file, json_file):
 
 
 def small_exact_pictures(scene):
-    render = scene.render
-    render.engine, render.resolution_x, render.resolution_y = "CYCLES", 64, 36
-    render.use_compositing = render.use_sequencer = False
+    write_geometry(scene, 64, 36)
+    scene.render.use_compositing = scene.render.use_sequencer = False
     cycles = scene.cycles
-    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling = 1, False, False
+    cycles.use_adaptive_sampling = False
     cycles.pixel_filter_type, cycles.filter_width = "BLACKMAN_HARRIS", 0.01
-    settings = render.image_settings
-    if hasattr(settings, "media_type"):
-        settings.media_type = "MULTI_LAYER_IMAGE"
-    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
-    layer = scene.view_layers[0]
-    layer.use_pass_z = layer.use_pass_position = layer.use_pass_normal = True
 
 
 def add_camera(name):

@@ -3,11 +3,13 @@
 install ZIP            installs and enables the extension, as the button in the preferences does
 make FILE              a small scene whose camera is stated in the four values, saved
 light FILE             adds lamps and a sky to FILE, and says how the render engine shall trace it
+set_all FILE JSON      a file in which everything that the add-on stores has been set, saved; and all of it
+read_all FILE JSON     writes everything that the add-on has stored in FILE
 render FILE OUT        opens FILE with the extension enabled and renders its frame 1
-trace FILE OUT         the same with the extension's engine
+trace FILE OUT         renders it with the extension's engine
+apply FILE OUT JSON    turns the four values off, moves the camera away, applies the Pinhole in JSON instead, and renders
 export FILE ARGUMENT…  opens FILE and runs `viewcam export` on it
 viewcam ARGUMENT…      runs `viewcam` in a process of its own, as check does
-apply FILE OUT JSON    the same, but turns the four values off, moves the camera away and applies the Pinhole in JSON instead
 pytest PACKAGES …      runs pytest with these arguments, from the checkout, with packages from the folder PACKAGES
 """
 
@@ -20,6 +22,8 @@ import sys
 import bpy
 
 EXTENSION = "bl_ext.user_default.virtual_pinhole"
+CAMERA = {"eye": (4.5, -3.25, 2.125), "look_at": (0.3, 0.1, -0.5), "up": (0.0, 0.5, 2.0), "distance": 15.25}
+EXACT = [4.5, -3.25, 2.125, 0.3, 0.1, -0.5, 0.0, 0.5, 2.0, 15.25]  # float32 can't hold all of them
 
 
 def enable():
@@ -36,29 +40,37 @@ def install(zip_path):
 
 
 def make(file):
+    scene = small_scene(320, 240)
+    scene.render.resolution_percentage = 50
+    values = scene.camera.virtual_pinhole
+    values.enabled = True
+    values.eye, values.look_at, values.up, values.distance = (4.5, -3.25, 2.125), (0.25, 0.125, -0.5), (0.0, 0.5, 2.0), 410.5
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+
+
+def small_scene(width, height):
+    """A monkey above a ground, in an empty file, and its camera."""
     enable()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scene = bpy.context.scene
     bpy.ops.mesh.primitive_monkey_add()
     bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 0, -1))
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    render = scene.render
-    render.engine = "CYCLES"
-    render.resolution_x, render.resolution_y, render.resolution_percentage = 320, 240, 50
-    if hasattr(render.image_settings, "media_type"):
-        render.image_settings.media_type = "MULTI_LAYER_IMAGE"
-    render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
-    render.image_settings.color_depth = "32"
-    scene.cycles.samples = 1
-    scene.cycles.use_denoising = False
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(scene.camera)
+    write_geometry(scene, width, height)
+    return scene
+
+
+def write_geometry(scene, width, height):
+    """Let renders be multilayer EXRs by Cycles, of a sample a pixel, with the passes of geometry."""
+    render, settings = scene.render, scene.render.image_settings
+    render.engine, render.resolution_x, render.resolution_y = "CYCLES", width, height
+    scene.cycles.samples, scene.cycles.use_denoising = 1, False
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
     layer = scene.view_layers[0]
     layer.use_pass_z = layer.use_pass_position = layer.use_pass_normal = True
-    values = camera.virtual_pinhole
-    values.enabled = True
-    values.eye, values.look_at, values.up, values.distance = (4.5, -3.25, 2.125), (0.25, 0.125, -0.5), (0.0, 0.5, 2.0), 410.5
-    bpy.ops.wm.save_as_mainfile(filepath=file)
 
 
 def light(file):
@@ -71,6 +83,66 @@ def light(file):
     settings = scene.virtual_pinhole_reference
     settings.level, settings.samples, settings.seed = "PATH", 4, 7
     bpy.ops.wm.save_as_mainfile(filepath=file)
+
+
+def set_all(file, json_file):
+    scene = small_scene(96, 64)
+    targets = [bpy.data.objects.new(name, None) for name in ("Eye", "Look-At")]
+    for block in targets:
+        scene.collection.objects.link(block)
+    targets[0].location, targets[1].location = (4.75, -3.0, 2.25), (0.25, 0.0, 0.0)
+    group = scene.camera.virtual_pinhole
+    set_properties(group, CAMERA | {"enabled": True, "eye_target": targets[0], "look_at_target": targets[1], "pole": "HOLD"})
+    group.exact = json.dumps(EXACT)
+    set_properties(scene.virtual_pinhole_reference, {})
+    bpy.context.view_layer.update()
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    read_all(file, json_file)
+
+
+def set_properties(group, values):
+    """Set each property of a group: to what is given, else to something that is not its default."""
+    for name, value in values.items():
+        setattr(group, name, value)
+    for each in group.bl_rna.properties:
+        is_free = not (each.is_readonly or each.is_hidden or each.type in ("POINTER", "STRING"))
+        if not is_free or each.identifier in (*values, "roll"):  # roll is read off the others
+            continue
+        setattr(group, each.identifier, another(each))
+
+
+def another(each):
+    """A value of a property that is not its default."""
+    if each.type == "ENUM":
+        return next(item.identifier for item in each.enum_items if item.identifier != each.default)
+    if getattr(each, "is_array", False):
+        return [value + 1 + i for i, value in enumerate(each.default_array)]
+    if each.type == "BOOLEAN":
+        return not each.default
+    value = each.default + 1 if each.type == "INT" else each.default * 1.5 + 0.125
+    return value if value <= each.hard_max else (each.default + each.hard_min) / 2
+
+
+def read_all(file, json_file):
+    open_file(file)
+    result = {}
+    for block in (bpy.data.objects["Camera"], bpy.data.cameras["Camera"], bpy.context.scene):
+        for name in (each.identifier for each in block.bl_rna.properties if each.identifier.startswith("virtual_pinhole")):
+            value = getattr(block, name)
+            if isinstance(value, bpy.types.PropertyGroup):
+                members = (each.identifier for each in value.bl_rna.properties if each.identifier not in ("rna_type", "name"))
+                result |= {f"{name}.{member}": plain(getattr(value, member)) for member in members}
+            else:
+                result[name] = plain(value)
+    with open(json_file, "w") as stream:
+        json.dump(result, stream)
+
+
+def plain(value):
+    """The value as JSON has it: a block by its name, a vector as a list."""
+    if isinstance(value, bpy.types.ID):
+        return value.name
+    return value if value is None or isinstance(value, str | bool | int | float) else list(value)
 
 
 def open_file(file):
@@ -128,6 +200,6 @@ def run_pytest(packages, *arguments):
 
 if __name__ == "__main__":
     command, *arguments = sys.argv[sys.argv.index("--") + 1 :]
-    known = (install, make, light, render, trace, export, viewcam, apply)
+    known = (install, make, light, set_all, read_all, render, trace, apply, export, viewcam)
     {"pytest": run_pytest, **{each.__name__: each for each in known}}[command](*arguments)
     sys.stdout.flush()

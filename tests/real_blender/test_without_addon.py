@@ -1,14 +1,12 @@
 """A file saved with the add-on, in a Blender without it: the same picture, and all values are there when the add-on returns."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from viewcam_addon import image
 
-SCRIPT = Path(__file__).with_name("values_in_blender.py")
 ADDON = ("--addons", "bl_ext.user_default.virtual_pinhole")
 HAS_ADDON = "hasattr(bpy.types.Object, 'virtual_pinhole')"
 
@@ -18,12 +16,12 @@ def folder(real_blender, tmp_path_factory):
     """scene.blend and its values.json, resaved.blend from a Blender without the add-on, and pictures of both."""
     folder = tmp_path_factory.mktemp("values")
     file, resaved = folder / "scene.blend", folder / "resaved.blend"
-    run(real_blender, "--python", SCRIPT, "--", "make", file, folder / "values.json")
+    real_blender.run_inside("set_all", file, folder / "values.json")
     render(real_blender, folder / "with", file, *ADDON, expected=True)
     render(real_blender, folder / "without", file, expected=False)
     run(real_blender, file, "--python-expr", f"import bpy; bpy.ops.wm.save_as_mainfile(filepath={str(resaved)!r})")
     render(real_blender, folder / "returned", resaved, *ADDON, expected=True)
-    run(real_blender, "--python", SCRIPT, "--", "read", resaved, folder / "returned.json")
+    real_blender.run_inside("read_all", resaved, folder / "returned.json")
     return folder
 
 
@@ -78,6 +76,6 @@ def test_a_value_that_is_lost_would_be_noticed(folder, real_blender, tmp_path):
     file = tmp_path / "lost.blend"
     file.write_bytes((folder / "resaved.blend").read_bytes())
     run(real_blender, *ADDON, file, "--python-expr", lost)
-    run(real_blender, "--python", SCRIPT, "--", "read", file, tmp_path / "lost.json")
+    real_blender.run_inside("read_all", file, tmp_path / "lost.json")
     values, returned = (json.loads(path.read_text()) for path in (folder / "values.json", tmp_path / "lost.json"))
     assert {name for name in values if values[name] != returned[name]} >= {"virtual_pinhole.zoom"}

@@ -446,12 +446,14 @@ class Level(_SeenThroughTheCamera):
 
 
 class _WithoutTheSidebar(Step):
-    """Its picture shows all of the viewport."""
+    """Its picture shows all of the viewport, without the tools."""
 
     def pose_for_the_picture(self):
+        region(*VIEWPORT)[0].spaces.active.show_region_toolbar = False
         yield from hide_the_sidebar()
 
     def after_the_picture(self):
+        region(*VIEWPORT)[0].spaces.active.show_region_toolbar = True
         yield from hide_the_sidebar(hidden=False)
 
 
@@ -471,7 +473,7 @@ class DragTheLookAtPoint(_WithoutTheSidebar):
             yield
 
     def by_script(self):
-        values().look_at = (0.5, 0.2, 1.3)
+        values().look_at = bpy.data.objects["Ball"].location
 
     def check(self):
         eye, look_at, up, _ = values().numbers()

@@ -27,7 +27,6 @@ def _rooms() -> list[ModuleType]:
         render_panels,
         scene_cameras,
         swipe,
-        view_menu,
     )
     from .rendering import engine
 
@@ -43,7 +42,6 @@ def _rooms() -> list[ModuleType]:
         engine,
         render_panels,
         file_menu,
-        view_menu,
         *followers,
     ]
 

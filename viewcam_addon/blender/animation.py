@@ -44,11 +44,13 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if depsgraph.id_type_updated("SCENE"):  # so it is, too, where what depends on what has changed, as by a new curve
         datablocks.forget_curves()
         resolution.follow(scene)
-    for sync, _ in _evaluated_cameras(depsgraph):
+    for sync, *_ in _evaluated_cameras(depsgraph):
         with _errors_told(sync.camera_object, scene):
             if not resolution.is_paused:
                 sync.updated(scene, depsgraph)
-            elif datablocks.has_driven_values(sync.camera_object):
+                continue
+            sync.doubt()
+            if datablocks.has_driven_values(sync.camera_object):
                 sync.at_frame(scene, depsgraph)
 
 
@@ -82,11 +84,16 @@ def _is_camera(block: bpy.types.ID) -> bool:
     return type(block) is _Object and block.type == "CAMERA" and storage.is_enabled(block)
 
 
-def _evaluated_cameras(depsgraph: bpy.types.Depsgraph) -> list[tuple[CameraSync, bpy.types.Object]]:
-    """The enabled cameras that Blender has just evaluated and that nobody is about to set, each with its evaluated object."""
-    blocks = [block for block in [update.id for update in depsgraph.updates] if type(block) is _Object]
-    cameras = [(block.original, block) for block in blocks if block.type == "CAMERA"]
-    known = [(CameraSync.of(original), block) for original, block in cameras if storage.is_enabled(original)]
+def _evaluated_cameras(depsgraph: bpy.types.Depsgraph) -> list[tuple[CameraSync, bpy.types.Object, bool]]:
+    """The enabled cameras that Blender has just evaluated and that nobody is about to set, each with its evaluated object, and
+    true where its data may be new."""
+    updates = [(update.id, update) for update in depsgraph.updates]
+    cameras = [(block, update) for block, update in updates if type(block) is _Object and block.type == "CAMERA"]
+    known = [
+        (CameraSync.of(block), block, update.is_updated_geometry)
+        for block, update in cameras
+        if storage.is_enabled(block.original)
+    ]
     return [each for each in known if not each[0].is_being_set]
 
 

@@ -28,13 +28,14 @@ from typing import Any, ClassVar
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from .. import intrinsics, rotation
 from .. import roll as rolls
 from ..camera_values import FACTORS, HOLD, CameraValues, moved_poses, without_border
 from ..errors import InputError
-from ..pinhole import Pinhole, Triple, basis, make_views
+from ..pinhole import Pinhole, Triple, basis_of_views, make_views
 from . import causes, conversion, datablocks, findings, hold, pose, preferences, storage, targets
 from .conversion import read, takes_part
 
@@ -86,6 +87,7 @@ class CameraSync:
         # The camera's state and its stored values as they were last seen to agree; None where nobody has looked.
         self._state: Any = None  # a tuple, and CameraValues; None until it is first seen
         self._values: Any = None
+        self._matrix: Matrix | None = None  # the one that the channels of this state make
         self._raw: tuple | None = None  # as Blender holds these values, once a frame has looked
         # The picture in which they decide all of the camera, each by itself, so that `carry` may bring it; None in no picture.
         self._carried_in: intrinsics.Frame | None = None
@@ -232,6 +234,7 @@ class CameraSync:
         if self.is_untouched(by_values=is_driven):
             self._is_moving = False  # the next move is another
         else:
+            self.doubt()
             with contextlib.suppress(InputError):  # the panel finds the same error and shows it
                 is_moved = self._adopt_move(scene, depsgraph)
         if is_driven and not is_moved:
@@ -240,25 +243,31 @@ class CameraSync:
     @classmethod
     def carry(
         cls,
-        cameras: list[tuple["CameraSync", bpy.types.Object]],
+        cameras: list[tuple["CameraSync", bpy.types.Object, bool]],
         scene: bpy.types.Scene,
         depsgraph: bpy.types.Depsgraph,
     ) -> list["CameraSync"]:
         """Bring those cameras, in one pass, of which a frame has changed the values alone, and to those that it has moved the
         values.
 
-        cameras : enabled ones, with their objects as Blender has evaluated them. Returns those that are left to `at_frame`.
+        cameras : enabled ones, with their objects as Blender has evaluated them, and true where it has evaluated their data.
+
+        Returns those that are left to `at_frame`.
         """
         if depsgraph.mode == "RENDER" or len(cameras) < _MANY:
-            return [sync for sync, _ in cameras]
+            return [sync for sync, *_ in cameras]
         left, stated, moved = [], [], []
         try:
             picture = without_border(datablocks.frame_of(scene))
         except InputError:  # no picture at all
-            return [sync for sync, _ in cameras]
-        for sync, evaluated in cameras:
+            return [sync for sync, *_ in cameras]
+        for sync, evaluated, has_new_data in cameras:
             camera_object = sync.camera_object
-            if sync._carried_in != picture or camera_object.parent or camera_object.constraints:
+            if sync._carried_in is not picture and sync._carried_in != picture:
+                left.append(sync)
+                continue
+            sync._carried_in = picture  # two that are one and the same are compared in no time
+            if camera_object.parent or camera_object.constraints:
                 left.append(sync)
                 continue
             if not datablocks.is_known_as_animated(camera_object):
@@ -269,7 +278,7 @@ class CameraSync:
                     left.append(sync)
                 continue
             raw = storage.raw(evaluated)
-            if raw is None or conversion.state_of(camera_object) != sync._state:
+            if raw is None or not sync._stands(has_new_data):
                 left.append(sync)
                 continue
             values = sync._values if raw == sync._raw else storage.animated(sync._values, raw)
@@ -277,17 +286,15 @@ class CameraSync:
                 stated.append((sync, values, raw))
         if moved:
             left += cls._follow(moved, picture)
-        poses = _poses_of([values for _, values, _ in stated])
-        valid = make_views(*poses.swapaxes(0, 1))
-        if not valid.all():
-            left += [sync for (sync, *_), is_valid in zip(stated, valid, strict=True) if not is_valid]
-            stated, poses = [each for each, is_valid in zip(stated, valid, strict=True) if is_valid], poses[valid]
         if stated:
-            axes = np.stack(basis(*poses.swapaxes(0, 1)), axis=-1)
-            locations = poses[:, 0].astype(np.float32)
-            modes = np.array([sync._state[0].mode for sync, *_ in stated])
-            for mode in set(modes.tolist()):
-                of_mode = np.flatnonzero(modes == mode)
+            poses = _poses_of([values for _, values, _ in stated])
+            axes, valid = basis_of_views(*poses.swapaxes(0, 1))
+            left += [stated[i][0] for i in np.flatnonzero(~valid)]
+            of_modes: dict[str, list[int]] = {}
+            for i in np.flatnonzero(valid).tolist():
+                of_modes.setdefault(stated[i][0]._state[0].mode, []).append(i)
+            axes, locations = axes.transpose(1, 2, 0), poses[:, 0].astype(np.float32)
+            for mode, of_mode in of_modes.items():
                 left += cls._bring([stated[i] for i in of_mode], mode, locations[of_mode], axes[of_mode], scene)
         return left
 
@@ -332,7 +339,8 @@ class CameraSync:
                 eye, look_at, up = map(tuple, pose_after)
                 sync._values, sync._raw = values.animated(eye, look_at, up, distance, 2.0**-53), None
                 storage.follow(sync.camera_object, sync._values, vectors)
-            sync._state, sync._rests, sync._is_moving, sync._placed = state, (), False, ()
+            sync._state, sync._matrix = state, sync.camera_object.matrix_basis.copy()
+            sync._rests, sync._is_moving, sync._placed = (), False, ()
         return left
 
     def _distance_of_lens(self, picture: intrinsics.Frame) -> float | None:
@@ -347,6 +355,16 @@ class CameraSync:
             return values.distance
         distance = values.stored_distance(seen[0] * (picture.resolution_x / picture.size[0]), picture, fit)
         return distance if 0 < distance <= intrinsics.LARGEST_FLOAT32 else None
+
+    def _stands(self, has_new_data: bool) -> bool:
+        """True if the camera is in the state in which it was last seen to agree with its values, give or take a rounding.
+
+        has_new_data : false where its lens can't be another one.
+        """
+        camera_object = self.camera_object
+        if has_new_data:
+            return conversion.state_of(camera_object) == self._state
+        return camera_object.matrix_basis == self._matrix and camera_object.rotation_mode == self._state[0].mode
 
     def _is_free(self, state: tuple) -> bool:
         """True if nothing keeps the values of a camera that Blender has moved from following."""
@@ -368,17 +386,22 @@ class CameraSync:
         locations : their places, (n, 3).
         axes : (n, 3, 3), u, v and w as columns.
 
-        Returns those that have no such lens.
+        Returns those that do not stand there now, or have no such lens.
         """
         left, cameras = [], [sync.camera_object for sync, *_ in stated]
-        turns = pose.set_rotations(cameras, mode, rotation.numbers(axes, mode), axes)
-        for (sync, values, raw), location, turn in zip(stated, map(tuple, locations.tolist()), turns.tolist(), strict=True):
+        places = [tuple(location) for location in locations.tolist()]
+        for (sync, *_), location in zip(stated, places, strict=True):
+            if location != sync._state[0].location:
+                sync.camera_object.location = location
+        turns, matrices = pose.set_rotations(cameras, mode, rotation.numbers(axes, mode), axes)
+        for (sync, values, raw), location, turn, matrix in zip(stated, places, turns.tolist(), matrices, strict=True):
             camera_object, (channels, *lens), before = sync.camera_object, sync._state, sync._values
-            if location != channels.location:
-                camera_object.location = location
+            if matrix.translation[:] != location:  # a script has made deltas of its channels
+                left.append(sync)
+                continue
             if storage.is_focused_on_look_at(camera_object):
                 conversion.store(camera_object.data.dof, focus_distance=math.dist(values.eye, values.look_at))
-            sync._state = (rotation.Channels(mode, location, tuple(turn), *channels[3:]), *lens)
+            sync._state, sync._matrix = (rotation.Channels(mode, location, tuple(turn), *channels[3:]), *lens), matrix
             sync._values, sync._raw, sync._rests, sync._is_moving, sync._placed = values, raw, (), False, ()
             if values.zoomed_distance != before.zoomed_distance:
                 try:
@@ -432,6 +455,10 @@ class CameraSync:
         if camera_object.parent or camera_object.constraints or self._state != conversion.state_of(camera_object):
             return False
         return by_values or self._values == storage.load(camera_object)
+
+    def doubt(self) -> None:
+        """Take it that the camera may have been moved without its values: `carry` leaves it alone until they agree."""
+        self._carried_in = None
 
     def forget(self) -> None:
         """Undo has brought back other values, or another camera."""
@@ -571,6 +598,7 @@ class CameraSync:
     def _agree(self, rests: tuple[tuple[tuple, CameraValues], ...] = (), is_moving: bool = False) -> None:
         """Take note that the camera is where its values say."""
         self._state = channels, kind, *_ = conversion.state_of(self.camera_object)
+        self._matrix = self.camera_object.matrix_basis.copy()
         self._values = values = storage.load(self.camera_object)
         self._raw, self._rests, self._is_moving = None, rests, is_moving
         is_simple = values.pole != HOLD and not values.follows and values.set_for == values.counted_in

@@ -51,7 +51,7 @@ LENSES = {
 LOOKS = dict.fromkeys(LENSES, "distance") | {"roll": "up"}
 
 
-_known_curves: dict[tuple[int, int], bool] = {}  # by an action and its slot: `is_animated` when it was last looked through
+_known_curves: dict[int, bool] = {}  # by a camera's session_uid: `is_animated` when its action was last looked through
 
 
 def is_animated(camera_object: bpy.types.Object) -> bool:
@@ -60,23 +60,21 @@ def is_animated(camera_object: bpy.types.Object) -> bool:
 
 
 def is_known_as_animated(camera_object: bpy.types.Object) -> bool:
-    """`is_animated`, in a fifth of the time: an action is looked through once until `forget_curves`.
+    """`is_animated`, in a tenth of the time: a camera's action is looked through once until `forget_curves`.
 
-    For a frame change, before which Blender has told of curves that are new: those that have been removed may be missed.
+    For a frame change, before which Blender has told of curves, actions and drivers that are new: those that have been removed
+    may be missed.
     """
-    data = camera_object.animation_data
-    if not data:
-        return False
-    if data.drivers or data.nla_tracks or not data.action:
-        return is_animated(camera_object)
-    key = data.action.session_uid, versions.slot_of(data)
-    if key not in _known_curves:
-        _known_curves[key] = is_animated(camera_object)
-    return _known_curves[key]
+    known = _known_curves.get(camera_object.session_uid)
+    if known is None:
+        known, data = is_animated(camera_object), camera_object.animation_data
+        if not data or not (data.drivers or data.nla_tracks):
+            _known_curves[camera_object.session_uid] = known
+    return known
 
 
 def forget_curves() -> None:
-    """Take it that any action may have other curves now."""
+    """Take it that any camera may have another action now, or its action other curves."""
     _known_curves.clear()
 
 

@@ -1,11 +1,11 @@
-"""Holding the roll through the pole (`virtual_pinhole.pole` = HOLD): which poses came before the one that is stated.
+"""Hold the roll through the pole (`virtual_pinhole.pole` = HOLD): it is carried along from the poses before the stated one.
 
-While the artist edits, it is the pose that the camera stands in: each edit carries its axes along (roll.py) and writes the new
-roll beside the values. In an animation it is every whole frame since the range's first, read from the curves: the roll at a
-frame is `held_roll` plus what all steps up to it have carried, backwards before the first frame. A frame's roll so depends on
-the file alone, not on the frames that were shown before, and is the same in a window, in `blender -b` and at the sub-frames of
-motion blur, where a last step leads from the whole frame before. Values that differ from the curves, edited and not keyed yet,
-are one step more.
+While the artist edits, that is the pose that the camera stands in: each edit carries its axes along (roll.py) and writes the
+new roll beside the values. In an animation these are the poses of all whole frames since the range's first, read from the
+curves: the roll at a frame is `held_roll` plus what all steps up to it have carried, backwards before the first frame. So a
+frame's roll depends on the file alone, not on the frames that were shown before, and is the same in a window, in `blender -b`
+and at the sub-frames of motion blur, where a last step leads from the whole frame before. Values that differ from the
+curves, edited and not keyed yet, are one step more.
 
 `held_roll` may be keyframed, and is added as it is at each frame. `pole` and `hold_within` may not: they count for all frames
 alike.

@@ -16,11 +16,13 @@ from collections.abc import Iterator, Sequence
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from .. import rotation
 from ..errors import InputError
 from ..rotation import Channels, float64
+from . import versions
 
 Array = NDArray[np.float64]
 
@@ -66,21 +68,25 @@ def set_rotation(camera_object: bpy.types.Object, turn: Array, before: Sequence[
     set_rotations([camera_object], channels.mode, numbers[None], (channels.delta @ turn * channels.signs)[None])
 
 
-def set_rotations(cameras: Sequence[bpy.types.Object], mode: str, numbers: Array, axes: Array) -> NDArray[np.float32]:
+def set_rotations(
+    cameras: Sequence[bpy.types.Object], mode: str, numbers: Array, axes: Array
+) -> tuple[NDArray[np.float32], list[Matrix]]:
     """Rotate n cameras of one mode, each by its numbers or those beside them that float32 makes the better matrix of.
 
     numbers : (n, k), of the mode.
     axes : (n, 3, 3), those wanted, as columns.
 
-    Returns the numbers that were set.
+    Returns the numbers that were set, and the cameras' matrices then.
     """
     name, best = _ROTATIONS.get(mode, "rotation_euler"), numbers.astype(np.float32)
     for camera_object, turn in zip(cameras, best.tolist(), strict=True):
         setattr(camera_object, name, turn)
-    errors = rotation.largest_error(float64([camera_object.matrix_basis for camera_object in cameras]), axes)
+    matrices = [camera_object.matrix_basis.copy() for camera_object in cameras]
+    errors = rotation.largest_error(versions.numbers_of(matrices), axes)
     for i in np.flatnonzero(errors > _ROUNDING):
         best[i] = _set_better(cameras[i], name, best[i], axes[i], errors[i])
-    return best
+        matrices[i] = cameras[i].matrix_basis.copy()
+    return best, matrices
 
 
 def _set_better(
@@ -93,7 +99,7 @@ def _set_better(
         for turn in tried:
             setattr(camera_object, name, turn)
             matrices.append(camera_object.matrix_basis.copy())
-        errors = rotation.largest_error(float64(matrices), axes)
+        errors = rotation.largest_error(versions.numbers_of(matrices), axes)
         if errors.min() < least:
             best, least = tried[errors.argmin()], errors.min()
         at_once *= 2

@@ -102,7 +102,7 @@ def raw(camera_object: bpy.types.Object) -> Raw | None:
     """
     stored = versions.stored_properties(camera_object.virtual_pinhole)
     try:
-        rounded = (*stored["eye"], *stored["look_at"], *stored["up"], stored["distance"])
+        rounded = (*stored["eye"].to_list(), *stored["look_at"].to_list(), *stored["up"].to_list(), stored["distance"])
     except KeyError:
         return None
     return None if _ASKED in stored else (rounded, stored.get("exact", ""), tuple(map(stored.get, FACTORS)))
@@ -138,7 +138,7 @@ def _numbers(text: str, rounded: tuple[float, ...]) -> tuple[tuple[float, ...], 
     if not exact:
         return rounded, False
     columns = zip(*exact, _shown_values(exact[0]), rounded, strict=True)
-    numbers = tuple([full if value in (short, zeroed) else value for full, short, zeroed, value in columns])
+    numbers = tuple([full if value == short else full if value == zeroed else value for full, short, zeroed, value in columns])
     return numbers, numbers == exact[0]
 
 

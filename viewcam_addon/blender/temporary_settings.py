@@ -22,7 +22,7 @@ LARGEST_INDEX = 32767
 class Overrides:
     """Sets what is Blender's for a while, and remembers how to restore it.
 
-    lasting : the overrides of all renders that this one is of, which end after it; by default these themselves.
+    lasting : the overrides of a series of renders of which this is one, which end after it; by default these themselves.
     """
 
     def __init__(self, stack: contextlib.ExitStack, lasting: "Overrides | None" = None) -> None:

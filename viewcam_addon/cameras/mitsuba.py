@@ -270,18 +270,24 @@ def _read(element: ElementTree.Element, text: Callable[[str], str]) -> str:
 def _transform(steps: Sequence[ElementTree.Element], name: str, text: Callable[[str], str]) -> "np.ndarray | _Look":
     moves = [step for step in steps if isinstance(step.tag, str)]
     matrices = [_step(step, name, text) for step in moves]
-    if len(matrices) == 1:
-        return matrices[0]
-    if len(matrices) == 2 and isinstance(matrices[1], _Look) and _is_mirror(matrices[0]):
-        return _Look(matrices[1].eye, matrices[1].target, matrices[1].up, True)
+    return _multiplied(matrices[::-1])
+
+
+def _multiplied(factors: Sequence["np.ndarray | _Look"]) -> "np.ndarray | _Look":
+    """The product of transforms, of which the last comes first; a look-at stays one, alone or after a mirror."""
+    first, *others = factors or (np.eye(4),)
+    if isinstance(first, _Look) and not others:
+        return first
+    if isinstance(first, _Look) and len(others) == 1 and _is_mirror(others[0]):
+        return _Look(first.eye, first.target, first.up, True)
     result = np.eye(4)
-    for step in matrices:
-        result = (step.matrix() if isinstance(step, _Look) else step) @ result
+    for factor in factors:
+        result = result @ (factor.matrix() if isinstance(factor, _Look) else factor)
     return result
 
 
-def _is_mirror(step: object) -> bool:
-    return isinstance(step, np.ndarray) and step.tolist() == np.diag([-1.0, 1, 1, 1]).tolist()
+def _is_mirror(factor: object) -> bool:
+    return isinstance(factor, np.ndarray) and factor.tolist() == np.diag([-1.0, 1, 1, 1]).tolist()
 
 
 def _step(step: ElementTree.Element, name: str, text: Callable[[str], str]) -> "np.ndarray | _Look":
@@ -441,14 +447,7 @@ def _product(text: str, at: int) -> "np.ndarray | _Look":
         if after.text not in (".", "@"):
             break
         at = after.end
-    if len(factors) == 1:
-        return factors[0]
-    if len(factors) == 2 and isinstance(factors[0], _Look) and _is_mirror(factors[1]):
-        return _Look(factors[0].eye, factors[0].target, factors[0].up, True)
-    result = np.eye(4)
-    for step in factors:
-        result = result @ (step.matrix() if isinstance(step, _Look) else step)
-    return result
+    return _multiplied(factors)
 
 
 def _call(name: str, values: list, named: dict, text: str, at: int) -> "np.ndarray | _Look":

@@ -1,4 +1,4 @@
-"""Light that is a renderer's choice: what of a picture is taken out of the comparison for it.
+"""Light that is a renderer's choice, and the pixels that are taken out of a comparison for it.
 
 Which of several surfaces in one place a ray of Cycles meets, and whether one of them shadows the other, is what float32
 rounds: a ray leaves a surface at the distance 0, leaves out that one triangle (`intersection_skip_self` in kernel/bvh/util.h),
@@ -12,8 +12,8 @@ than without, or with another lamp in the scene. Rejected: doing what Cycles doe
 light tree, has other weights than the one that is compared; and to switch importance sampling off on both sides, which takes
 lamps out of mirrors.
 
-So the tracer tells how much light is of these kinds, at most (core/integrators/path.h). Pixels of which that is a share to
-speak of are taken out; the others keep it as a tolerance.
+So the tracer tells how much light is of these kinds, at most (core/integrators/path.h). Pixels in which it is a tenth of the
+light or more are taken out; the others keep it as a tolerance.
 """
 
 from collections.abc import Callable, Mapping
@@ -59,14 +59,14 @@ class CoincidentLight:
         return bool(self.pairs or self.seen_otherwise)
 
     def of(self, sides: Sides) -> Array:
-        """(height, width): of a quantity, the largest of its channels."""
+        """(height, width): the most of this light that a quantity has, over its channels and in the mean around each pixel."""
         if sides.name == "Alpha":
             return np.zeros(sides.broken.shape)
         values = np.nan_to_num(values_of(self.light, sides.name))
         return np.maximum(values, noise.mean_around(values)).max(axis=-1)
 
     def rest(self, combined: Sides) -> "Rest":
-        """The rest of a comparison without the pixels of which this light is a share to speak of."""
+        """The comparison without the pixels in which this light is _SHARE of all, or more."""
         light = self.of(combined)
         return Rest(self, (light > 0.0) & (light >= _SHARE * self.total.max(axis=-1)))
 
@@ -79,11 +79,11 @@ class Rest:
     out: NDArray[np.bool_]
 
     def tolerance(self, sides: Sides) -> Array:
-        """(height, width): of a quantity, the light that may be there or not in the pixels that are left."""
+        """(height, width): the light of a quantity that may be there or not in the pixels that are left."""
         return np.where(self.out, 0.0, self.coincident.of(sides))
 
     def of(self, sides: Sides) -> Sides:
-        """The sides, the same where pixels are taken out, and with the noise of that light."""
+        """The sides, with the reference's values on both where pixels are taken out, and with the noise of this light added."""
         test = np.where(self.out[..., None], sides.reference, sides.test)
         variance = sides.variance
         if sides.name == "Combined":

@@ -80,7 +80,7 @@ class Claims:
         self._unlock(_byte(shot))
 
     def _lock(self, byte: int, shared: bool = False, wait: bool = False) -> bool | None:
-        """True if it is had; None where the file system has no locks."""
+        """True if this batch has the lock now, False if another one has it; None where the file system has no locks."""
         if _ON_WINDOWS:
             return True
         kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX

@@ -72,7 +72,7 @@ def verdict(result: Result) -> str:
     largest = _part(figures, "position").get("max")
     words = f"identical to {plain(largest)} px" if isinstance(largest, float) else "identical"
     words = "the same within noise" if figures.get("noisy") else words
-    not_modeled = _part(check, "not_modeled") or _part(check, "not_modelled")  # as folders of the first months have it
+    not_modeled = _part(check, "not_modeled")
     return (
         f"{words}, {but_for(not_modeled)}"
         if result.answer == SAME_BUT and isinstance(not_modeled.get("names"), list)

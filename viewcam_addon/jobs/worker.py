@@ -19,7 +19,7 @@ from .served_renderer import ServedRenderer
 
 
 class _Blender:
-    """The one that this process keeps, and for what."""
+    """The Blender that this process keeps, with the scene that it has open."""
 
     def __init__(self) -> None:
         self._scene: dict[str, Any] = {}
@@ -86,7 +86,7 @@ def dask_teardown(_worker: object) -> None:
 
 
 def _forget_dasks_variables() -> None:
-    """Dask tells its workers to compute in one thread each, and what libraries add up in one thread may be other bits."""
+    """Take back the variables by which Dask has its workers compute in one thread: libraries may add up to other bits there."""
     import dask
 
     for name in dask.config.get("distributed.nanny.pre-spawn-environ", {}):
@@ -94,7 +94,7 @@ def _forget_dasks_variables() -> None:
 
 
 def _refuse_other(here: dict[str, Any], batch: dict[str, Any]) -> None:
-    """The pictures would be others, and their settings not those that the batch looks for."""
+    """Raise InputError where the pictures would be made here from something else than the batch's."""
     differing = [key for key in sorted(here.keys() | batch.keys()) if here.get(key) != batch.get(key)]
     if differing:
         raise InputError(

@@ -81,12 +81,12 @@ def entry(covered: Coverage, number: int) -> dict[str, Any] | None:
 
 
 def _places() -> list[tuple[float, float]]:
-    """In a pixel, from its lower left corner."""
+    """The places in a pixel where what it shows is counted, from its lower left corner."""
     return [((i + 0.5) / SAMPLES, (i * _STEP % SAMPLES + 0.5) / SAMPLES) for i in range(SAMPLES)]
 
 
 def _counted(at_samples: NDArray[np.int32]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Pixels, their instances and at how many of their places these are: by pixels, then the most first, then by number.
+    """(pixels, instances, counts): an instance stands at so many of a pixel's places; by pixel, then the most first.
 
     at_samples : (SAMPLES, pixels), −1 for none.
     """
@@ -107,7 +107,7 @@ def _counted(at_samples: NDArray[np.int32]) -> tuple[NDArray[np.intp], NDArray[n
 
 
 def _names(instances: list[Instance]) -> list[str]:
-    """An object's, and of its further places with their numbers: Tree, Tree #1; each once."""
+    """A name for each instance: its object's, from the second place on with a number (Tree, Tree #1), and no name twice."""
     taken: set[str] = {each.key[0] for each in instances}
     result = []
     for name, number in (each.key for each in instances):

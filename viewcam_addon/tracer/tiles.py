@@ -1,6 +1,6 @@
 """A picture in tiles over threads, watched and stopped by whoever waits for it.
 
-Whoever computes a tile computes every pixel alone, so that threads and tiles change no bit of the result.
+Each pixel is computed by itself, so that threads and tiles change no bit of the result.
 """
 
 import contextvars

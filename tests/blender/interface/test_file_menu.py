@@ -17,6 +17,7 @@ from viewcam_addon import cameras as formats
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import findings
 from viewcam_addon.blender.interface import clipboard, file_menu
+from viewcam_addon.blender.interface.camera_options import READING, ReadingOptions
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.cameras import Camera, Options, distortion, naming
 from viewcam_addon.jobs.job import Job
@@ -787,6 +788,114 @@ def test_after_a_text_in_which_y_is_up_the_answer_beside_paste_is_named_and_turn
 def test_a_camera_of_ours_whose_up_is_y_is_pasted_without_a_word_about_it(posed_camera, capfd):
     assert bpy.ops.viewcam.paste_camera(text="eye=(0, 0, 9) look_at=(0, 0, 0) up=(0, 1, 0) d=900") == {"FINISHED"}
     assert "Paste Upright" not in capfd.readouterr().out
+
+
+class Asking(ReadingOptions):
+    """Paste as it is invoked by a click, with nothing chosen yet."""
+
+    invoke, draw, _cameras_of = (vars(clipboard.VIEWCAM_OT_paste_camera)[name] for name in ("invoke", "draw", "_cameras_of"))
+    camera, named = "Camera", ""
+    axes, scale, unmirrored, without_distortion = "as_is", 1.0, False, False
+    up_from = angle_unit = pixel = pose = "UNSTATED"
+
+    def __init__(self, text):
+        self.text, self.drawn = text, []
+        self.layout = SimpleNamespace(prop=lambda _, name: self.drawn.append(name), label=self._labeled, separator=lambda: None)
+
+    def _labeled(self, text, **_look):
+        self.drawn.append(text)
+
+    def click(self):
+        """Click it; "asks" where it shows a dialog, else "pastes"."""
+        self.execute = lambda _context: {"FINISHED"}
+        dialog = SimpleNamespace(invoke_props_dialog=lambda *_, **__: {"RUNNING_MODAL"})
+        context = SimpleNamespace(window_manager=dialog)
+        (outcome,) = self.invoke(context, None)
+        return {"RUNNING_MODAL": "asks", "FINISHED": "pastes"}[outcome]
+
+
+def matrices_of(pinhole):
+    """(4, 4) of a camera that is not mirrored, in each of formats.POSES: by whose axes, and from where to where."""
+    u, v, w = pinhole.basis()
+    matrices = {}
+    for whose, axes in {"opencv": (u, -v, -w), "opengl": (u, v, w)}.items():
+        to_world = np.eye(4)
+        to_world[:3] = np.column_stack([*axes, pinhole.eye])
+        matrices |= {f"c2w_{whose}": to_world, f"w2c_{whose}": np.linalg.inv(to_world)}
+    return matrices
+
+
+UNSAID = Pinhole((7, -6, 5), (1, 2, 0.5), (0.1, 0.2, 1), 1500, 1920, 1080)
+
+
+def with_matrix(matrix, name="pose"):
+    return f"K = [[1500, 0, 959.5], [0, 1500, 539.5], [0, 0, 1]]\n{name} = {matrix.tolist()}"
+
+
+def is_unsaid(camera_object, scene):
+    """True if the camera is UNSAID."""
+    read = cameras.read(camera_object, scene)
+    apart = [np.subtract(read.eye, UNSAID.eye), *np.subtract(read.basis(), UNSAID.basis())]
+    return np.abs(apart).max() < 16 * 2.0**-24
+
+
+def test_paste_asks_which_way_a_matrix_goes_first_and_has_no_answer_of_its_own(posed_camera):
+    asking = Asking(with_matrix(matrices_of(UNSAID)["c2w_opencv"]))
+    assert asking.click() == "asks"
+    asking.draw(bpy.context)
+    answer = asking.drawn.index("pose")
+    question = " ".join(asking.drawn[:answer])
+    assert "pose" in question and "which way it goes is not said" in question and "--" not in question, asking.drawn
+    assert asking.drawn.count("pose") == 1 and not set(READING) & set(asking.drawn[:answer])
+    pose = bpy.ops.viewcam.paste_camera.get_rna_type().properties["pose"]
+    assert pose.default == "UNSTATED" and pose.is_skip_save, "an answer is a guess for the next text"
+
+
+def test_a_question_of_paste_that_is_not_answered_changes_nothing(posed_camera):
+    before = everything(posed_camera)
+    for matrix in matrices_of(UNSAID).values():
+        with pytest.raises(RuntimeError, match="which way it goes is not said"):
+            paste(with_matrix(matrix))
+    assert everything(posed_camera) == before
+
+
+@pytest.mark.parametrize("way", formats.POSES)
+def test_each_answer_of_paste_takes_the_matrix_as_its_words_say(posed_camera, scene, way):
+    """An answer that stood for another would give one of the others' cameras, and all four are different."""
+    label = bpy.ops.viewcam.paste_camera.get_rna_type().properties["pose"].enum_items[way].name
+    goes, whose = way.split("_")
+    assert label.startswith({"w2c": "World to Camera", "c2w": "Camera to World"}[goes])
+    assert label.endswith({"opencv": "OpenCV's Axes", "opengl": "OpenGL's Axes"}[whose])
+    for written, matrix in matrices_of(UNSAID).items():
+        asking = Asking(with_matrix(matrix))
+        asking.pose = way
+        assert asking.click() == "pastes", "it is answered"
+        assert paste(with_matrix(matrix), pose=way) == {"FINISHED"}
+        assert is_unsaid(posed_camera, scene) == (written == way), f"{written}, taken as {way}"
+
+
+def test_a_matrix_whose_name_says_which_way_it_goes_is_pasted_without_a_question(posed_camera, scene):
+    for name, way in (("w2c", "w2c_opencv"), ("extrinsic", "w2c_opencv"), ("matrix_world", "c2w_opengl")):
+        text = with_matrix(matrices_of(UNSAID)[way], name)
+        assert Asking(text).click() == "pastes", name
+        paste(text)
+        assert is_unsaid(posed_camera, scene), name
+
+
+def test_of_several_cameras_that_are_not_known_paste_asks_the_way_and_which_at_once(posed_camera, scene):
+    matrices = matrices_of(UNSAID)["c2w_opencv"], np.eye(4)
+    text = json.dumps(
+        {
+            f"cam{i}": {"K": [[1500, 0, 960], [0, 1500, 540], [0, 0, 1]], "pose": each.tolist()}
+            for i, each in enumerate(matrices)
+        }
+    )
+    asking = Asking(text)
+    assert asking.click() == "asks" and asking.names == ["cam0", "cam1"]
+    asking.draw(bpy.context)
+    assert [name for name in asking.drawn if name in ("pose", "named", "axes")] == ["pose", "named", "axes"], asking.drawn
+    assert paste(text, pose="c2w_opencv", named="cam0") == {"FINISHED"}
+    assert is_unsaid(posed_camera, scene)
 
 
 def test_undo_takes_a_pasted_camera_back(camera_object):

@@ -34,7 +34,6 @@ from viewcam_addon.blender.interface import (
     render_panels,
     scene_cameras,
     swipe,
-    view_menu,
 )
 from viewcam_addon.image import SETTINGS
 from viewcam_addon.labels import KINDS
@@ -345,19 +344,20 @@ def test_no_label_of_the_panel_reads_as_the_subjects_distance(posed_camera):
     assert "Distance" not in result
 
 
-def test_the_box_does_not_tick_where_the_camera_is_no_pinhole(posed_camera):
-    def is_offered():
-        layout = Layout()
-        panel.VIEWCAM_PT_sidebar.draw_header(SimpleNamespace(layout=layout), bpy.context)
-        ((_, name, _, row, _),) = layout.drawn
-        return name == "enabled" and row.is_all("enabled")
+def box_is_offered():
+    layout = Layout()
+    panel.VIEWCAM_PT_sidebar.draw_header(SimpleNamespace(layout=layout), bpy.context)
+    ((_, name, _, row, _),) = layout.drawn
+    return name == "enabled" and row.is_all("enabled")
 
+
+def test_the_box_does_not_tick_where_the_camera_is_no_pinhole(posed_camera):
     group = posed_camera.virtual_pinhole
     cases = ("PERSP", False, True), ("ORTHO", False, False), ("PANO", False, False), ("ORTHO", True, True)
     for kind, ticked, offered in cases:
         posed_camera.data.type, group.enabled = "PERSP", ticked
         posed_camera.data.type = kind
-        assert is_offered() == offered, f"{kind}, ticked: {ticked}"
+        assert box_is_offered() == offered, f"{kind}, ticked: {ticked}"
 
 
 NARROWEST = 202  # pixels, below which Blender hides the sidebar
@@ -448,6 +448,7 @@ def test_a_camera_that_is_no_pinhole_is_not_offered_to_be_used(posed_camera, emp
         posed_camera.parent = empty("Stretched", scale=scale)
         bpy.context.view_layer.update()
         assert properties_drawn(panel.VIEWCAM_PT_sidebar)["enabled"].is_all("enabled") == offered, scale
+        assert box_is_offered() == offered, f"the box in the header, {scale}"
 
 
 def test_what_a_constraint_or_a_driver_places_is_read_only_with_a_word_why(posed_camera, empty):
@@ -924,7 +925,7 @@ def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(regi
         return SimpleNamespace()
 
     layout = SimpleNamespace(operator=operator, menu=menus.append, separator=lambda: None)
-    view_menu.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
+    panel.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
     classes = (*moving.CLASSES, *operators.CLASSES, *baking.CLASSES, *clipboard.IN_MENUS, *scene_cameras.OPERATORS)
     classes += (*photo_matching.OPERATORS, *swipe.CLASSES)
     assert set(entries) == {each.bl_idname for each in classes} and menus == ["VIEWCAM_MT_copy_camera_as"]
@@ -936,9 +937,9 @@ def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(regi
 def test_the_menu_stands_under_view_cameras(registered_addon):
     menus = []
     layout = SimpleNamespace(menu=menus.append, separator=lambda: None)
-    view_menu._draw(SimpleNamespace(layout=layout), bpy.context)
+    panel._draw_menu(SimpleNamespace(layout=layout), bpy.context)
     assert menus == ["VIEWCAM_MT_cameras"] and hasattr(bpy.types, menus[0])
-    assert view_menu._draw in bpy.types.VIEW3D_MT_view_cameras._dyn_ui_initialize()
+    assert panel._draw_menu in bpy.types.VIEW3D_MT_view_cameras._dyn_ui_initialize()
 
 
 def test_the_menu_goes_with_the_add_on(registered_addon):

@@ -112,9 +112,18 @@ def test_a_world_that_tells_other_rays_apart_is_what_diffuse_ones_see_and_is_nam
     mix.inputs[1].default_value, mix.inputs[2].default_value = (0, 0, 1, 1), (0.5, 0, 0, 1)
     tree.color(mix.outputs[0])
     exported, reasons = export()
-    lights, seen = (exported.images[each.image].pixels for each in (exported.world, exported.world.backdrop))
-    assert (lights == (0.5, 0, 0)).all() and (seen == (0, 0, 1)).all()
+    assert exported.world.radiance == (0.5, 0, 0) and exported.world.backdrop.radiance == (0, 0, 1) and not exported.images
     assert "all but the camera's see what diffuse ones do" in reasons
+
+
+def test_a_world_whose_nodes_do_not_vary_is_one_color_and_no_image(tree, export):
+    """Cycles samples the light of an image, and that of one color by no table."""
+    invert = tree.add("ShaderNodeInvert")
+    invert.inputs["Color"].default_value = (0.75, 0.5, 0.25, 1)
+    tree.color(invert.outputs[0])
+    exported, reasons = export()
+    assert exported.world.radiance == (0.25, 0.5, 0.75) and exported.world.image is None and not exported.images
+    assert "both sides show the color that Cycles renders" in reasons and not exported.not_modeled
 
 
 def test_the_sun_of_a_sky_is_a_lamp_of_its_direction_and_size(tree, export):
@@ -149,7 +158,7 @@ def test_links_that_go_in_a_circle_are_none(tree, export):
     tree.color(second.outputs[0])
     tree.link(second.outputs[0], first.inputs[0])
     exported, reasons = export()
-    assert (exported.images[exported.world.image].pixels == 0.5).all()
+    assert exported.world.radiance == (0.5, 0.5, 0.5)
     assert ("go in a circle" in reasons) == NEWER
 
 

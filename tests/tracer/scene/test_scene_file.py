@@ -140,13 +140,6 @@ def test_a_plane_is_two_triangles_with_a_uv_map_along_its_edges(example, read_do
     assert np.allclose(corners[..., :2], floor.corner_uvs * 8 - 4)
 
 
-def test_colors_of_a_mesh_are_read_as_the_first_files_spell_them(example, read_document):
-    document = copy.deepcopy(example)
-    tent = document["geometries"]["tent"]
-    tent["corner_colours"] = np.full((len(tent["triangles"]), 3, 3), 0.25).tolist()
-    assert (read_document(document).geometries["tent"].corner_colors == 0.25).all()
-
-
 @pytest.mark.parametrize(
     ("path", "value", "words"),
     [

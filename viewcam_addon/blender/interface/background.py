@@ -6,7 +6,6 @@ it. A batch is one of a copy of the file as it stands, into a new folder; it nee
 
 import atexit
 import shutil
-import tempfile
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -187,10 +186,7 @@ class BackgroundBatch:
         self.count, self._files = len(shots), files
         stem = Path(bpy.data.filepath).stem or "untitled"
         self.folder = into / f"{made_fit(f'{stem} {what}')} {datetime.now():%Y-%m-%d %H.%M.%S}"
-        try:
-            self._temporary = Path(tempfile.mkdtemp(prefix="viewcam-", dir=bpy.app.tempdir or None))
-        except OSError as error:
-            raise InputError(f"no folder for the copy can be made ({error.strerror}): free some space") from error
+        self._temporary = comparing.temporary_folder("copy")
         try:
             self.folder.mkdir(parents=True)
             copy = self._temporary / f"{stem}.blend"

@@ -112,7 +112,7 @@ class ReadingOptions(WorldOptions):
 
     def chosen(self, **more: Any) -> Options:
         stated = {name: None if getattr(self, name) == _UNSTATED else getattr(self, name) for name in _MAY_BE_STATED}
-        return super().chosen(unmirrored=self.unmirrored, without_distortion=self.without_distortion, **stated, **more)
+        return super().chosen(unmirrored=self.unmirrored, without_distortion=self.without_distortion, **(stated | more))
 
 
 READING = ("axes", "scale", "up_from", "unmirrored", "without_distortion", *_MAY_BE_STATED[1:])

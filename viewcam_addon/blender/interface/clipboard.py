@@ -114,7 +114,7 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
     )
     names: ClassVar[list[str]] = []
     question: ClassVar[str] = ""
-    asked: ClassVar[str] = ""  # the property that answers it
+    asked: ClassVar[list[str]] = []  # the properties that answer it
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
@@ -129,17 +129,24 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
             formats.recognized(text)
         except InputError:
             return self.execute(context)
+        camera_object = bpy.data.objects.get(self.camera) or datablocks.camera_in(context)
+        scene, cls.question, cls.asked, cls.names = datablocks.scene_of(camera_object), "", [], []
         try:
-            camera_object = bpy.data.objects.get(self.camera) or datablocks.camera_in(context)
-            read = self._cameras_of(text, camera_object, datablocks.scene_of(camera_object))
+            read = self._cameras_of(text, camera_object, scene)
             if len(read) == 1 or self.named:
                 return self.execute(context)
-            cls.names, cls.question = [camera.name for camera in read], f"The text has {len(read)} cameras: name one of them"
-            cls.asked = "named"
         except InputError as error:
             # Without the words of the shell: what can be chosen stands below it.
-            cls.names, (cls.question, _, answer) = [], datablocks.sentence(error).partition(_ANSWERED_BY)
-            cls.asked = next((name for name in READING if answer.startswith(name.replace("_", "-"))), "")
+            cls.question, _, answer = datablocks.sentence(error).partition(_ANSWERED_BY)
+            cls.asked = [name for name in READING if answer.startswith(name.replace("_", "-"))][:1]
+            read = []
+            if cls.asked == ["pose"]:  # whichever way it goes, which cameras there are is the same, and is asked at once
+                with contextlib.suppress(InputError):
+                    read = self._cameras_of(text, camera_object, scene, pose=next(iter(formats.POSES)))
+        if len(read) > 1:
+            cls.names, several = [camera.name for camera in read], f"the text has {len(read)} cameras: name one of them"
+            cls.question = f"{cls.question}, and {several}" if cls.question else several[:1].upper() + several[1:]
+            cls.asked.append("named")
         return context.window_manager.invoke_props_dialog(self, width=_DIALOG_WIDTH)
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -150,16 +157,16 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
         layout.use_property_split = True
         names: tuple[str, ...] = ("set_size", *READING)
         if self.question and self.asked:
-            layout.prop(self, self.asked)
+            for name in self.asked:
+                layout.prop(self, name)
             layout.separator()
-            names = tuple(name for name in names if name != self.asked)
+            names = tuple(name for name in names if name not in self.asked)
         for name in names:
             layout.prop(self, name)
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
-        type(self).question = type(self).asked = (
-            ""  # it is answered, and the panel of the last operation shows the same properties
-        )
+        # It is answered, and the panel of the last operation shows the same properties.
+        type(self).question, type(self).asked = "", []
         text = self.text or _clipboard()
         camera = formats.choose(self._cameras_of(text, camera_object, scene), self.named or None)
         before = _present(camera_object, scene)
@@ -171,10 +178,14 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
         for finding in findings:  # after it, since the status bar shows what was reported last
             self.report({"WARNING"}, finding)
 
-    def _cameras_of(self, text: str, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[formats.Camera]:
+    def _cameras_of(
+        self, text: str, camera_object: bpy.types.Object, scene: bpy.types.Scene, **answers: str
+    ) -> list[formats.Camera]:
         """The cameras of a text, in the picture that it states, else in the scene's at 100 %.
 
         What stands where the text says nothing is the camera as it is.
+
+        answers : options that count over those that are chosen.
         """
         frame = datablocks.frame_of(scene)
         options = self.chosen(
@@ -182,6 +193,7 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
             size_fits=True,
             pixel_aspect=frame.pixel_aspect_x / frame.pixel_aspect_y,
             base=picture.at_full_size(_present(camera_object, scene), frame),
+            **answers,
         )
         return formats.read(text, options=options)
 

@@ -102,6 +102,14 @@ class Outcome:
         return path if path and path.is_file() else None
 
 
+def temporary_folder(what: str) -> Path:
+    """A new folder in the one that Blender removes as it ends. what : the folder's content, as a sentence calls it."""
+    try:
+        return Path(tempfile.mkdtemp(prefix="viewcam-", dir=bpy.app.tempdir or None))
+    except OSError as error:
+        raise InputError(f"no folder for the {what} can be made ({error.strerror}): free some space") from error
+
+
 class RunningComparison:
     """A comparison in the background, which is on its way from the moment it is made.
 
@@ -132,10 +140,7 @@ class RunningComparison:
         self._pictures = seeds(level, SAMPLES)
         self._started = time.monotonic()
         job = Job(camera=camera_object.name, level=level, clay=clay, find=find if level != LEVELS[0] else None)
-        try:
-            self.folder = Path(tempfile.mkdtemp(prefix="viewcam-", dir=bpy.app.tempdir or None))
-        except OSError as error:
-            raise InputError(f"no folder for the comparison can be made ({error.strerror}): free some space") from error
+        self.folder = temporary_folder("comparison")
         try:
             save_copy(self.folder / _file_name())
             self._process = self._child(scene, job)

@@ -1,4 +1,4 @@
-"""The panel "Virtual Pinhole": in Properties › Camera data, and in the 3D viewport's sidebar.
+"""The panel "Virtual Pinhole": in Properties › Camera data, and in the 3D viewport's sidebar; and the menu of its buttons.
 
 What it says is found by functions that a test calls without a window: `notices` here, the rest in readouts.py. They run at
 every redraw, so the camera is stated once for the panel, and read once for the read-outs while these are open. Read-outs are
@@ -20,7 +20,20 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import causes, datablocks, findings, hold, preferences, targets
-from . import baking, clipboard, converting, dragging, panel_rows, presets, readouts, scene_cameras
+from . import (
+    baking,
+    clipboard,
+    converting,
+    dragging,
+    moving,
+    operators,
+    panel_rows,
+    photo_matching,
+    presets,
+    readouts,
+    scene_cameras,
+    swipe,
+)
 from .panel_rows import BelowProperties, BelowSidebar, CameraPanel, InProperties, InSidebar, SubPanel
 
 
@@ -46,7 +59,7 @@ class _MainPanel(CameraPanel):
         if camera_object is None:
             return
         group, row = camera_object.virtual_pinhole, self.layout.row()
-        row.enabled = camera_object.data.type == "PERSP" or group.enabled
+        row.enabled = group.enabled or bool(standing(camera_object, context.scene))
         row.prop(group, "enabled", text="")
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
@@ -338,6 +351,40 @@ class VIEWCAM_PT_sidebar_readouts(_ReadOutsPanel, BelowSidebar, bpy.types.Panel)
     pass
 
 
+class VIEWCAM_MT_cameras(bpy.types.Menu):
+    """View › Cameras › Virtual Pinhole, in the 3D viewport: all buttons once more.
+
+    Blender's search (F3) looks through menus; what stands in none is found by developers alone.
+    """
+
+    bl_idname = "VIEWCAM_MT_cameras"
+    bl_label = "Virtual Pinhole"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        for group in (
+            moving.CLASSES,
+            operators.CLASSES,
+            baking.CLASSES,
+            clipboard.IN_MENUS,
+            scene_cameras.OPERATORS,
+            photo_matching.OPERATORS,
+            swipe.CLASSES,
+        ):
+            for each in group:
+                if each is moving.VIEWCAM_OT_drag_camera:
+                    for kind, name in dragging.NAMES.items():
+                        self.layout.operator(each.bl_idname, text=f"Drag: {name}").kind = kind
+                else:
+                    self.layout.operator(each.bl_idname)
+            self.layout.separator()
+        self.layout.menu(clipboard.VIEWCAM_MT_copy_camera_as.bl_idname)
+
+
+def _draw_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.separator()
+    menu.layout.menu(VIEWCAM_MT_cameras.bl_idname)
+
+
 CLASSES = (
     VIEWCAM_PT_data,
     VIEWCAM_PT_sidebar,
@@ -347,12 +394,15 @@ CLASSES = (
     VIEWCAM_PT_sidebar_move,
     VIEWCAM_PT_data_readouts,
     VIEWCAM_PT_sidebar_readouts,
+    VIEWCAM_MT_cameras,
 )
 
 
 def register() -> None:
     bpy.types.DATA_PT_camera_dof.append(_draw_focus)
+    bpy.types.VIEW3D_MT_view_cameras.append(_draw_menu)
 
 
 def unregister() -> None:
+    bpy.types.VIEW3D_MT_view_cameras.remove(_draw_menu)
     bpy.types.DATA_PT_camera_dof.remove(_draw_focus)

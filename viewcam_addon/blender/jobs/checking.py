@@ -172,18 +172,19 @@ class Checker:
             result["reason"] = least_level(exported)[1]
         return _brief(comparison, ledger) | result
 
-    def both_sides(self, stage: Stage, job: Job, paths: Sequence[Path], everything: Path | None = None) -> Scene:
-        """The scene for the tracer, and the engine's pictures at these paths, from one state of the file.
+    def both_sides(self, stage: Stage, job: Job, paths: Sequence[Path]) -> Scene:
+        """The scene for the tracer, and the engine's pictures at these paths, from one state of the file."""
+        exported = stage.export()
+        self._render(stage, exported, job, paths)
+        return exported
+
+    def _render(self, stage: Stage, exported: Scene, job: Job, paths: Sequence[Path], everything: Path | None = None) -> None:
+        """Render the engine's pictures at these paths.
 
         everything : a path for the picture with everything, see Stage.render; written where there is more to be seen. A
             recentered scene has none of it.
         """
 
-        exported = stage.export()
-        self._render(stage, exported, job, paths, everything)
-        return exported
-
-    def _render(self, stage: Stage, exported: Scene, job: Job, paths: Sequence[Path], everything: Path | None = None) -> None:
         def rendering(number: int) -> None:
             if self._events:
                 self._events.tell("step", name="rendering", number=number, of=max(number, len(paths)))

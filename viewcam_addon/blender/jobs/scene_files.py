@@ -1,7 +1,7 @@
 """The scene as files for processes beside this one, which check and label a batch's shots.
 
 It is exported anew for another frame, camera object or size of the picture, and for each shot where more may change: in a batch
-nothing else does. It is written when other things are in it than in those that are there already.
+nothing else does. It is written where no file holds the same things yet.
 """
 
 import contextlib
@@ -78,7 +78,7 @@ class SceneFiles:
 
     @functools.cached_property
     def folder(self) -> Path:
-        """A temporary one, made when it is first needed: most batches need none."""
+        """The files' folder, a temporary one, made when it is first needed: most batches need none."""
         return self._ends.enter_context(temporary_folder())
 
     @functools.cached_property

@@ -31,7 +31,7 @@ def unit_number(bits: NDArray[np.uint32]) -> NDArray[np.float32]:
 
 
 def random_per_island(edges: NDArray[np.int32], count: int) -> NDArray[np.float32]:
-    """(count,) of each vertex the number that all have that edges connect.
+    """(count,): for each vertex, a number that all have that edges connect with it.
 
     It is hashed from the vertex that Cycles' sets end up with, which depends on the order of the edges. edges : (n, 2).
     """
@@ -50,7 +50,7 @@ def random_per_island(edges: NDArray[np.int32], count: int) -> NDArray[np.float3
 
 
 def pointiness(places: NDArray[np.float32], normals: NDArray[np.float32], edges: NDArray[np.int32]) -> NDArray[np.float32]:
-    """(n,) of each vertex how pointed the surface is there: ½ where it is flat, more where it is convex.
+    """(n,): for each vertex, how pointed the surface is there: ½ where it is flat, more where it is convex.
 
     The angle between the normal and the mean way along the edges that leave, in half turns; then its mean with the neighbors'.
     Vertices in one place are one.
@@ -82,7 +82,7 @@ def _summed(at: NDArray[np.integer], vectors: NDArray[np.floating], count: int) 
 
 
 def _welded(places: NDArray[np.float32]) -> NDArray[np.int64]:
-    """(n,) the vertex that each is taken for: of those that stand in one place, as Cycles sees it, the first."""
+    """(n,): the first of the vertices that stand in one place with each, as Cycles sees it."""
     sums = places[:, 0] + places[:, 1] + places[:, 2]
     order = np.lexsort((-np.arange(len(places)), sums))
     places, sums = places[order], sums[order]
@@ -100,7 +100,7 @@ def _welded(places: NDArray[np.float32]) -> NDArray[np.int64]:
 
 
 def _ends(target: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(n,) where each gets to that goes on to its target until there is none."""
+    """(n,): the last number that each gets to from target to target."""
     while not np.array_equal(further := target[target], target):
         target = further
     return target

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ...tracer.scene.materials import Picture
+from .. import versions
 from ..temporary_settings import Overrides, overridden
 from . import nodes
 
@@ -47,7 +48,13 @@ def obstacle(image: bpy.types.Image) -> str | None:
     space = image.colorspace_settings.name
     if space != "sRGB" and space not in _LINEAR:
         return f"shows {image.name!r}, whose colors are {space}"
+    if versions.CYCLES < (4, 5) and image.file_format == "WEBP" and image.channels == 4 and _is_read_by_cycles(image):
+        return f"shows {image.name!r}, a WebP with an alpha that Cycles multiplies by in a way of its own before 4.5"
     return None
+
+
+def _is_read_by_cycles(image: bpy.types.Image) -> bool:
+    return image.source == "FILE" and not image.packed_file and not image.is_dirty
 
 
 def alpha_obstacle(image: bpy.types.Image) -> str | None:
@@ -68,21 +75,35 @@ def picture_of(image: bpy.types.Image, alpha: bool = False) -> Picture:
 
     alpha : true to read its alpha too, which has no obstacle either.
     """
-    srgb = image.colorspace_settings.name == "sRGB"
-    if image.is_float and srgb:
-        # Blender has decoded them. Cycles reads a file for itself; what Blender hands it stays as it is.
-        srgb = image.source == "FILE" and not image.packed_file and not image.is_dirty
-    pixels = _encoded(image) if image.is_float and srgb else _pixels(image)
+    # Blender decodes floats, and multiplies or divides by the alpha of files. Cycles reads a file for itself; what Blender
+    # hands it stays as it is.
+    by_itself = _is_read_by_cycles(image)
+    srgb = image.colorspace_settings.name == "sRGB" and (by_itself or not image.is_float)
+    has_alpha = image.channels == 4 and not image.colorspace_settings.is_data
+    done_by_blender = has_alpha and image.alpha_mode == ("STRAIGHT" if image.is_float else "PREMUL")
+    pixels = _encoded(image) if by_itself and ((image.is_float and srgb) or done_by_blender) else _pixels(image)
     rgb = pixels[..., :3] if image.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
     if alpha and image.channels == 4 and image.alpha_mode != "NONE":
         rgb = pixels
-    elif is_multiplied(image):
-        return Picture(_multiplied(pixels, np.uint8), srgb)
-    elif image.is_float and srgb and image.channels == 4 and image.alpha_mode == "STRAIGHT":
-        if Picture.compact(pixels).pixels.dtype.kind == "u":
+    elif has_alpha and image.alpha_mode in _multiplied_modes(image, by_itself):
+        if not image.is_float:
+            return Picture(_multiplied(pixels, np.uint8), srgb)
+        if by_itself and Picture.compact(pixels).pixels.dtype.kind == "u":
             return Picture(_multiplied(pixels, np.uint16), srgb)
         rgb = rgb * pixels[..., 3:]
     return Picture.compact(np.nan_to_num(rgb, copy=False, posinf=0.0, neginf=0.0) if image.is_float else rgb, srgb)
+
+
+def _multiplied_modes(image: bpy.types.Image, by_itself: bool) -> tuple[str, ...]:
+    """The alpha modes in which Cycles multiplies an image's colors by its alpha, measured: since 5.2 where it is straight;
+    before, by what a kind of file usually keeps.
+
+    by_itself : true if Cycles reads its file.
+    """
+    if versions.CYCLES >= (5, 2):
+        return ("STRAIGHT",)
+    multiplies = image.file_format == "PNG" if image.is_float else image.file_format != "WEBP"
+    return ("STRAIGHT", "PREMUL") if (multiplies if by_itself else not image.is_float) else ()
 
 
 def image_of(picture: Picture, name: str, overrides: Overrides, packed: bool = True) -> bpy.types.Image:

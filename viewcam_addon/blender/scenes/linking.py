@@ -1,11 +1,12 @@
 """Light and shadow linking: which objects a lamp or a shining surface lights, and which cast its shadows, from and to Blender.
 
-As Blender has it: of what a collection includes or excludes, its own objects count rather than its children's, and one that
-includes nothing means all that it does not exclude. In Cycles an instance gives light to what the object that it shows gives
-light to, and gets the light that what places it gets, where that is linked.
+As in Blender, what a collection says of its own objects counts before what it says of its children's, and a collection that
+includes nothing means all that it does not exclude. In Cycles an instance lights what the object lights that it shows, and is
+lit by what lights the object that places it, where that one is linked.
 
-Cycles loses what scattered rays find of a light with blockers behind what casts none of its shadows and is opaque, unless some
-collection names that (kernel/integrator/shadow_linking.h). Where a collection excludes all that casts none, it loses nothing.
+Of a light with blockers, Cycles loses what scattered rays find behind an opaque object that casts none of its shadows, unless
+some collection names that object (kernel/integrator/shadow_linking.h). Where a collection excludes all such objects, it loses
+nothing.
 """
 
 from collections.abc import Collection, Iterable
@@ -62,7 +63,7 @@ class Links:
         return receivers, blockers
 
     def _named(self, collection: bpy.types.Collection) -> tuple[_Names, bool]:
-        """The objects that a collection means, and whether these are all that it does not exclude."""
+        """(the objects that a collection means, true if these are all that it does not exclude)."""
         states: dict[str, str] = {}
         for child, child_link in zip(collection.children, collection.collection_children, strict=True):
             states |= dict.fromkeys((block.name for block in child.all_objects), child_link.light_linking.link_state)
@@ -79,7 +80,7 @@ def is_linked(block: bpy.types.Object) -> bool:
 
 
 def among(lights: Iterable[_Light], names: set[str]) -> tuple[_Light, ...]:
-    """Lights whose receivers and blockers are without those that are no objects of these names; all of them are None again."""
+    """The lights, linked to objects of these names alone; a link to all of these is none."""
 
     def remaining(linked: _Names) -> _Names:
         return None if linked is None or names <= linked else linked & names

@@ -1,4 +1,4 @@
-"""The materials and images of an export, each read once; where there is none of this class, level geometry is exported."""
+"""The materials and images of an export, each read once."""
 
 from collections.abc import Iterable
 
@@ -25,6 +25,8 @@ def add_pictures(reading: shaders.Reading, alphas: set[str], to: dict[str, Pictu
 
 
 class Shading:
+    """The materials that an export has met so far. An export of level geometry has none of this class."""
+
     def __init__(self) -> None:
         self._readings: dict[str, shaders.Reading] = {}
 

@@ -89,7 +89,8 @@ def _rendered(
             ledger.note(world.name, "approximated", f"the world {reason}, and a constant one stands in")
         return None
     width = world_image.width(world)
-    image = f"both sides show an image of it, {width} × {width // 2} pixels, that Cycles renders"
+    image = f"an image of it, {width} × {width // 2} pixels," if result.pictures else "the color"
+    image = f"both sides show {image} that Cycles renders"
     if result.suns:
         image += ", and lamps that shine evenly for its suns"
     for reason in reasons:

@@ -5,7 +5,7 @@ renders. Both sides of a comparison are then shown the image and the lamps.
 """
 
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -83,11 +83,10 @@ def rendered(world: bpy.types.World, scene: bpy.types.Scene) -> Rendered | None:
 
 
 def _rendered(name: str, arrays: dict[str, NDArray]) -> Rendered:
-    pictures = {f"{name} (rendered)": _picture(arrays["light"])}
-    backdrop = None
+    pictures: dict[str, Picture] = {}
+    world, backdrop = _world(f"{name} (rendered)", arrays["light"], pictures), None
     if arrays["seen"] is not arrays["light"] and not np.array_equal(arrays["seen"], arrays["light"]):
-        pictures[f"{name} (seen)"] = _picture(arrays["seen"])
-        backdrop = World((1.0, 1.0, 1.0), image=f"{name} (seen)")
+        backdrop = _world(f"{name} (seen)", arrays["seen"], pictures)
     suns = []
     for number, (lit, seen) in enumerate(zip(arrays["light_suns"], arrays["seen_suns"], strict=True)):
         same = np.allclose(lit, seen, rtol=1e-6, atol=0.0)
@@ -96,11 +95,16 @@ def _rendered(name: str, arrays: dict[str, NDArray]) -> Rendered:
             if any(irradiance):
                 title = f"{name} (sun{f' {number + 1}' if number else ''})"
                 suns.append(Sun(title, hidden_from, towards=(x, y, z), irradiance=tuple(irradiance), angle=angle))
-    return Rendered(World((1.0, 1.0, 1.0), image=f"{name} (rendered)", backdrop=backdrop), tuple(suns), pictures)
+    return Rendered(replace(world, backdrop=backdrop), tuple(suns), pictures)
 
 
-def _picture(pixels: NDArray[np.float32]) -> Picture:
-    return Picture(np.nan_to_num(np.clip(pixels, 0.0, LARGEST_RADIANCE), nan=0.0))
+def _world(name: str, pixels: NDArray[np.float32], pictures: dict[str, Picture]) -> World:
+    """The world that looks like this: one color, or an image, which `pictures` receives by its name."""
+    pixels = np.nan_to_num(np.clip(pixels, 0.0, LARGEST_RADIANCE), nan=0.0)
+    if (pixels == pixels[0, 0]).all():
+        return World(tuple(pixels[0, 0].tolist()))
+    pictures[name] = Picture(pixels)
+    return World((1.0, 1.0, 1.0), image=name)
 
 
 def show(overrides: Overrides, world: bpy.types.World, scene: bpy.types.Scene, rendered: Rendered) -> None:

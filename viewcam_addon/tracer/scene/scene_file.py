@@ -65,17 +65,9 @@ def geometry(field: Field, arrays: Arrays) -> Mesh | Spheres:
     if kind.text() not in readers:
         kind.fail(f"is {quoted(kind.value)}: give one of {', '.join(readers)}")
     try:
-        return readers[kind.text()](_as_spelled_now(field), arrays)
+        return readers[kind.text()](field, arrays)
     except InputError as error:
         field.hand_on(error)
-
-
-def _as_spelled_now(field: Field) -> Field:
-    """The geometry with the key that files of the first months spell otherwise."""
-    values = {key: each.value for key, each in field.fields((), others=True).items()}
-    if "corner_colors" not in values and "corner_colours" in values:
-        values["corner_colors"] = values.pop("corner_colours")
-    return Field(values, field.name, field.file)
 
 
 def _mesh(field: Field, arrays: Arrays) -> Mesh:
