@@ -48,14 +48,11 @@ def _triples(m: Array, order: str, before: Sequence[float] | None = None) -> tup
     second = np.arctan2(-m[..., k, i], from_lock)
     sine, cosine = np.sin(first), np.cos(first)
     third = np.arctan2(sine * m[..., i, k] - cosine * m[..., i, j], cosine * m[..., j, j] - sine * m[..., j, k])
-    angles, other = np.empty((2, *np.shape(first), 3))
+    angles = np.empty((*np.shape(first), 3))
     angles[..., i], angles[..., j], angles[..., k] = sign * first, sign * second, sign * third
-    other[..., i], other[..., j], other[..., k] = (sign * _opposite(angle) for angle in (first, -second, third))
-    return angles, other
-
-
-def _opposite(angle: Array) -> Array:
-    return angle - np.copysign(math.pi, angle)
+    other = angles.copy()
+    other[..., j] = -angles[..., j]
+    return angles, other - np.copysign(math.pi, other)
 
 
 def from_euler(angles: Sequence[float], order: str) -> Array:

@@ -14,12 +14,13 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon import intrinsics, rotation
+from viewcam_addon import camera_values, intrinsics, rotation
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import conversion, datablocks, findings, pose, storage, versions
 from viewcam_addon.blender.camera import CameraSync
 from viewcam_addon.blender.interface import panel
 from viewcam_addon.blender.scenes import depsgraph
+from viewcam_addon.pinhole import basis_of_views
 
 
 @pytest.fixture
@@ -541,6 +542,21 @@ def test_channels_that_a_script_makes_deltas_move_no_keyed_camera(crowd, scene):
     for each, (there, *_), (channels, *_) in zip(crowd, expected, states(crowd), strict=True):
         places = [np.add(state[0].location, state[0].delta_location) for state in (there, (channels[0],))]
         assert places[1] == pytest.approx(places[0], abs=1e-5), each.name
+
+
+def test_an_up_that_is_taken_for_level_beyond_doubt_is_level_to_the_basis_too():
+    """And most that are level are, else the basis would be asked for all of them."""
+    rng, rounding = np.random.default_rng(3), findings.LARGEST_TURN
+    poses = rng.normal(size=(4000, 3, 3))
+    poses[:2000, 2] = (0, 0, 1)
+    axes = basis_of_views(*poses.swapaxes(0, 1))[0].transpose(1, 2, 0)
+    turns = rng.choice([0, 0.1, 0.3, 0.9, 1.1, 3, 1 / rounding], 4000) * rounding
+    u, v, w = np.moveaxis(axes, -1, 0)
+    cosine, sine = np.cos(turns)[:, None], np.sin(turns)[:, None]
+    turned = np.stack([cosine * u - sine * v, cosine * v + sine * u, w], axis=-1)
+    is_level = np.abs(v - turned[:, :, 1]).max(axis=-1) <= rounding
+    beyond_doubt = camera_values._are_level(poses[:, 2], turned, rounding)
+    assert not (beyond_doubt & ~is_level).any() and beyond_doubt[turns == 0].all()
 
 
 def test_a_view_that_did_not_follow_its_camera_would_be_noticed(flock, scene, monkeypatch):

@@ -56,7 +56,7 @@ def test_what_is_modeled_and_still_said_nothing_of_is_told_as_what_it_is():
     answer = answered(True, "The same picture", "over 9 pixels.", actual)
     assert answer.headline == (
         "The same picture, but for 1 object that is not modeled and 2 objects with surfaces in one place "
-        "and 1 shadow that not all rays see (Hair, Floor, Carpet and 1 more; 25 % of the picture)"
+        "and 1 light or shadow that not all rays see (Hair, Floor, Carpet and 1 more; 25 % of the picture)"
     )
 
 

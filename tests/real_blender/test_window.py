@@ -12,6 +12,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from viewcam_addon import cameras
 from viewcam_addon.pinhole import Pinhole
 
@@ -27,6 +29,7 @@ PNG = bytes.fromhex(
 # A virtual screen on a busy machine may lose a click: one loss is no finding, two at different times are.
 ATTEMPTS = 2
 TALL = (1600, 2000)
+MOST_FOR_PICTURES = 3 * 3600  # seconds
 
 
 def go_through(real_blender, name, *arguments, expected="", attempts=ATTEMPTS, **options):
@@ -92,6 +95,7 @@ def _command_lines():
     return lines
 
 
+@pytest.mark.timeout(2 * MOST_FOR_PICTURES if PICTURES else 1200)
 def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_blender, tmp_path):
     """With VIEWCAM_PICTURES the pictures of docs/artists.md are taken instead."""
     if PICTURES:
@@ -103,7 +107,7 @@ def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_b
 def take_the_pictures(real_blender, scratch, folder):
     """The tour's, the README's moving one, and those of docs/artists.md that no step of the tour takes."""
     images = folder.parent
-    go_through(real_blender, "tour", folder, attempts=1, size=TALL, patience=3 * 3600)  # drawn finely
+    go_through(real_blender, "tour", folder, attempts=1, size=TALL, patience=MOST_FOR_PICTURES)  # drawn finely
     make_the_moving_picture(real_blender, scratch / "frames", images / "moving.webp")
     photo = scratch / "photo.png"
     subprocess.run([sys.executable, Path(__file__).with_name("photo_of_a_room.py"), photo], check=True)

@@ -527,6 +527,9 @@ class ShowTheDiagramElsewhere(_WithoutTheSidebar):
     picture = "diagram.png"
     shows, with_before = (0.0, 0.42, 0.78, 0.935), True
 
+    def prepare(self):
+        values().look_at = (0, 0, 1)
+
     def by_hand(self):
         values().plane_at = 0.65
         with bpy.context.temp_override(window=window()):

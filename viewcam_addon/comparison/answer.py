@@ -33,7 +33,7 @@ class NotModeled:
     share : the share of the pixels, 0 to 1, that show them or differ by them; None where it was not measured.
     visible : the share of the pixels that show them.
     in_one_place : the names among them of surfaces in one place.
-    seen_otherwise : the names among them of objects whose shadows not all kinds of rays see.
+    seen_otherwise : the names among them of what not all kinds of rays see, or see the shadows of.
     """
 
     names: tuple[str, ...] = ()
@@ -147,7 +147,7 @@ def in_the_picture(
 
 
 def but_for(not_modeled: Mapping[str, Any]) -> str:
-    """but for 2 objects that are not modeled and 1 shadow that not all rays see
+    """but for 2 objects that are not modeled and 1 light or shadow that not all rays see
 
     not_modeled : see NotModeled.to_json.
     """
@@ -161,7 +161,7 @@ def but_for(not_modeled: Mapping[str, Any]) -> str:
             " modeled",
         ),
         (one_place, "object", "objects", " with surfaces in one place"),
-        (otherwise, "shadow", "shadows", " that not all rays see"),
+        (otherwise, "light or shadow", "lights or shadows", " that not all rays see"),
     ]
     parts = [
         f"{len(names):,} {singular if len(names) == 1 else plural}{rest}" for names, singular, plural, rest in kinds if names

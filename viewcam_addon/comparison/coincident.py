@@ -8,9 +8,10 @@ which would be Embree's arithmetic to the bit, with fused products or without, a
 Which part of its light a place gets where shadow rays see otherwise than scattered ones (an object that only some kinds of
 rays see, a material that asks for the kind, a lamp without shadows) is Cycles' weights of multiple importance sampling
 (`light_sample_mis_weight_forward` and `light_sample_mis_weight_nee` in kernel/light/sample.h): other ones with a light tree
-than without, or with another lamp in the scene. Rejected: doing what Cycles does, since an artist's own picture, with the
-light tree, has other weights than the one that is compared; and to switch importance sampling off on both sides, which takes
-lamps out of mirrors.
+than without, or with another lamp in the scene. So is which part it gets of a light that only some kinds of rays see, where a
+surface scatters several kinds: each ray carries the light of all of them. Rejected: doing what Cycles does, since an artist's
+own picture, with the light tree, has other weights than the one that is compared; and to switch importance sampling off on
+both sides, which takes lamps out of mirrors.
 
 So the tracer tells how much light is of these kinds, at most (core/integrators/path.h). Pixels in which it is a tenth of the
 light or more are taken out; the others keep it as a tolerance.
@@ -47,7 +48,8 @@ class CoincidentLight:
     total : (height, width, 3), all light, traced with the same seed, which is not the reference's: pixels that were taken out
         because the reference is dark there would leave those where it is bright.
     pairs : two names in order of the alphabet → how often rays found these in one place.
-    seen_otherwise : objects and lamps whose shadows not all kinds of rays see → how often that made a difference.
+    seen_otherwise : objects and lights that not all kinds of rays see, or see the shadows of → how often that made a
+        difference; rough glass, too, where light comes in that no facet refracts.
     """
 
     light: Image

@@ -210,7 +210,7 @@ class RadianceComparison:
         if self.taken_out.pairs:
             table.append(f"{'In one place':<17}{pairs_text(self.taken_out.pairs)}")
         if self.taken_out.seen_otherwise:
-            table.append(f"{'Shadows':<17}not all rays see those of {_few(self.taken_out.seen_otherwise)}")
+            table.append(f"{'Seen by some rays':<18}light or shadows of {_few(self.taken_out.seen_otherwise)}")
         if self.taken_out:
             table.append(f"{'Taken out':<17}{self.taken_out.count:,} pixels")
         seen = self.appearance
@@ -247,14 +247,14 @@ def _which(taken_out: TakenOut) -> str:
         which.append(f"show surfaces in one place, or are lit by them ({pairs_text(taken_out.pairs)})")
     if taken_out.seen_otherwise:
         names = _few(taken_out.seen_otherwise)
-        which.append(f"are lit past what shadow rays see and scattered rays do not, or the reverse ({names})")
+        which.append(f"are lit by, or past, what some kinds of rays see and others do not ({names})")
     return ", and that ".join(which)
 
 
 def _nothing_left(taken_out: TakenOut) -> str:
     remedies = ["move one of two that lie in one place aside"] if taken_out.pairs else []
     if taken_out.seen_otherwise:
-        remedies.append("let shadow rays see what other rays see")
+        remedies.append("let all kinds of rays see what some see")
     return (
         f"{percent_of(taken_out.share_of_lit)} of the pixels with light {_which(taken_out)}, which is a renderer's choice: "
         f"{' and '.join(remedies)}, or check level geometry, where any such choice is right"

@@ -135,7 +135,7 @@ class Tracer:
         """The light that is a renderer's choice, because surfaces are in one place or shadow rays see otherwise than others, as
         much as any choice may bring: passes as of `render_light`. And the names of two objects each that were found in one
         place, in order of the alphabet, with how often; the same one twice where they are faces of one. And those of objects
-        that shadow rays see otherwise, and of lamps without shadows, with how often.
+        that shadow rays see otherwise, of lamps without shadows, and of lights that only some rays see, with how often.
 
         roundings : the number of roundings of float32 by which surfaces in one place may be apart.
         """
@@ -147,7 +147,7 @@ class Tracer:
             pass
         pairs: dict[tuple[str, str], int] = {}
         seen_otherwise: dict[str, int] = {}
-        names = [*self._names[:-1], *(lamp.name for lamp in self._scene.lamps)]
+        names = [*self._names[:-1], *(lamp.name for lamp in self._scene.lamps), "World"]
         for first, second, count in light.pairs():
             if second is None:
                 seen_otherwise[names[first]] = seen_otherwise.get(names[first], 0) + count

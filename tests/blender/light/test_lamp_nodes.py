@@ -74,6 +74,15 @@ def image(lamp, by=None, times=(1.0, 1.0, 1.0)):
     tree.links.new(node.outputs["Color"], emission.inputs["Color"])
 
 
+def image_by_a_map(lamp):
+    """By a UV map of a name, which no light has."""
+    image(lamp)
+    tree, _ = emission_of(lamp)
+    uv_map = tree.nodes.new("ShaderNodeUVMap")
+    uv_map.uv_map = "Unwrapped"
+    tree.links.new(uv_map.outputs[0], next(node for node in tree.nodes if node.type == "TEX_IMAGE").inputs["Vector"])
+
+
 def noise(lamp):
     """In the coordinates that a texture is looked up by where nothing is given; mixed with a plain light, and another added."""
     tree, emission = emission_of(lamp)
@@ -121,6 +130,7 @@ KINDS = {
     "a gobo on a point": ("POINT", image),
     "a gobo by the normal": ("SPOT", lambda lamp: image(lamp, "Normal", (0.4, 0.7, 1.0))),
     "a gobo by UV": ("POINT", lambda lamp: image(lamp, "UV", (3.0, 2.0, 1.0))),
+    "a gobo by a named map": ("POINT", image_by_a_map),
     "waves": ("POINT", noise),
     "waves on a spot": ("SPOT", noise),
     "the way of light": ("POINT", weight),

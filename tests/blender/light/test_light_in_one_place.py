@@ -4,6 +4,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+import math
 from dataclasses import replace
 
 from viewcam_addon import api
@@ -141,8 +142,67 @@ def test_light_past_what_not_all_rays_see_is_taken_out_and_named(lit_past_a_shee
     assert 0.02 < comparison.taken_out.pixels.mean() < 0.7
     assert comparison.not_modeled.names == (name,)
     if light != "shadowless":  # which the ledger tells as approximated already
-        assert "but for 1 shadow that not all rays see" in comparison.sentence and "not modeled" not in comparison.sentence
+        assert (
+            "but for 1 light or shadow that not all rays see" in comparison.sentence
+            and "not modeled" not in comparison.sentence
+        )
     brighter = [replace(image, passes={**image.passes, "Combined": 1.06 * image["Combined"]}) for image in tests]
+    assert not compared(exported, "direct", brighter).passed
+
+
+@pytest.fixture
+def lit_by_what_some_rays_see(scene, camera, add, add_lamp, mesh_from, set_world):
+    """make(light, kind, closure) : a sheet of a closure near a light that is hidden from a kind of rays; the light's name."""
+
+    def make(light, kind, closure):
+        sheet = mesh_from("plane", size=4)
+        material = bpy.data.materials.new("Sheet")
+        material.use_nodes = True
+        tree = material.node_tree
+        shader = tree.nodes.new(closure)
+        tree.links.new(shader.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+        if "Roughness" in shader.inputs:
+            shader.inputs["Roughness"].default_value = 0.2
+        sheet.materials.append(material)
+        add(sheet, "Sheet")
+        scene.render.resolution_x, scene.render.resolution_y = 48, 32
+        if light == "world":
+            set_world((0.5, 0.5, 0.5))
+            setattr(scene.world.cycles_visibility, kind, False)
+            return "World"
+        below = kind == "transmission"
+        lamp = add_lamp("AREA", (0, 0, -1 if below else 1), (math.pi if below else 0, 0, 0), energy=10.0, size=2.0)
+        lamp.name, lamp.visible_camera = "Lamp", False
+        setattr(lamp, f"visible_{kind}", False)
+        if below:  # most of the light is another's
+            add_lamp("SUN", (0, 0, -5), (math.pi, 0, 0), energy=20.0)
+        return lamp.name
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("light", "kind", "closure"),
+    [
+        ("lamp", "glossy", "ShaderNodeBsdfPrincipled"),
+        ("lamp", "diffuse", "ShaderNodeBsdfPrincipled"),
+        ("world", "glossy", "ShaderNodeBsdfPrincipled"),
+        ("lamp", "transmission", "ShaderNodeBsdfTranslucent"),
+    ],
+)
+def test_light_that_only_some_rays_see_is_taken_out_and_named(
+    lit_by_what_some_rays_see, tmp_path, read_passes, light, kind, closure
+):
+    """A scattered ray of Cycles carries the light of all closures and sees with one's kind: 5 % of Diffuse Direct is lost."""
+    name = lit_by_what_some_rays_see(light, kind, closure)
+    paths = [tmp_path / f"cycles-{number}.exr" for number in range(8)]
+    exported = jobs.both_sides(Job(threads=2, level="direct", samples=256), paths)
+    tests = [Image(passes, exported.camera) for passes in read_passes(paths)]
+    comparison = compared(exported, "direct", tests)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert comparison.taken_out.seen_otherwise.keys() == {name} and not comparison.pairs
+    assert "but for 1 light or shadow that not all rays see" in comparison.sentence
+    brighter = [replace(image, passes={**image.passes, "Combined": 1.1 * image["Combined"]}) for image in tests]
     assert not compared(exported, "direct", brighter).passed
 
 

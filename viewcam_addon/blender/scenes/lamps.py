@@ -326,6 +326,8 @@ class _LampReader(shaders.Tree):
 
     def _value(self, output: Output) -> Color | Node | None:
         source, name = output.node, output.socket.name
+        if source.type == "UVMAP" and source.uv_map:
+            return Color(_BLACK)  # a light has no map by a name
         if source.type == "UVMAP" or (source.type, name) in (("TEX_COORD", "UV"), ("NEW_GEOMETRY", "Parametric")):
             return self._of_itself(output, UV)
         if source.type == "TEX_COORD" and name == "Normal":

@@ -134,6 +134,16 @@ template <class T> class BSDFOf {
                 lobe(i));
         return sum;
     }
+    // Calls visit(lobe, light, pdf) for the lobes that scatter light from a direction all over, with what they send on, and the density with
+    // which `sample` chooses them and this direction.
+    template <class Visit> void each(Vec3 to_light, Visit&& visit) const {
+        for (int i = 0; i < count_; i++)
+            std::visit([&](const auto& lobe) {
+                if (lobe.DELTA) return;
+                double left = bumped_ ? terminator_.left(normal_of(lobe), lobe.IS_DIFFUSE, to_light) : 1;
+                visit(lobe, lobe.eval(to_light) * left, share(i) * lobe.pdf(to_light));
+            }, this->lobe(i));
+    }
     // u_lobe: which lobe, in [0, 1). direction: two numbers in [0, 1) that are made where they are asked for.
     template <class Numbers>
     BSDFSampleOf<T> sample(T u_lobe, Numbers&& direction) const {

@@ -129,6 +129,11 @@ struct MicrofacetTransmission : MicrofacetLobeOf<double> {
     double importance() const { return albedo(gray(1) - reflectance(fresnel, wi.z)); }
     Vec3 eval(Vec3 to_light) const { return eval_local(frame.to_local(to_light)); }
     double pdf(Vec3 to_light) const { return pdf_local(frame.to_local(to_light)); }
+    // False where no facet refracts light from a direction to the viewer.
+    bool has_facet(Vec3 to_light) const {
+        Vec3 wo = frame.to_local(to_light), bent = wo * ratio + wi, h = bent * std::copysign(1.0, bent.z);
+        return dot(wi, h) > 0 && dot(wo, h) < 0;
+    }
     LobeSample sample(Vec2 u) const {
         Vec3 h = facets.sample_visible(wi, u);
         double cosine = dot(wi, h), squared = 1 - (1 - cosine * cosine) / (ratio * ratio);

@@ -24,7 +24,8 @@
 // much of it as all surfaces there would scatter, none of which shadows another. No choice of a renderer's brings more, and any
 // brings at least nothing. So it is with light that shadow rays find and scattered rays do not, or the reverse (an object that
 // only some kinds of rays see, a material that asks which kind has come, a lamp without shadows): how much of it a picture has
-// is its renderer's own weights of multiple importance sampling, which elsewhere make no difference.
+// is its renderer's own weights of multiple importance sampling, which elsewhere make no difference. And so it is with a light that
+// only some kinds of rays see, on a surface that scatters several, and with rough refraction (`weighed_otherwise`).
 //
 // Where paths come to materials that are wide (Material::is_wide), four of one material go on at a time, on triangles or on spheres, at
 // every depth: surface, light, lobes and the next ray are computed in vectors, whatever the other paths of the block have met (WidePaths).
@@ -104,7 +105,8 @@ class PathIntegrator {
     const SobolSampler& sampler() const { return sampler_; }
     const Scene& scene() const { return scene_; }
     // Two objects, which may be one, that paths have met in one place, and how often; with NONE in the place of the second, an object
-    // that shadow rays see otherwise than others, or a lamp without shadows. Lamps are counted after the objects.
+    // that shadow rays see otherwise than others, or a light that only some rays see, or without shadows. Lamps are counted after the
+    // objects, and the world after these.
     std::map<std::pair<uint32_t, uint32_t>, uint64_t> coincident_pairs() const {
         std::lock_guard lock(mutex_);
         return pairs_;
@@ -256,6 +258,7 @@ class PathIntegrator {
         return left;
     }
     uint32_t name_of(const Light& lamp) const { return uint32_t(scene_.objects.size()) + lamp.number; }
+    uint32_t name_of_world() const { return uint32_t(scene_.objects.size() + scene_.illumination.lamps.size()); }
     // The share that a surface leaves of light that comes along a ray through it.
     Vec3 left_behind(const Ray& ray, const Hit& hit, RayState state) const {
         if (!(scene_.objects[hit.object].visible & state.kind)) return {1, 1, 1};
@@ -548,6 +551,12 @@ class PathIntegrator {
             if (!(bsdf.kinds() & leading)) continue;
             BSDFSample sampled =
                 bsdf.sample(bsdf.needs_choice() ? number(SobolSampler::LOBE) : 0, [&] { return pair(SobolSampler::DIRECTION); });
+            if (const Environment& sky = lights_.environment(); coincident_ > 0 && !path.coincident && !lights_.has_sky() && sampled.pdf < INFINITE && !is_black(sky.radiance)) {
+                double all;
+                ScatteredLight light = weighed_otherwise(bsdf, sampled.direction, sky.hidden_from, {}, all);
+                add_weighed(light, sky.radiance / all, {point.ray_origin(sampled.direction), sampled.direction, 0, INFINITE}, RayKind(sampled.kind),
+                            sky.hidden_from & (DIFFUSE | GLOSSY | TRANSMISSION) ? name_of_world() : point.object, path, depth, block);
+            }
             if (!(sampled.kind & leading)) continue;
             // A smooth normal may send rays to the wrong side of the true surface: that light is lost, as in Cycles.
             if ((dot(sampled.direction, point.normal) > 0) == (sampled.kind == TRANSMISSION)) continue;
@@ -776,6 +785,11 @@ class PathIntegrator {
         uint32_t kinds = ~choice.light->hidden_from, unseen = 0;  // unseen: for which no scattered ray finds what this one does
         bool hidden_from_some = coincident_ > 0 && !path.coincident && end == 0;
         if (hidden_from_some) {
+            const Light& light = *choice.light;
+            double all, pdf = light.is_sized() && light.multiple_importance ? sample.pdf : INFINITE;
+            uint32_t name = !(light.hidden_from & (DIFFUSE | GLOSSY | TRANSMISSION)) ? point.object : light.mesh() ? light.mesh()->object() : light.is_environment() ? name_of_world() : name_of(light);
+            add_weighed(weighed_otherwise(bsdf, sample.direction, light.hidden_from, {pdf * choice.chance, pdf / lights_.count()}, all), sample.weight / choice.chance, shadow_ray(point, sample),
+                        light.casts_shadow ? light.shadow_rays : NO_RAY, name, path, depth, block);
             kinds &= bsdf.non_specular_kinds();
             see_otherwise(*choice.light, point, sample, path, depth, kinds, unseen);
             if (!kinds) return;
@@ -798,6 +812,52 @@ class PathIntegrator {
         Ray ray = shadow_ray(point, sample);
         if (end > 0) ray.t_max = max(min(ray.t_max, sample.distance - end), 0.0);
         lit.rays.set(place, ray);
+    }
+
+    // Light from a direction of which Cycles has more or less than there is, by about so much. A ray that a lobe has scattered carries the
+    // light of all lobes there, and its kind says what it sees (`surface_shader_bsdf_sample_closure`); a shadow ray finds a light for the
+    // lobes whose class it is not hidden from, where translucence is diffuse, and glass is hidden from if both its kinds are
+    // (`_surface_shader_exclude`). And where no facet refracts, rough refraction has a density, but no ray comes of it.
+    // hidden_from: the kinds of rays that don't see the light. pdfs: between which Cycles' density of a shadow ray is, 0 where there is none;
+    // INFINITE where scattered rays don't find the light. all: receives the density of all lobes together.
+    [[gnu::noinline]] ScatteredLight weighed_otherwise(const BSDF& bsdf, Vec3 direction, uint32_t hidden_from, Vec2 pdfs, double& all) const {
+        constexpr uint32_t BOTH = GLOSSY | TRANSMISSION;
+        bool refracts = false, is_chosen = lights_.count() > 1 || lights_.has_meshes();
+        double seeing = 0;
+        all = 0;
+        auto no_facet = [&](const auto& lobe) {
+            if constexpr (requires { lobe.has_facet(direction); }) return !lobe.has_facet(direction);
+            return false;
+        };
+        bsdf.each(direction, [&](const auto& lobe, Vec3, double density) {
+            if constexpr (requires { lobe.has_facet(direction); }) refracts = true;
+            is_chosen |= lobe.IS_DIFFUSE;
+            all += density;
+            if (!(hidden_from & (lobe.IS_DIFFUSE ? lobe.KIND | DIFFUSE : lobe.KIND)) && !no_facet(lobe)) seeing += density;
+        });
+        double carried = all > 0 ? seeing / all : 0;
+        ScatteredLight sum;
+        bsdf.each(direction, [&](const auto& lobe, Vec3 light, double) {
+            uint32_t hiding = lobe.IS_DIFFUSE ? hidden_from & DIFFUSE : refracts ? (hidden_from & BOTH) == BOTH : hidden_from & lobe.KIND;
+            double ours = hidden_from & lobe.KIND ? 0 : 1;
+            auto off = [&](double pdf) {
+                double asked = power_heuristic(pdf, all);
+                return std::fabs((hiding ? 0 : asked) + (1 - asked) * carried - ours);
+            };
+            (lobe.IS_DIFFUSE ? sum.diffuse : sum.other) += light * (no_facet(lobe) ? double(is_chosen) : max(off(pdfs.x), off(pdfs.y)));
+        });
+        return sum;
+    }
+    // Adds such light. name: what makes it, as in `pairs_`.
+    void add_weighed(ScatteredLight light, Vec3 weight, const Ray& ray, RayKind kind, uint32_t name, const Path& path, int depth, Block& block) const {
+        if (is_black(light.diffuse) && is_black(light.other)) return;
+        weight *= path.weight * unoccluded(ray, kind, {kind, false, false, depth, path.passed, path.scattered, 0, path.width});
+        if (is_black(weight)) return;
+        if (depth > 1) light.diffuse += light.other, light.other = {};
+        block.light[path.sample].add(after(path.category, true, depth), light.diffuse * weight);
+        block.light[path.sample].add(OTHER, light.other * weight);
+        std::lock_guard lock(mutex_);
+        pairs_[{name, NONE}]++;
     }
 
     // Leaves of kinds of rays those that see a light otherwise than shadow rays do. unseen: receives those of them that don't see it.

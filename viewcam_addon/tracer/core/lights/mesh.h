@@ -37,6 +37,7 @@ class MeshLight {
         center_ = (box_.low + box_.high) / 2, reach_ = length(box_.high - box_.low) / 2;
     }
 
+    uint32_t object() const { return object_; }
     bool is_sized() const { return true; }
     bool is_dark() const { return !(brightness_ > 0); }
     bool is_black() const { return triangles_.empty(); }  // whatever its size
