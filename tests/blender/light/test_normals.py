@@ -15,7 +15,7 @@ from viewcam_addon.tracer import render
 COLOR = (0.8, 0.5, 0.2, 1.0)
 # p99, calibrated: heights are looked up a tenth of a pixel beside, as Cycles does from 4.4 on (1e-4), or a whole one (1.2e-5).
 DISPLACED = 2e-4 if bpy.app.version >= (4, 4) else 2e-5
-# p50, p99, where heights are looked up a tenth of a pixel beside and no node offers another: float32, as in the narrow filter's test.
+# p50, p99, where heights are looked up a tenth of a pixel beside and nowhere else: float32, as of the narrow filter.
 HEIGHTS = {"p50": 2e-5, "p99": 2e-4} if (4, 4) <= bpy.app.version < (4, 5) else {}
 # p50, p99: the tables' own differences, as in test_closures.py; since 5.1 normals are two numbers of 16 bits.
 TILTED = (1e-4, 2e-3) if bpy.app.version >= (5, 1) else (3e-5, 1e-4)
