@@ -109,14 +109,16 @@ lint: .venv/test
 
 # One environment for each Blender, with the NumPy that this Blender brings along where the wheel leaves it open.
 wheel-4.2 = bpy==4.2.23 numpy==1.24.*
+wheel-4.4 = bpy==4.4.0
 wheel-4.5 = bpy==4.5.15
 wheel-5.0 = bpy==5.0.1
 wheel-5.2 = bpy==5.2.3
 python-4.2 = 3.11
+python-4.4 = 3.11
 python-4.5 = 3.11
 python-5.0 = 3.11
 python-5.2 = 3.13
-WHEELS := 4.2 4.5 5.0 $(if $(shell .ci/python 3.13),5.2)
+WHEELS := 4.2 4.4 4.5 5.0 $(if $(shell .ci/python 3.13),5.2)
 # make test has one of them.
 TESTED := $(shell $(PYTHON) -c 'import sys; print("5.0" if sys.version_info[:2] == (3, 11) else "5.2")')
 MATRIX := $(filter-out $(TESTED),$(WHEELS))
@@ -127,11 +129,13 @@ test-matrix: $(MATRIX:%=test-wheel-%)
 # The tests whose outcome a version can change: those that touch Blender; with the oldest and the newest, which have NumPys of
 # their own, the quick ones; with the newest, which has a Python of its own, processes. Of the newest, tests/blender runs inside
 # the real one, but for lights and batches (test-blender). What is slow of lights the newest has alone, what is slow of batches
-# the oldest. Between the two, 4.5 has what versions.py tells apart: scenes, pictures, animation; 5.0 has the rest, and
-# test-light what Cycles shades. The faults that are made on purpose, and the sample scenes, are the oldest's, whose files the
+# the oldest. Between the two, 4.4 has what its Cycles alone shades so; 4.5 has what versions.py tells apart: scenes, pictures,
+# animation; 5.0 has the rest, and test-light what Cycles shades. The faults that are made on purpose, and the sample scenes, are the oldest's, whose files the
 # latter are.
 TOUCHING_BLENDER = tests/blender tests/test_crashes.py \
 	$(shell grep -lE 'importorskip\("bpy"\)' tests/test_*.py tests/commands/test_*.py tests/comparison/test_*.py | grep -v test_project)
+tests-4.4 = tests/blender/light/test_closures.py tests/blender/light/test_normals.py
+without-4.4 = $(without-4.5)
 tests-4.5 = tests/blender $(foreach each,interface jobs light,--ignore=tests/blender/$(each))
 without-4.5 = $(empty) and not slow
 tests-5.0 = $(TOUCHING_BLENDER)
@@ -146,7 +150,7 @@ tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-ou
 test-wheel-%: .venvs/%/ready
 	$(call PARALLEL,.venvs/$*) --hypothesis-profile=quick -m "not exhaustive and not light and not speed$(without-$*)" $(tests-$*)
 
-test-light: $(MATRIX:%=test-light-%)
+test-light: $(patsubst %,test-light-%,$(filter-out 4.4,$(MATRIX)))
 
 # The oldest and the newest share the scenes out, the newest having those that take long; of the versions between them one or two
 # tell whether Cycles shades otherwise.

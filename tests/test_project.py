@@ -604,6 +604,17 @@ except AttributeError as error:
     assert outcome.returncode == 0 and "has no attribute 'nothing'" in outcome.stdout, outcome.stderr
 
 
+def test_rooms_that_tests_in_a_window_ask_for_by_name_are_there():
+    """They are looked up only there, in a Blender that most changes never start."""
+    rooms = {
+        (path.name, name.removeprefix("blender."))
+        for path in (ROOT / "tests" / "real_blender").glob("*.py")
+        for name in re.findall(r'\broom\("([\w.]+)"\)', path.read_text(encoding="utf-8"))
+    }
+    lost = [(file, name) for file, name in rooms if not (PACKAGE / "blender" / f"{name.replace('.', '/')}.py").exists()]
+    assert len(rooms) > 20 and not lost, lost
+
+
 def test_what_the_readme_says_to_make_can_be_made():
     targets = set(re.findall(r"(?m)^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8")))
     promised = set(re.findall(r"(?m)(?:`|^ *)make ([a-z-]+)", (ROOT / "README.md").read_text(encoding="utf-8")))

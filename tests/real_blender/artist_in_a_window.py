@@ -791,11 +791,11 @@ def make_a_photo():
     region("VIEW_3D", "WINDOW")[0].spaces.active.region_3d.view_perspective = "CAMERA"
     yield from settle()
     push_undo("before")
-    _photo[:] = matrix, edges, room("interface.kept").state(camera)
+    _photo[:] = matrix, edges, room("interface.dragging").state(camera)
 
 
 def _is_as_before():
-    return room("interface.kept").state(bpy.data.objects["Camera"]) == _photo[2]
+    return room("interface.dragging").state(bpy.data.objects["Camera"]) == _photo[2]
 
 
 def escape_from_a_match():

@@ -129,7 +129,14 @@ WIDE = {
     "rough": node("diffuse", color=BLUE, roughness=0.7),
     "plastic": node("principled", base_color=RED, normal=node("bump", height=node("noise"), distance=0.1)),
     "painted": node(
-        "principled", base_color=OUTWARDS, metallic=0.4, roughness=OUTWARDS, specular_ior_level=0.8, diffuse_roughness=0.3
+        "principled",
+        base_color=OUTWARDS,
+        metallic=0.4,
+        roughness=OUTWARDS,
+        specular_ior_level=0.8,
+        diffuse_roughness=0.3,
+        coat_weight=OUTWARDS,
+        coat_tint=RED,
     ),
     "brushed": node(
         "mix",

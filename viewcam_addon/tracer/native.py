@@ -30,7 +30,7 @@ from .scene.film import FILTERS
 from .scene.lamps import RAYS, Lamp, World
 from .scene.materials import PLAIN, Color, Material
 from .scene.shader_nodes import KINDS, Closure, Node
-from .scene.value_nodes import IES, OWN
+from .scene.value_nodes import IES, OWN, bump_filter_width
 from .tiles import Passes
 
 LIGHT = (*LIGHT_PASSES, "Sample Count")
@@ -423,9 +423,8 @@ class CoreScene:
             described = (_Closure * len(closures))(*closures)
             normal: Node | None = None
             if material.displacement is not None:
-                normal = Node(
-                    "bump", (("height", material.displacement), ("distance", 1.0), ("filter_width", _filter_width(scene)))
-                )
+                width = bump_filter_width(scene.cycles)
+                normal = Node("bump", (("height", material.displacement), ("distance", 1.0), ("filter_width", width)))
                 self.add_nodes(normal, images, nodes)
             turned = _color(normal or (0.0, 0.0, 0.0), images, nodes)
             self.check(self.core.add_material(self.handle, described, len(closures), turned, material.transparent_shadow))
@@ -670,11 +669,6 @@ def sobol(seed: int, samples: int, pixels: NDArray, numbers: NDArray, first: int
     if core().probe_sobol(*arguments):
         raise MemoryError
     return points
-
-
-def _filter_width(scene: Scene) -> float:
-    """The distance in pixels at which slopes of displacements are taken, as by Cycles, which has had a choice since 4.5."""
-    return 0.1 if scene.cycles >= (4, 5) else 1.0
 
 
 def kinds(names: frozenset[str]) -> int:

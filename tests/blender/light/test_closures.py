@@ -33,7 +33,7 @@ ROUGHNESSES = (0.2, 0.5, 0.8, 1.0)
 # in 4.2 2.2e-5, on Windows 2.1e-5); the tables' own differences (2.7e-5, 7.8e-5), and those of facets as rough as can be
 # (1.3e-4); an exponential in float32 far off a lobe (8.6e-7, 1.2e-4); refraction (7e-7, 3.3e-5); facets that are narrow one way
 # (7.4e-7, 9.1e-6, the narrowest of all round an axis 3.4e-5); velvet's exponential (9e-7, 2.8e-5).
-FORMULAS = (5e-7, 2.5e-5 if bpy.app.version < (4, 3) or sys.platform == "win32" else 2e-5)
+FORMULAS = (5e-7, 2.5e-5 if bpy.app.version < (4, 4) or sys.platform == "win32" else 2e-5)
 STRETCHED = SHEEN = (1e-6, 4e-5)
 TABLES, ROUGHEST, BECKMANN, REFRACTED = (3e-5, 1e-4), (3e-5, 1.5e-4), (1.2e-6, 1.5e-4), (1e-6, 4e-5)
 

@@ -274,12 +274,12 @@ def test_links_that_go_in_a_circle_are_none_as_in_cycles(pictures, floor):
     lamp.use_nodes = True
     trees = floor.node_tree, lamp.node_tree
     before = [len(tree.links) for tree in trees]
-    for tree, kind, name in zip(trees, ("BSDF_DIFFUSE", "EMISSION"), ("Color", "Strength"), strict=True):
+    for tree, kind, name in zip(trees, ("BsdfDiffuse", "Emission"), ("Color", "Strength"), strict=True):
         first, second = (tree.nodes.new("ShaderNodeMath") for _ in range(2))
         for node, number in ((first, 0.25), (second, 0.5)):
             node.inputs[0].default_value, node.inputs[1].default_value = number, 0.125
         tree.links.new(first.outputs[0], second.inputs[0])
-        shader = next(node for node in tree.nodes if node.type == kind)
+        shader = next(node for node in tree.nodes if node.bl_idname == f"ShaderNode{kind}")
         tree.links.new(second.outputs[0], shader.inputs[name])
         tree.links.new(second.outputs[0], first.inputs[0])
     sides = pictures(scenes=1)

@@ -18,6 +18,7 @@ from viewcam_addon.blender.temporary_settings import overridden
 from viewcam_addon.tracer.scene.colors import RGBE
 from viewcam_addon.tracer.scene.materials import PLAIN_COLOR, Color, Material, sum_of
 from viewcam_addon.tracer.scene.shader_nodes import KINDS, SHADERS, Node, node
+from viewcam_addon.tracer.scene.value_nodes import bump_filter_width
 
 RED, GREEN = (0.5, 0.25, 0.125), (0.0, 1.0, 0.5)
 
@@ -130,7 +131,15 @@ VALUES = [
     node("layer_weight", normal=node("normal_map", color=CHECKS, strength=0.5, space="blender_object", uv="Second")),
     node(
         "layer_weight",
-        normal=node("bump", height=CHECKS, strength=0.5, distance=0.25, filter_width=1.0, invert=True, normal=NORMAL),
+        normal=node(
+            "bump",
+            height=CHECKS,
+            strength=0.5,
+            distance=0.25,
+            filter_width=bump_filter_width(bpy.app.version[:2]),
+            invert=True,
+            normal=NORMAL,
+        ),
     ),
     node("hue_saturation", color=node("gamma", color=node("bright_contrast", color=node("invert", color=CHECKS)), gamma=0.5)),
 ]

@@ -156,7 +156,7 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
         for name, theirs in row.inputs.items():
             socket = value_nodes.input_of(added, theirs)
             if socket is None:
-                _want_as_before(added, theirs, node[name], row.before[name])
+                _want_as_before(added, theirs, node[name], row.before[name](versions.CYCLES))
             elif KINDS[node.type].inputs[name] not in (UV, GENERATED, POSITION, *OWN) or name in dict(node.inputs):
                 _color(adder, socket, node[name], reading)
     sockets = [socket for socket in added.outputs if row.outputs.get(socket.identifier, "") == word]

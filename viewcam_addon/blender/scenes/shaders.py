@@ -463,7 +463,7 @@ class Tree:
                 continue
             socket = value_nodes.input_of(node, theirs)
             if socket is None:
-                inputs[name] = (row.before[name],) * 3
+                inputs[name] = (row.before[name](versions.CYCLES),) * 3
                 continue
             is_beside, self._is_beside = self._is_beside, self._is_beside or name == "height"
             read = self._value_input(Input(socket, output.groups), known)

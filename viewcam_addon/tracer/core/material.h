@@ -74,7 +74,7 @@ struct Material {
         // Any surface that is not plainly diffuse has its smooth normals bent, too (specular_normal).
         Mask<NumberOf<At>> bent = VIEWCAM_ISA::is_black(at.point.shading - at.point.normal) == Mask<NumberOf<At>>{};
         if (bumped_) bent = bent == bent;  // everywhere
-        if (bumped_ || (kinds_ != DIFFUSE && any(bent))) bsdf.bump(bent, {at.point.shading, at.version >= CYCLES_4_3, at.version >= CYCLES_5_0});
+        if (bumped_ || (kinds_ != DIFFUSE && any(bent))) bsdf.bump(bent, {at.point.shading, at.version >= CYCLES_4_5, at.version >= CYCLES_5_0});
         for (const WeightedClosure& weighted : closures) add(weighted, at, bsdf);
         return bsdf;
     }

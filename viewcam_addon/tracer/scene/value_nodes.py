@@ -78,7 +78,7 @@ class BlenderNode:
     words, flags, names, numbers : our name of an input → the property.
     spelled : the words that are not ours in capitals → Blender's.
     fixed : property → the value that it must have.
-    before : the values that older versions compute with, of inputs that they lack.
+    before : inputs that older versions lack, each with the function of the version that gives the number they compute with.
     unnamed : the name that an empty one stands for.
     """
 
@@ -92,7 +92,7 @@ class BlenderNode:
     numbers: Mapping[str, str] = field(default_factory=dict)
     spelled: Mapping[str, str] = field(default_factory=dict)
     fixed: Mapping[str, str | bool] = field(default_factory=dict)
-    before: Mapping[str, float] = field(default_factory=dict)
+    before: Mapping[str, Callable[[tuple[int, int]], float]] = field(default_factory=dict)
     unnamed: str = ""
 
     @property
@@ -115,6 +115,14 @@ class ValueNode:
 
     inputs: Mapping[str, Default]
     blender: tuple[BlenderNode, ...]
+
+
+def bump_filter_width(version: tuple[int, int]) -> float:
+    """The distance in pixels at which the Cycles of a version takes the slopes of heights, unless a node says another.
+
+    Nodes can say it since 4.5.
+    """
+    return 0.1 if version >= (4, 4) else 1.0
 
 
 def _row(inputs: Mapping[str, Default], *blender: BlenderNode) -> ValueNode:
@@ -294,7 +302,7 @@ KINDS: dict[str, ValueNode] = {
             "normal": NORMAL,
             "invert": False,
         },
-        BlenderNode("BUMP", "Bump", {"Normal": None}, flags=_as_they_are("invert"), before={"filter_width": 1.0}),
+        BlenderNode("BUMP", "Bump", {"Normal": None}, flags=_as_they_are("invert"), before={"filter_width": bump_filter_width}),
     ),
     "math": _row(
         {"operation": tuple(MATH.split()), "a": 0.5, "b": 0.5, "c": 0.5, "clamp": False},

@@ -18,12 +18,12 @@ namespace viewcam::VIEWCAM_ISA {
 
 // The end of light on a bumped surface: what bumps turn towards the light may lie where the surface itself looks away.
 //
-// As in Cycles: since 4.3 bumps shadow diffuse light as microfacets would (Conty Estevez et al., A Microfacet-Based Shadowing Function
+// As in Cycles: since 4.5 bumps shadow diffuse light as microfacets would (Conty Estevez et al., A Microfacet-Based Shadowing Function
 // to Solve the Bump Terminator Problem, Ray Tracing Gems, 2019), before that it is faded by a cubic (Chiang et al., Taming the Shadow
 // Terminator, 2019).
 template <class T> struct ShadowTerminatorOf {
     Vec3Of<T> smooth;  // the normal without bumps
-    bool by_facets, of_all;  // since 4.3; since 5.0, of light that is not diffuse, too
+    bool by_facets, of_all;  // since 4.5; since 5.0, of light that is not diffuse, too
 
     // The share that is left of light from a direction, scattered by a lobe with a bumped normal.
     T left(Vec3Of<T> bumped, bool is_diffuse, Vec3Of<T> to_light) const {

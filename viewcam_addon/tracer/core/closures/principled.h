@@ -121,7 +121,7 @@ struct PrincipledClosure {
         T cosine = -dot(normal, at.incoming), eta = max(at.number(coat_ior), splat<T>(1)), reflected = fresnel(cosine, eta);
         FacetsOf<T> facets = facets_of(at.number(coat_roughness));
         Scattering<T> scattered;
-        if (at.version >= CYCLES_4_3) {
+        if (at.version >= CYCLES_4_5) {
             scattered = Scattering<T>::of(multiple_reflection(at, normal, facets, gray(mean_fresnel(eta))));
             T seen = mix(f0_of(eta), splat<T>(1), fresnel_progress_seen<T>(eta, roughness_of(facets), cosine));
             reflected = select(Mask<T>(eta > 1.0), seen, reflected);

@@ -14,7 +14,7 @@
 namespace viewcam::VIEWCAM_ISA {
 
 // The versions of Blender whose Cycles computes materials in ways of its own: what is meant is the newest that is not newer.
-enum CyclesVersion { CYCLES_4_2 = 402, CYCLES_4_3 = 403, CYCLES_5_0 = 500, CYCLES_5_1 = 501, CYCLES_5_2 = 502 };
+enum CyclesVersion { CYCLES_4_2 = 402, CYCLES_4_3 = 403, CYCLES_4_5 = 405, CYCLES_5_0 = 500, CYCLES_5_1 = 501, CYCLES_5_2 = 502 };
 
 // The types of values: as a number, a color counts by its luminance and a vector by its mean.
 enum class Gives { NUMBER, COLOR, VECTOR };
