@@ -148,6 +148,24 @@ def test_rough_glass_under_an_image_of_the_sky_has_cycles_weights(take, make_mat
     check(take(arrange=arrange))
 
 
+@pytest.mark.parametrize("roughness", [0.8, 1.0])
+def test_rough_gloss_on_a_tilted_normal_is_cycles(take, make_material, roughness):
+    """Before 5.0 rays count that facets send below the plane of the normal and above the surface: up to 1.3 % of the light."""
+
+    def arrange(_):
+        for lamp in [each for each in bpy.data.objects if each.type == "LIGHT"]:
+            bpy.data.objects.remove(lamp)
+        material = make_material("Rough", "ShaderNodeBsdfGlossy", Color=(0.9, 0.8, 0.7, 1), Roughness=roughness)
+        tree = material.node_tree
+        tilted = tree.nodes.new("ShaderNodeCombineXYZ")
+        for socket, value in zip(tilted.inputs, (0.3, 0.1, 1.0), strict=True):
+            socket.default_value = value
+        tree.links.new(tilted.outputs[0], tree.nodes["Shader"].inputs["Normal"])
+        bpy.data.objects["Floor"].data.materials[0] = material
+
+    check(take(arrange=arrange, level="direct", samples=64))
+
+
 def surround(set_world, pixels):
     """Put an image, turned, around the world. pixels : (height, width, 4)."""
     height, width, _ = pixels.shape

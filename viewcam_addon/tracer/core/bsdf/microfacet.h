@@ -89,26 +89,32 @@ template <class T> struct MicrofacetReflectionOf : MicrofacetLobeOf<T> {
     static constexpr RayKind KIND = GLOSSY;
     static constexpr bool DELTA = false, IS_DIFFUSE = false;
     using MicrofacetLobeOf<T>::color, MicrofacetLobeOf<T>::frame, MicrofacetLobeOf<T>::wi, MicrofacetLobeOf<T>::facets, MicrofacetLobeOf<T>::fresnel;
+    // True if rays count that facets send below the plane of a normal, as in Cycles before 5.0; none is asked of lights there.
+    bool goes_below = false;
 
     T importance() const { return this->albedo(reflectance(fresnel, wi.z)); }
-    Vec3Of<T> eval(Vec3Of<T> to_light) const { return eval_local(frame.to_local(to_light)); }
-    T pdf(Vec3Of<T> to_light) const { return pdf_local(frame.to_local(to_light)); }
+    Vec3Of<T> eval(Vec3Of<T> to_light) const { return eval_local(frame.to_local(to_light), false); }
+    T pdf(Vec3Of<T> to_light) const { return pdf_local(frame.to_local(to_light), false); }
     LobeSampleOf<T> sample(Vec2Of<T> u) const {
         Vec3Of<T> h = facets.sample_visible(wi, u), wo = h * (2.0 * dot(wi, h)) - wi;
-        T pdf = pdf_local(wo);
-        return {frame.to_world(wo), select(Mask<T>(pdf > 0.0), eval_local(wo) / pdf, Vec3Of<T>{}), pdf};
+        T pdf = pdf_local(wo, goes_below);
+        return {frame.to_world(wo), select(Mask<T>(pdf > 0.0), eval_local(wo, goes_below) / pdf, Vec3Of<T>{}), pdf};
     }
 
    private:
-    Vec3Of<T> eval_local(Vec3Of<T> wo) const {
-        Mask<T> above = Mask<T>(wi.z > 0.0) & Mask<T>(wo.z > 0.0);
+    Mask<T> is_above(Vec3Of<T> wo, bool or_below) const {
+        Mask<T> seen(wi.z > 0.0);
+        return or_below ? seen : seen & Mask<T>(wo.z > 0.0);
+    }
+    Vec3Of<T> eval_local(Vec3Of<T> wo, bool or_below) const {
+        Mask<T> above = is_above(wo, or_below);
         if (!any(above)) return {};
         Vec3Of<T> h = normalize(wi + wo);
         Vec3Of<T> light = color * reflectance(fresnel, dot(wi, h)) * (facets.d(h) * facets.g(wi, wo) / (4.0 * wi.z));
         return select(above, light, Vec3Of<T>{});
     }
-    T pdf_local(Vec3Of<T> wo) const {
-        Mask<T> above = Mask<T>(wi.z > 0.0) & Mask<T>(wo.z > 0.0);
+    T pdf_local(Vec3Of<T> wo, bool or_below) const {
+        Mask<T> above = is_above(wo, or_below);
         if (!any(above)) return T{};
         Vec3Of<T> h = normalize(wi + wo);
         return select(above, facets.pdf_visible(wi, h) / (4.0 * dot(wi, h)), T{});

@@ -82,7 +82,7 @@ inline void add_reflection(BSDFOf<T>& bsdf, const At& at, Vec3Of<T> color, Vec3O
     FrameOf<T> frame(normal);
     if constexpr (IS_ONE<At>)
         if (!is_black(facets.tangent)) frame = frame_along(normal, facets.tangent);
-    bsdf.add(MicrofacetReflectionOf<T>{{color, frame, frame.to_local(-at.incoming), facets, fresnel}});
+    bsdf.add(MicrofacetReflectionOf<T>{{color, frame, frame.to_local(-at.incoming), facets, fresnel}, at.version < CYCLES_5_0});
 }
 // Adds the refraction of what `fresnel` lets through. ratio: see `refracted`.
 inline void add_refraction(BSDF& bsdf, const ShadingPoint& at, Vec3 color, Vec3 normal, const Facets& facets, const Fresnel& fresnel,
