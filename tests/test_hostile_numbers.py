@@ -200,7 +200,7 @@ def what_a_camera_says(source):
     answer(camera.cropped, source.number(), source.number(), source.choice(WHOLES), 48)
 
 
-@attacks("pinhole.Pinhole.of_poses", "pinhole.make_views")
+@attacks("pinhole.Pinhole.of_poses", "pinhole.basis_of_views", "pinhole.make_views")
 def many_poses(source):
     """Refused where one of them is, and else what they are one by one; but that in an array True is 1, as for NumPy."""
     plane, draw = some_camera(source).plane, source.choice((source.number, source.finite))
@@ -210,8 +210,11 @@ def many_poses(source):
     alone = [answer(Pinhole, *pose, plane.distance, plane.width, plane.height, plane.principal_point) for pose in poses]
     assert (pinholes is REFUSED) if REFUSED in alone else (pinholes == alone), (pinholes, alone)
     if all(isinstance(x, float) for x in numbers):
-        valid = pinhole.make_views(*np.array(poses).swapaxes(0, 1))
-        assert valid.tolist() == [camera is not REFUSED for camera in alone], poses
+        views = np.array(poses).swapaxes(0, 1)
+        axes, valid = pinhole.basis_of_views(*views)
+        assert valid.tolist() == pinhole.make_views(*views).tolist() == [camera is not REFUSED for camera in alone], poses
+        for i in np.flatnonzero(valid):  # each within 4e-16 of exact arithmetic
+            assert np.abs(axes[:, i] - alone[i].basis()).max() <= 8e-16, poses[i]
 
 
 @attacks("pinhole.Pinhole.ray_directions", "pinhole.Pinhole.view_plane", "pinhole.Pinhole.project", "pinhole.basis")

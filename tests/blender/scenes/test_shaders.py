@@ -66,6 +66,8 @@ def approximately(material, *words):
 
 
 NORMAL = node("geometry", output="normal")
+# A width in pixels that nodes can be given, or have where they have no choice.
+WIDTH = 1.0 if bpy.app.version >= (4, 5) else bump_filter_width(bpy.app.version[:2])
 CHECKS = node("image", image=Color((1.0, 1.0, 1.0), "Checks"), extension="mirror", interpolation="cubic")
 TEXTURED = node(
     "mix",
@@ -136,7 +138,7 @@ VALUES = [
             height=CHECKS,
             strength=0.5,
             distance=0.25,
-            filter_width=bump_filter_width(bpy.app.version[:2]),
+            filter_width=WIDTH,
             invert=True,
             normal=NORMAL,
         ),
