@@ -21,7 +21,7 @@ STILL = Still(
     "Six matte Suzannes beside Mitsuba",
     "direct",
     (640, 360),
-    {0.003: (1.2, 1.5), 0.001: (1.2, 1.5)},
+    {0.003: (1.3, 1.5), 0.001: (2, 1.8)},
     {OURS: 1024, LLVM: 2048},
 )
 _SQUARES = (4.0, 9.0, 25.0, 49.0, 121.0, 289.0)  # squares of primes, as the orthogonal sampler wants them

@@ -25,7 +25,7 @@ from .contest import Effort, Method
 from .standings import Contested, measured
 from .stills import CYCLES, OURS, PICTURE, WHOLE, Figure, prepare_cycles, start_contestant
 
-_WANTED = {PICTURE: 12.0, WHOLE: 6.0}
+_WANTED = {PICTURE: 10.0, WHOLE: 6.0}
 _LEAST_SHARE = {"geometry": 0.6, "direct": 0.8}
 _SAMPLES = 16  # a pixel, where rays are counted at `direct`
 _ONCE = (1.0,)

@@ -71,16 +71,14 @@ POWERS = tuple(2.0**power for power in range(13))
 ERRORS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005)
 NOISE_THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)
 
-_SUN = {0.003: (12, 8), 0.001: (12, 8)}
-_SOFT = {0.003: (6, 6), 0.001: (6, 6)}
 STILLS = (
-    Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), _SUN, {OURS: 2048, CYCLES: 256}),
-    Still("studio", "Studio still", "direct", (160, 90), _SOFT, {OURS: 4096, CYCLES: 1024}),
+    Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), {0.003: (15, 12), 0.001: (15, 12)}, {OURS: 2048, CYCLES: 256}),
+    Still("studio", "Studio still", "direct", (160, 90), {0.003: (12, 12), 0.001: (12, 12)}, {OURS: 4096, CYCLES: 1024}),
     Still(
         "dressed_studio", "Studio still in artists' materials", "path", (160, 90), {0.01: (3, 3)}, {OURS: 2048, CYCLES: 2048}
     ),
-    Still("spheres", "Sphere field", "direct", (160, 90), _SOFT, {OURS: 4096, CYCLES: 4096}),
-    Still("cornell", "Cornell box", "path", (120, 120), {0.01: (4, 4)}, {OURS: 2048, CYCLES: 2048}),
+    Still("spheres", "Sphere field", "direct", (160, 90), {0.003: (6, 6), 0.001: (6, 6)}, {OURS: 4096, CYCLES: 4096}),
+    Still("cornell", "Cornell box", "path", (120, 120), {0.01: (3, 3)}, {OURS: 2048, CYCLES: 2048}),
 )
 OUR_METHODS = (
     Method(f"{OURS}, adaptive", OURS, "error", ERRORS, ours=True, job=True),
