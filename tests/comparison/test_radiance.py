@@ -354,6 +354,17 @@ def test_passes_that_may_trade_their_light_have_noise_though_their_sum_has_none(
         assert np.isinf(actual.variance[traded]).all() and not actual.variance[~traded].any()
 
 
+def test_colors_and_alpha_have_noise_where_there_is_no_light():
+    """A sample in 64 meets a black thing before another: that its light is quiet says nothing of its color."""
+    lit, white = np.zeros((*SHAPE, 4), np.float32), np.ones((*SHAPE, 3), np.float32)
+    lit[..., 2:, :] = 1.0
+    passes = {"Diffuse_Direct": lit[..., :3], "Diffuse_Color": white}
+    reference, test = painted(lit, Variance=0 * white, **passes), painted(lit, **passes)
+    for name in ("Diffuse Color", "Alpha"):
+        variance = sides(reference, [test, test], name).variance
+        assert np.isinf(variance[:, :2]).all() and not variance[:, 2:].any()
+
+
 def test_roundings_are_no_noise_and_more_is():
     values = np.full((*SHAPE, 3), 2.0)
     assert quiet(values, np.full(values.shape, (8 * 2.0**-23) ** 2)).all()

@@ -4,8 +4,9 @@ of both.
 Several test pictures are one picture rendered with several seeds: their mean is the test, and their spread tells its noise. The
 reference brings the variance of its Combined pass along. Of the other passes only the spread is known, and that the reference
 has none where its Combined has none and is one pass's light alone. A sum of several may never change while they do: where rays
-go on to glass that shines as brightly as the world, light that is direct once is indirect another time. A reference that was
-traced anew with several seeds tells its noise as the tests do.
+go on to glass that shines as brightly as the world, light that is direct once is indirect another time. And colors and
+alpha may change where there is no light, as at the edge of one unlit thing before another. A reference that was traced anew
+with several seeds tells its noise as the tests do.
 
 Cycles divides Diffuse Direct and Diffuse Indirect by the surface's color, each a mean over the pixel: a quotient of means,
 which on edges depends on the number of samples. So their products with Diffuse Color are compared, the light itself.
@@ -116,8 +117,9 @@ def all_sides(reference: Image, tests: Sequence[Image], anew: Sequence[Image] = 
     yield replace(combined, certain=_is_certain(combined, emission[0])) if has_many else combined
     alone = np.any([_is_all(part, combined) for part in parts if part.name in _LIGHT], axis=0)
     is_quiet = quiet(combined.reference, combined.variance) & alone
+    is_lit = (combined.reference > 0.0).any(axis=-1, keepdims=True)
     for part in parts:
-        known = np.where(is_quiet, 0.0, part.variance)
+        known = np.where(is_quiet if part.name in _LIGHT else is_quiet & is_lit, 0.0, part.variance)
         yield replace(part, variance=known, shared=shared if part.name in _TIMES_COLOR else 0.0)
 
 
