@@ -233,6 +233,51 @@ def test_few_bounces_of_each_kind_are_counted_alike(take, make_material, scene):
     check(take())
 
 
+@pytest.mark.parametrize("kind", ["diffuse", "glossy"])
+def test_velvet_scatters_diffuse_rays_of_glossy_light(take, make_material, mesh_from, add, scene, kind):
+    """In a white room, without glossy bounces it has the light of the walls, and without diffuse ones it has none."""
+    setattr(scene.cycles, f"{kind}_bounces", 0)
+    room = add(mesh_from("uv_sphere", radius=8), "Room")
+    room.visible_camera = False
+    room.data.materials.append(make_material("White", "ShaderNodeBsdfDiffuse", Color=(0.9, 0.9, 0.9, 1)))
+
+    def arrange(_):
+        material = make_material("Velvet", "ShaderNodeBsdfSheen", Color=(0.9, 0.8, 0.7, 1), Roughness=1.0)
+        material.node_tree.nodes["Shader"].distribution = "ASHIKHMIN"
+        bpy.data.objects["Floor"].data.materials[0] = material
+        bpy.data.objects["Monkey"].hide_render = True
+        bpy.context.scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+
+    sides = take(arrange=arrange)
+    errors, share = deviation(sides)
+    assert abs(errors) <= MOST and abs(share) < 0.01, f"{errors:+.2f} standard errors, {share:+.3%}"
+
+
+def test_bumps_shadow_no_ray_that_a_translucent_sheet_has_scattered(take, make_material, mesh_from, add, set_world):
+    """It is lit from below alone, by a floor in the sun: where the rays that it lets through were shadowed, it was 9 % darker."""
+
+    def arrange(_):
+        for lamp in [each for each in bpy.data.objects if each.type == "LIGHT"]:
+            if lamp.data.type == "AREA":
+                bpy.data.objects.remove(lamp)
+            else:
+                lamp.rotation_euler, lamp.data.angle = (1.1, 0, 0), 0.0
+        set_world((0, 0, 0), 0.0)
+        material = make_material("Sheet", "ShaderNodeBsdfTranslucent", Color=(0.9, 0.8, 0.7, 1))
+        tree = material.node_tree
+        tilted = tree.nodes.new("ShaderNodeCombineXYZ")
+        for socket, value in zip(tilted.inputs, (1.0, 0.0, 1.0), strict=True):
+            socket.default_value = value
+        tree.links.new(tilted.outputs[0], tree.nodes["Shader"].inputs["Normal"])
+        bpy.data.objects["Floor"].data.materials[0] = material
+        bpy.data.objects["Monkey"].hide_render = True
+
+    ground = add(mesh_from("plane", size=200), "Ground", (0, 0, -12))
+    ground.visible_camera = False
+    ground.data.materials.append(make_material("White", "ShaderNodeBsdfDiffuse", Color=(0.9, 0.9, 0.9, 1)))
+    check(take(arrange=arrange, samples=64))
+
+
 @pytest.mark.parametrize("shape", ["BOX", "GAUSSIAN"])
 def test_a_see_through_film_with_its_own_exposure_and_filter(take, scene, shape):
     scene.render.film_transparent, scene.cycles.film_exposure, scene.cycles.pixel_filter_type = True, 1.7, shape

@@ -134,14 +134,15 @@ template <class T> class BSDFOf {
                 lobe(i));
         return sum;
     }
-    // Calls visit(lobe, light, pdf) for the lobes that scatter light from a direction all over, with what they send on, and the density with
-    // which `sample` chooses them and this direction.
+    // Calls visit(lobe, light, lost, pdf) for the lobes that scatter light from a direction all over, with what they send on, what more they
+    // do where `sample` has chosen the direction, and the density with which it chooses them and this direction.
     template <class Visit> void each(Vec3 to_light, Visit&& visit) const {
         for (int i = 0; i < count_; i++)
             std::visit([&](const auto& lobe) {
                 if (lobe.DELTA) return;
                 double left = bumped_ ? terminator_.left(normal_of(lobe), lobe.IS_DIFFUSE, to_light) : 1;
-                visit(lobe, lobe.eval(to_light) * left, share(i) * lobe.pdf(to_light));
+                Vec3 light = lobe.eval(to_light);
+                visit(lobe, light * left, light * (lobe.IS_DIFFUSE && lobe.KIND == TRANSMISSION ? 1 - left : 0), share(i) * lobe.pdf(to_light));
             }, this->lobe(i));
     }
     // u_lobe: which lobe, in [0, 1). direction: two numbers in [0, 1) that are made where they are asked for.
@@ -161,7 +162,7 @@ template <class T> class BSDFOf {
                 [&](const auto& lobe) {
                     if (!lobe.DELTA && !u) u = direction();
                     LobeSampleOf<T> of_lobe = lobe.sample(lobe.DELTA ? Vec2Of<T>{} : *u);
-                    if (any(bumped_) && lobe.IS_DIFFUSE)
+                    if (any(bumped_) && lobe.IS_DIFFUSE && lobe.KIND != TRANSMISSION)  // so Cycles has it
                         of_lobe.weight = of_lobe.weight * select(bumped_, terminator_.left(normal_of(lobe), true, of_lobe.direction), splat<T>(1));
                     sample.direction = select(lanes, of_lobe.direction, sample.direction);
                     sample.weight = select(lanes, of_lobe.weight / share(i), sample.weight);

@@ -42,7 +42,7 @@ struct SheenLobe {
 };
 
 struct VelvetLobe {
-    static constexpr RayKind KIND = GLOSSY;
+    static constexpr RayKind KIND = DIFFUSE;  // and its light is glossy: so Cycles has it
     static constexpr bool DELTA = false, IS_DIFFUSE = false;
     Vec3 color, normal, to_viewer;
     double squared_slope;  // the fibers'

@@ -154,13 +154,12 @@ struct MetallicClosure {
 // Sheen of cloth.
 struct SheenClosure {
     static constexpr const char* NAME = "sheen";
-    static constexpr uint32_t KINDS = DIFFUSE | GLOSSY;
+    static constexpr uint32_t KINDS = DIFFUSE;
     Color color, roughness, normal;
     bool fibers;  // or Ashikhmin's velvet
 
     explicit SheenClosure(const Inputs& in)
         : color(in["color"]), roughness(in["roughness"]), normal(in["normal"]), fibers(in.choice("distribution") == "microfiber") {}
-    uint32_t kinds() const { return fibers ? DIFFUSE : GLOSSY; }
     bool is_rough() const { return true; }
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         Vec3 tint = at.color(color) * weight, normal = at.normal(this->normal);

@@ -563,7 +563,7 @@ class PathIntegrator {
             Path& next = block.onwards[onwards];
             next = path;
             next.from = path.from;
-            next.kind = RayKind(sampled.kind), next.diffuse = sampled.is_diffuse;
+            next.kind = RayKind(sampled.kind), next.diffuse = sampled.is_diffuse || next.kind == DIFFUSE;
             next.last = last & sampled.kind;
             next.scattered[row(next.kind)]++;
             next.through = through;
@@ -817,19 +817,21 @@ class PathIntegrator {
     // Light from a direction of which Cycles has more or less than there is, by about so much. A ray that a lobe has scattered carries the
     // light of all lobes there, and its kind says what it sees (`surface_shader_bsdf_sample_closure`); a shadow ray finds a light for the
     // lobes whose class it is not hidden from, where translucence is diffuse, and glass is hidden from if both its kinds are
-    // (`_surface_shader_exclude`). And where no facet refracts, rough refraction has a density, but no ray comes of it.
+    // (`_surface_shader_exclude`). And where no facet refracts, rough refraction has a density, but no ray comes of it; and bumps shadow
+    // translucence for a shadow ray, and not for a scattered one.
     // hidden_from: the kinds of rays that don't see the light. pdfs: between which Cycles' density of a shadow ray is, 0 where there is none;
     // INFINITE where scattered rays don't find the light. all: receives the density of all lobes together.
     [[gnu::noinline]] ScatteredLight weighed_otherwise(const BSDF& bsdf, Vec3 direction, uint32_t hidden_from, Vec2 pdfs, double& all) const {
         constexpr uint32_t BOTH = GLOSSY | TRANSMISSION;
         bool refracts = false, is_chosen = lights_.count() > 1 || lights_.has_meshes();
+        bool is_weighed = pdfs.x == 0 || (pdfs.x < INFINITE && is_chosen);
         double seeing = 0;
         all = 0;
         auto no_facet = [&](const auto& lobe) {
             if constexpr (requires { lobe.has_facet(direction); }) return !lobe.has_facet(direction);
             return false;
         };
-        bsdf.each(direction, [&](const auto& lobe, Vec3, double density) {
+        bsdf.each(direction, [&](const auto& lobe, Vec3, Vec3, double density) {
             if constexpr (requires { lobe.has_facet(direction); }) refracts = true;
             is_chosen |= lobe.IS_DIFFUSE;
             all += density;
@@ -837,14 +839,17 @@ class PathIntegrator {
         });
         double carried = all > 0 ? seeing / all : 0;
         ScatteredLight sum;
-        bsdf.each(direction, [&](const auto& lobe, Vec3 light, double) {
-            uint32_t hiding = lobe.IS_DIFFUSE ? hidden_from & DIFFUSE : refracts ? (hidden_from & BOTH) == BOTH : hidden_from & lobe.KIND;
+        bsdf.each(direction, [&](const auto& lobe, Vec3 light, Vec3 lost, double) {
+            uint32_t hiding = lobe.IS_DIFFUSE ? hidden_from & DIFFUSE
+                              : refracts      ? (hidden_from & BOTH) == BOTH
+                                              : hidden_from & (lobe.KIND == DIFFUSE ? GLOSSY : lobe.KIND);
             double ours = hidden_from & lobe.KIND ? 0 : 1;
             auto off = [&](double pdf) {
                 double asked = power_heuristic(pdf, all);
                 return std::fabs((hiding ? 0 : asked) + (1 - asked) * carried - ours);
             };
             (lobe.IS_DIFFUSE ? sum.diffuse : sum.other) += light * (no_facet(lobe) ? double(is_chosen) : max(off(pdfs.x), off(pdfs.y)));
+            if (is_weighed && lobe.IS_DIFFUSE) sum.diffuse += lost;
         });
         return sum;
     }
