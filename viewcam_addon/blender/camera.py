@@ -434,7 +434,8 @@ class CameraSync:
         stood = values
         # A render's graph writes nothing back to the camera, so that its state says nothing of how it stands there.
         others = conversion.PARTS - decided
-        if causes.may_move(camera_object, others) and (is_render or not self.is_untouched(by_values=True)):
+        is_moved = causes.may_move(camera_object, others) and (is_render or not self.is_untouched(by_values=True))
+        if is_moved or (findings.DISTANCE in others and not is_render and self._has_another_lens()):
             values, level = self._carried(evaluated, values, level, decided, scene, depsgraph)
         self._place(rolls.turned(level, hold.roll(evaluated, values, scene)), scene, depsgraph, decided)
         if is_render:
@@ -455,6 +456,10 @@ class CameraSync:
         if camera_object.parent or camera_object.constraints or self._state != conversion.state_of(camera_object):
             return False
         return by_values or self._values == storage.load(camera_object)
+
+    def _has_another_lens(self) -> bool:
+        """True if a script has set the lens or the sensor since the camera was last seen to agree with its values."""
+        return self._state is None or self._state[1:] != conversion.state_of(self.camera_object)[1:]
 
     def doubt(self) -> None:
         """Take it that the camera may have been moved without its values: `carry` leaves it alone until they agree."""
