@@ -72,7 +72,9 @@ ERRORS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005)
 NOISE_THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)
 
 STILLS = (
-    Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), {0.003: (15, 12), 0.001: (15, 12)}, {OURS: 2048, CYCLES: 256}),
+    Still(
+        "suzannes", "Six Suzannes, one sun", "direct", (640, 360), {0.003: (15, 12), 0.001: (15, 12)}, {OURS: 2048, CYCLES: 256}
+    ),
     Still("studio", "Studio still", "direct", (160, 90), {0.003: (12, 12), 0.001: (12, 12)}, {OURS: 4096, CYCLES: 1024}),
     Still(
         "dressed_studio", "Studio still in artists' materials", "path", (160, 90), {0.01: (3, 3)}, {OURS: 2048, CYCLES: 2048}

@@ -431,6 +431,29 @@ def test_a_camera_that_was_moved_by_hand_is_brought_back_by_the_next_frame(crowd
     assert states(crowd)[0][0] == expected[0][0]
 
 
+@pytest.mark.parametrize("number", [1, 4], ids=["alone", "carried together"])
+@pytest.mark.parametrize(("name", "value"), [("lens", 85.0), ("sensor_width", 24.0)])
+def test_a_lens_that_a_script_sets_between_two_frames_counts_under_a_keyed_eye(add_camera, scene, number, name, value):
+    """No update comes in between; the cameras are seen at a frame before."""
+    flying = [add_camera(f"Camera {i}") for i in range(number)]
+    for camera_object in flying:
+        group = camera_object.virtual_pinhole
+        group.enabled = True
+        for frame in (1, 60):
+            group.eye = KEYS["eye"](0, frame)
+            group.keyframe_insert("eye", frame=frame)
+    for frame in (1, 2, 3):
+        scene.frame_set(frame)
+    for camera_object in flying:
+        setattr(camera_object.data, name, value)
+    for frame in (4, 5):
+        scene.frame_set(frame)
+        for camera_object in flying:
+            assert getattr(camera_object.data, name) == value
+            assert findings.differences(cameras.stated(camera_object, scene), cameras.read(camera_object, scene), 20) == {}
+            assert camera_object.virtual_pinhole.focal_length == pytest.approx(camera_object.data.lens)
+
+
 @pytest.fixture
 def flock(add_camera, scene):
     """Cameras in use in each rotation mode, with keyframes of their own; some of them with more that moves or holds them."""

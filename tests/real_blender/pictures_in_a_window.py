@@ -40,6 +40,7 @@ FOLDER, PHOTO, *PARTS = sys.argv[sys.argv.index("--") + 1 :]
 FOLDER, PHOTO = Path(FOLDER), Path(PHOTO)
 STUDIO = Path(__file__).resolve().parent.parent.parent / "sample_scenes" / "studio.blend"
 SAMPLES, PATIENCE = 8, 3000  # light's, and seconds until it is there
+WIDER = 60  # pixels that the engine's settings take of the viewport for its picture
 EDGE, LEGEND = 24, 70  # pixels around the pictures of a proof, and below them
 # (axis, start, end) of edges of the room, world space.
 EDGES = (
@@ -72,6 +73,8 @@ def photo_match():
     background.image, background.alpha = photo, 1.0
     camera.data.show_background_images = True
     view, part = region(*VIEWPORT)
+    overlay = view.spaces.active.overlay  # the world's axes have the colors of the edges
+    overlay.show_floor = overlay.show_axis_x = overlay.show_axis_y = False
     view.spaces.active.region_3d.view_perspective = "CAMERA"
     yield from hide_the_sidebar()
     yield from settle()
@@ -172,6 +175,7 @@ def reference_in_the_viewport():
     scene.render.engine, scene.virtual_pinhole_reference.samples = "VIEWCAM", SAMPLES
     properties, _ = region("PROPERTIES", "WINDOW")
     properties.spaces.active.context = "RENDER"
+    yield from widen(properties, WIDER)  # the engine's name has room
     view.spaces.active.shading.type = "RENDERED"
     live = room("rendering.live_view").LiveView
     yield from until(lambda: any(each.samples == SAMPLES for each in live._all), "the light", PATIENCE)
@@ -179,6 +183,18 @@ def reference_in_the_viewport():
     right, bottom = properties.x + properties.width, view.y
     photograph((view.x, bottom, right - view.x, view.height), FOLDER / "engine.png", 60)
     view.spaces.active.shading.type = "SOLID"
+    yield from widen(properties, -WIDER)
+
+
+def widen(area, pixels):
+    """Steps that move the left edge of an area, through whose neighbor the camera is seen."""
+    edge = {"x": area.x - 1, "y": area.y + area.height // 2}
+    move(**edge)  # with the mouse over an editor it is refused
+    yield from settle()
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.screen.area_move(**edge, delta=-pixels)
+    yield from settle()
+    call(bpy.ops.view3d.view_center_camera)
     yield from settle()
 
 

@@ -37,6 +37,9 @@ class Enable(Step):
 
     picture = "enable.png"
 
+    def prepare(self):
+        camera().rotation_euler.x = math.radians(60)  # the numbers of its look-at point fit beside their letters
+
     def by_hand(self):
         self.stood = axes()
         yield from push("virtual_pinhole.enabled")
@@ -142,16 +145,16 @@ class Zoom(Step):
 
 
 class Roll(Step):
-    """An angle that turns up about the view."""
+    """An angle that turns up about the view; to the side on which the viewport shows it best."""
 
     picture = "roll.png"
     shows = UPPER_PART
 
     def by_hand(self):
-        yield from type_into("virtual_pinhole.roll", "20")
+        yield from type_into("virtual_pinhole.roll", "-20")
 
     def by_script(self):
-        values().roll = math.radians(20)
+        values().roll = math.radians(-20)
 
     def check(self):
         w = axes()[:, 2]

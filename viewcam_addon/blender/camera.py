@@ -201,11 +201,11 @@ class CameraSync:
         keep : names of values that stay as they are; the others follow the camera.
         """
         camera_object = self.camera_object
-        was_in_use = storage.load(camera_object).set_for is not None and not keep
-        standing = as_it_stands(camera_object, scene, in_use=was_in_use)
+        was_in_use = storage.load(camera_object).set_for is not None
+        standing = _standing(camera_object, scene, was_in_use and not keep)
         values = storage.load(camera_object)
         is_said_by_roll = values.enabled and values.pole == HOLD and values.held_roll != 0
-        if was_in_use and not is_said_by_roll and _agrees(camera_object, scene):
+        if was_in_use and not is_said_by_roll and _agreed(camera_object, scene):
             storage.enable(camera_object)
             return
         storage.begin(camera_object)
@@ -434,7 +434,8 @@ class CameraSync:
         stood = values
         # A render's graph writes nothing back to the camera, so that its state says nothing of how it stands there.
         others = conversion.PARTS - decided
-        if causes.may_move(camera_object, others) and (is_render or not self.is_untouched(by_values=True)):
+        is_moved = causes.may_move(camera_object, others) and (is_render or not self.is_untouched(by_values=True))
+        if is_moved or (findings.DISTANCE in others and not is_render and self._has_another_lens()):
             values, level = self._carried(evaluated, values, level, decided, scene, depsgraph)
         self._place(rolls.turned(level, hold.roll(evaluated, values, scene)), scene, depsgraph, decided)
         if is_render:
@@ -455,6 +456,10 @@ class CameraSync:
         if camera_object.parent or camera_object.constraints or self._state != conversion.state_of(camera_object):
             return False
         return by_values or self._values == storage.load(camera_object)
+
+    def _has_another_lens(self) -> bool:
+        """True if a script has set the lens or the sensor since the camera was last seen to agree with its values."""
+        return self._state is None or self._state[1:] != conversion.state_of(self.camera_object)[1:]
 
     def doubt(self) -> None:
         """Take it that the camera may have been moved without its values: `carry` leaves it alone until they agree."""
@@ -692,14 +697,15 @@ def _stood_at(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.
     return before if np.abs(off).max() <= findings.LARGEST_TURN else None
 
 
-def _agrees(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
-    """True if the camera stands where its values, in use or not, say."""
+def _agreed(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole | None:
+    """The Pinhole that the values, in use or not, ask for, if the camera stands there."""
     with contextlib.suppress(InputError):
         values, level = _level(camera_object, scene)
         wanted = rolls.turned(level, hold.roll(camera_object, values, scene))
         reach = pose.reach(camera_object, datablocks.depsgraph_of(scene))
-        return not findings.differences(wanted, read(camera_object, scene), reach)
-    return False
+        if not findings.differences(wanted, read(camera_object, scene), reach):
+            return wanted
+    return None
 
 
 def _free(camera_object: bpy.types.Object) -> frozenset[str]:
@@ -726,18 +732,22 @@ def _as_followed(camera_object: bpy.types.Object, eye: Triple, look_at: Triple) 
     return synced[0], synced[1]
 
 
-def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use: bool) -> Pinhole:
+def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     """The pinhole that `adopt` states, unstated: the camera as it stands, with a look-at point and an up that people would
     choose.
 
-    in_use : true to put the look-at point as far from the eye as the values say, if they say anything.
-
     Raises InputError as `read` does.
     """
+    was_in_use = storage.load(camera_object).set_for is not None
+    return (was_in_use and _agreed(camera_object, scene)) or _standing(camera_object, scene, was_in_use)
+
+
+def _standing(camera_object: bpy.types.Object, scene: bpy.types.Scene, was_in_use: bool) -> Pinhole:
+    """`as_it_stands`, the look-at point as far from the eye as the values say if these were ever in use."""
     pinhole = read(camera_object, scene)
     _, v, w = pinhole.basis()
     values = targets.values(camera_object)
-    reach = math.dist(values.eye, values.look_at) if in_use else 0.0
+    reach = math.dist(values.eye, values.look_at) if was_in_use else 0.0
     if not 0 < reach < math.inf:
         reach = _focus_distance(camera_object, pinhole, datablocks.depsgraph_of(scene))
     look_at = tuple((np.array(pinhole.eye) - reach * w).tolist())

@@ -12,7 +12,6 @@ from .. import argument_types as types
 from .. import cameras
 from ..cameras import Camera, Options, transforms, undistortion
 from ..cameras.distortion import Lens
-from ..cameras.sidecar import record
 from ..errors import InputError, several
 from ..files import folder_written_whole
 from ..jobs import makers
@@ -192,9 +191,8 @@ def _st_maps(options: argparse.Namespace) -> Result:
 
 
 def _to_json(camera: Camera) -> dict:
-    values = dataclasses.asdict(camera)
-    kept = {key: values[key] for key in ("size_stated", "image", "time", "notes")}
-    return {**kept, "camera": record(camera.pinhole)["camera"]}
+    kept = {key: getattr(camera, key) for key in ("size_stated", "image", "time", "notes")}
+    return {**kept, "camera": dataclasses.asdict(camera.pinhole)}
 
 
 def _line(camera: Camera) -> str:

@@ -312,6 +312,21 @@ def test_turned_on_again_after_a_bake_one_warning_names_the_keyframes_and_its_bu
         bpy.ops.viewcam.delete_keyframes()
 
 
+def test_turned_on_again_after_a_bake_the_values_that_have_no_keyframes_are_as_they_were(posed_camera, scene):
+    """Not what the plane of focus says: at another frame the camera would look past its look-at point."""
+    group = posed_camera.virtual_pinhole
+    group.up = (0.1, 0, 1)
+    for frame, eye in ((1, (7, -6, 5)), (21, (-7, -6, 5))):
+        group.eye = eye
+        group.keyframe_insert("eye", frame=frame)
+    scene.frame_start, scene.frame_end = 1, 21
+    scene.frame_set(1)
+    before = group.numbers()
+    baking.bake([posed_camera], scene, 1, 21)
+    group.enabled = True
+    assert group.numbers() == before
+
+
 def test_an_animated_parent_and_a_constraint_that_carries_are_taken_into_account(over_the_target, scene):
     dolly, crane = (bpy.data.objects.new(name, None) for name in ("Dolly", "Crane"))
     for item in (dolly, crane):

@@ -426,6 +426,21 @@ def test_a_camera_that_is_not_enabled_shows_its_own_values_grayed_and_one_button
     assert list(offered) == ["name", "enabled"] and offered["enabled"] == {"text": "Use", "toggle": True}
 
 
+@pytest.mark.parametrize("eye", [(7, -6, 5), (0, -8, 2)], ids=["where it was", "moved since"])
+def test_a_camera_that_was_in_use_shows_the_look_at_point_that_use_and_copy_state(posed_camera, scene, eye):
+    group = posed_camera.virtual_pinhole
+    group.enabled = False
+    posed_camera.location = eye
+    bpy.context.view_layer.update()
+    shown = dict(panel.standing(posed_camera, scene))["Look At"]
+    copied = clipboard.camera_of(posed_camera, scene).pinhole.look_at
+    group.enabled = True
+    look_at = group.numbers()[1]
+    assert math.dist(eye, look_at) == pytest.approx(math.dist((7, -6, 5), (0, 0, 1)))
+    assert copied == pytest.approx(look_at, abs=1e-5)
+    assert shown == tuple(datablocks.length(number, scene, digits=4) for number in readouts.rounded(look_at))
+
+
 @pytest.mark.parametrize("width", [NARROWEST, 253, 300, 600])
 def test_no_number_of_a_camera_that_is_not_enabled_is_cut_off(posed_camera, width):
     """Numbers that do not fit beside one another stand one below the other. A window of 1280 pixels has a panel of 253."""

@@ -241,7 +241,7 @@ def camera_of(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> format
     """
     frame = datablocks.frame_of(scene)
     stated = cameras.stated(camera_object, scene)
-    pinhole = stated or cameras.as_it_stands(camera_object, scene, in_use=False)
+    pinhole = stated or cameras.as_it_stands(camera_object, scene)
     whole = picture.at_full_size(pinhole, frame)
     if stated:  # as it was typed
         across = targets.values(camera_object).distance_at_full_size(frame, camera_object.data.sensor_fit)
@@ -290,7 +290,7 @@ def _present(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole
     with contextlib.suppress(InputError):
         if stated := cameras.stated(camera_object, scene):
             return stated
-    return cameras.as_it_stands(camera_object, scene, in_use=False)
+    return cameras.as_it_stands(camera_object, scene)
 
 
 def _differences(pinhole: Pinhole, before: Pinhole) -> str:

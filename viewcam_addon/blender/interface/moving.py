@@ -40,7 +40,7 @@ class _Move(CameraOperator):
 def _pinhole(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     """The camera's values, or the camera as it stands if they are not enabled."""
     stated = cameras.stated(camera_object, scene)
-    return cameras.as_it_stands(camera_object, scene, in_use=False) if stated is None else stated
+    return cameras.as_it_stands(camera_object, scene) if stated is None else stated
 
 
 class _SelectionMove(_Move):

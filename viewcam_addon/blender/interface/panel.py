@@ -97,7 +97,7 @@ def _draw_standing(layout: bpy.types.UILayout, camera_object: bpy.types.Object, 
 def standing(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[tuple[str, tuple[str, ...]]]:
     """(label, texts) of a camera's values as it stands, whatever is stored; none where it is no pinhole."""
     try:
-        pinhole = cameras.as_it_stands(camera_object, scene, in_use=False)
+        pinhole = cameras.as_it_stands(camera_object, scene)
     except InputError:
         return []
     roll = math.degrees(rolls.angle_from(preferences.up_axis(), pinhole))

@@ -332,7 +332,7 @@ def begun(camera_object: bpy.types.Object | None, context: bpy.types.Context) ->
     if scene.render.use_border and scene.render.use_crop_to_border:
         raise InputError("the picture is cropped to the render region: switch Crop to Render Region off")
     stated = cameras.stated(camera_object, scene)
-    like = cameras.as_it_stands(camera_object, scene, in_use=False) if stated is None else stated
+    like = cameras.as_it_stands(camera_object, scene) if stated is None else stated
     if like.mirrored or like.distance[0] != like.distance[1]:
         raise InputError("the picture is mirrored or its pixels are not square: a photo's are neither")
     drawing = Drawing(like, settings.kind, settings.axes, tuple(settings.sides), tuple(scene.cursor.location))

@@ -100,7 +100,7 @@ class VIEWCAM_OT_add_camera(_SceneOperator, bpy.types.Operator):
         try:
             cursor = tuple(scene.cursor.location)
             eye = tuple(a + b for a, b in zip(cursor, _FROM, strict=True))
-            like = cameras.as_it_stands(added, scene, in_use=False)
+            like = cameras.as_it_stands(added, scene)
             wanted = text.Pinhole(
                 eye, cursor, preferences.up_axis(), like.distance, like.width, like.height, like.principal_point
             )

@@ -40,7 +40,7 @@ def pinhole_of(area: bpy.types.Area, like: Pinhole, scene: bpy.types.Scene) -> P
         camera_object = space.camera if space.use_local_camera else scene.camera
         if camera_object is None:
             raise InputError("the viewport looks through a camera that is gone: leave the camera's view")
-        return cameras.as_it_stands(camera_object, scene, in_use=camera_object.virtual_pinhole.enabled)
+        return cameras.as_it_stands(camera_object, scene)
     if view.view_perspective == "ORTHO":
         raise InputError("the viewport is orthographic, no pinhole: switch it to perspective")
     _, v, w = rotation.from_quaternion(view.view_rotation).T

@@ -109,7 +109,7 @@ class BlenderRenderer:
         shot = Job("pinhole", camera=name, width=width, height=height, frame=frame)
         camera_object = obstacles.camera_of(shot, self.scene, obstacles.cameras_of(self.scene, self._own), self._settings)
         self._settings.set(shot)
-        pinhole = cameras.as_it_stands(camera_object, self.scene, in_use=camera_object.virtual_pinhole.enabled)
+        pinhole = cameras.as_it_stands(camera_object, self.scene)
         picture = self._settings.frame_of(shot)
         column, row, _, _ = picture.window
         return pinhole.cropped(-column, -row, *picture.size)
