@@ -432,13 +432,13 @@ def test_a_camera_that_was_in_use_shows_the_look_at_point_that_use_and_copy_stat
     group.enabled = False
     posed_camera.location = eye
     bpy.context.view_layer.update()
-    shown = dict(panel.standing(posed_camera, scene))["Look At"]
+    texts = dict(panel.standing(posed_camera, scene))["Look At"]
     copied = clipboard.camera_of(posed_camera, scene).pinhole.look_at
     group.enabled = True
     look_at = group.numbers()[1]
     assert math.dist(eye, look_at) == pytest.approx(math.dist((7, -6, 5), (0, 0, 1)))
     assert copied == pytest.approx(look_at, abs=1e-5)
-    assert shown == tuple(datablocks.length(number, scene, digits=4) for number in readouts.rounded(look_at))
+    assert texts == tuple(datablocks.length(number, scene, digits=4) for number in readouts.rounded(look_at))
 
 
 @pytest.mark.parametrize("width", [NARROWEST, 253, 300, 600])
