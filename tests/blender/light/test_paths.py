@@ -254,7 +254,7 @@ def test_velvet_scatters_diffuse_rays_of_glossy_light(take, make_material, mesh_
 
 
 def test_bumps_shadow_no_ray_that_a_translucent_sheet_has_scattered(take, make_material, mesh_from, add, set_world):
-    """It is lit from below alone, by a floor in the sun: were the rays that it lets through shadowed, it would be 9 % darker."""
+    """It is lit from below alone, by a floor in the sun: its rays, shadowed, would leave it 9 % darker."""
 
     def arrange(_):
         for lamp in [each for each in bpy.data.objects if each.type == "LIGHT"]:
