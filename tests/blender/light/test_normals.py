@@ -333,6 +333,43 @@ def test_a_smooth_body_is_stretched_along_tangents_of_its_own(render_pair, body,
     assert here.sum() > 300 and summary[1] < (1e-4 if packed else 1e-5) and summary[3] < 2e-3, summary
 
 
+@pytest.fixture
+def bare_body(body):
+    """The monkey without a UV map, and its material."""
+    monkey = bpy.data.objects["Monkey"]
+    while monkey.data.uv_layers:
+        monkey.data.uv_layers.remove(monkey.data.uv_layers[0])
+    return monkey, body[0]
+
+
+@pytest.mark.parametrize("asked_by", ["a map", "a tangent", "a map of the object", "what has a UV map"])
+def test_tangents_of_a_uv_map_that_is_not_there_are_told(scene, tmp_path, bare_body, asked_by):
+    monkey, material = bare_body
+    if asked_by == "a tangent":
+        shader = material.node_tree.nodes["Shader"]
+        shader.inputs["Anisotropic"].default_value = 0.8
+        node = material.node_tree.nodes.new("ShaderNodeTangent")
+        node.direction_type = "UV_MAP"
+        material.node_tree.links.new(node.outputs[0], shader.inputs["Tangent"])
+    else:
+        map_normals(material, ("Normal",), (0.7, 0.4, 0.9), space="OBJECT" if "object" in asked_by else "TANGENT")
+    if asked_by == "what has a UV map":
+        monkey.data.uv_layers.new(name="Other")
+    exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [tmp_path / "told.exr"])
+    told = [entry for entry in exported.ledger if entry.status != "exported"]
+    expected = [("Monkey", True)] if asked_by in ("a map", "a tangent") else []
+    assert [(entry.object, "UV map" in entry.reason) for entry in told] == expected
+
+
+def test_a_map_of_a_uv_map_that_is_named_and_missing_turns_no_normal(render_pair, bare_body):
+    map_normals(bare_body[1], ("Normal",), (0.7, 0.4, 0.9), uv="Lost")
+    traced, cycles, numbers = render_pair(96)
+    here = (numbers == 1) & (cycles.max(axis=-1) > 0) & (traced.max(axis=-1) > 0)
+    apart = np.abs(traced - cycles)[here].max(axis=1) / cycles.max()
+    packed = bpy.app.version >= (5, 1)  # normals as two numbers of 16 bits
+    assert here.sum() > 300 and np.median(apart) < (1e-4 if packed else 1e-5) and apart.max() < 2e-3
+
+
 def test_a_pixel_seen_in_mirrors_is_as_wide_as_its_way_is_long(scene, render_pair, camera, add, make_material):
     floor, mirror = make_material("Floor", DIFFUSE, Color=COLOR), make_material("Mirror", GLOSSY, Roughness=0.0)
     bump(floor, ("Normal",), Distance=0.3)

@@ -157,6 +157,9 @@ def note_object(
             if reading.mixes_refractions:  # Cycles weighs directions that no facet refracts into as if it sampled them
                 reason = "refracts roughly beside another closure that lets light through: Cycles shows up to 5 % more or less"
                 ledger.note(name, "approximated", f"material {material.name!r} {reason}")
+            if reading.material.follows_own_uv and isinstance(evaluated.data, bpy.types.Mesh) and not evaluated.data.uv_layers:
+                reason = "follows a UV map that the mesh has not: Cycles makes tangents round its origin, and here are none"
+                ledger.note(name, "approximated", f"material {material.name!r} {reason}")
             if reading.is_bumped and not material.cycles.use_bump_map_correction:
                 ledger.note(name, "approximated", f"material {material.name!r} has its bumped normals corrected on both sides")
                 ledger.set_for_cycles(material.original.cycles, "use_bump_map_correction", True)

@@ -83,6 +83,14 @@ class Material:
                 yield from maker.all
 
     @property
+    def follows_own_uv(self) -> bool:
+        """True if tangents follow the mesh's own UV map, whatever its name."""
+        needs = {("normal_map", "space", "tangent"), ("tangent", "kind", "uv_map")}
+        return any(
+            node.type == kind and node[name] == value and not node["uv"] for node in self.nodes for kind, name, value in needs
+        )
+
+    @property
     def attributes(self) -> set[str]:
         """The names of the attributes that its nodes ask meshes for."""
         return {name for node in self.nodes for name in node.attributes}
