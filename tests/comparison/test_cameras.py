@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from viewcam_addon.comparison.cameras import conversion_error, systematic_error
+from viewcam_addon.comparison.tolerances import PERCENTILES, ROUNDINGS
 from viewcam_addon.pinhole import Pinhole
 
 STATED = Pinhole((5.0, -7.0, 4.0), (0.0, 0.0, 0.5), (0.0, 0.0, 1.0), 1200.0, 1920, 1080)
@@ -77,6 +78,16 @@ def test_shift_zoom_and_roll_are_told_apart():
     assert (actual.zoom_x, actual.zoom_y) == pytest.approx((1e-3, 1e-3))
     assert actual.roll == pytest.approx(2e-4, rel=2e-3)  # arctan of 2e-4 / 1.001
     assert not actual.ok
+
+
+def test_errors_that_their_percentiles_allow_may_all_go_one_way_and_larger_ones_may_not():
+    pixels = np.arange(0, STATED.width * STATED.height, 997)
+    one_rounding, still = np.full(len(pixels), 1e-2), np.zeros(len(pixels))
+    largest = np.interp(np.linspace(0.0, 100.0, len(pixels)), (0.0, *PERCENTILES), (0.0, *ROUNDINGS)) * one_rounding
+    assert systematic_error(STATED, pixels, largest, still, one_rounding).ok
+    of_bands = np.array(ROUNDINGS)[np.searchsorted(PERCENTILES, np.linspace(0.0, 100.0, len(pixels)))] * one_rounding
+    assert systematic_error(STATED, pixels, still, 0.99 * of_bands, one_rounding).ok
+    assert not systematic_error(STATED, pixels, still, 1.01 * of_bands, one_rounding).ok
 
 
 def test_what_all_share_is_not_hidden_by_a_few_uncertain_pixels():

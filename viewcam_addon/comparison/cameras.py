@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pinhole import Pinhole
-from .tolerances import FILTER_BIAS, FLOAT32, ROUNDINGS
+from .tolerances import FILTER_BIAS, FLOAT32, MEAN_ROUNDINGS
 
 Array = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ def systematic_error(
     pixels : (n,) int, row after row.
     off_x, off_y : (n,) displacements there, pixels to the right and upwards.
     one_rounding : (n,) `position_shift`. A pixel weighs as much as it is certain, so that a few slender triangles do not hide
-        what all the others share. The mean of the errors can't exceed their typical size.
+        what all the others share.
     center : pixels that the renderer's rays are beside the pixels' centers by design.
     """
     row, column = np.divmod(pixels, pinhole.width)
@@ -116,7 +116,7 @@ def systematic_error(
     aspect = pinhole.distance[0] / pinhole.distance[1]
     roll = np.arctan2(shear_y * aspect - shear_x / aspect, 2.0 + zoom_x + zoom_y)
     mean_x, mean_y, typical = (np.average(values, weights=weight**2) for values in (off_x, off_y, one_rounding))
-    figures = (shift_x, shift_y, zoom_x, zoom_y, roll, np.hypot(mean_x, mean_y), ROUNDINGS[0] * typical + center)
+    figures = (shift_x, shift_y, zoom_x, zoom_y, roll, np.hypot(mean_x, mean_y), MEAN_ROUNDINGS * typical + center)
     return Systematic(*(float(figure) for figure in figures))
 
 

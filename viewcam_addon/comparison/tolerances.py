@@ -44,6 +44,8 @@ FILTER_BIAS = 3.505e-6 * 2**0.5
 # up to 8 km from the origin, of smooth and flat meshes, faces of 270 m and text: worst 0.41, 0.94, 1.96, 3.2 and 10, over all
 # hits 0.23, 0.54, 1.0, 1.5 and 10.
 ROUNDINGS = (0.7, 1.4, 3.0, 5.0, 20.0)
+# The mean of errors of which each is as large as the next percentile allows: what all of them share is no larger.
+MEAN_ROUNDINGS = float(np.diff((0.0, *PERCENTILES)) @ ROUNDINGS) / 100.0
 
 FLOAT32 = 2.0**-24
 
