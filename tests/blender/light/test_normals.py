@@ -356,9 +356,9 @@ def test_tangents_of_a_uv_map_that_is_not_there_are_told(scene, tmp_path, bare_b
     if asked_by == "what has a UV map":
         monkey.data.uv_layers.new(name="Other")
     exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [tmp_path / "told.exr"])
-    told = [entry for entry in exported.ledger if entry.status != "exported"]
+    noted = [entry for entry in exported.ledger if entry.status != "exported"]
     expected = [("Monkey", True)] if asked_by in ("a map", "a tangent") else []
-    assert [(entry.object, "UV map" in entry.reason) for entry in told] == expected
+    assert [(entry.object, "UV map" in entry.reason) for entry in noted] == expected
 
 
 def test_a_map_of_a_uv_map_that_is_named_and_missing_turns_no_normal(render_pair, bare_body):
