@@ -105,9 +105,10 @@ class TileSampler {
         return places;
     }
 
-    // Takes samples begin … end of some pixels, and notes their halves when each has `half` samples, unless these are all. They go in groups
-    // that fill a block with some samples of each: the closer together the rays of a block lie, the fewer boxes and triangles it meets. 378,000 triangles under a sun take 0.9 of the time with 16 of each of four pixels,
-    // and not 4 of 16, and 0.98 of that with 64 of one. Where so many would leave blocks half empty, fewer do: 20 of three pixels for 40 each.
+    // Takes samples begin … end of some pixels, and notes their halves when each has `half` samples, unless these are all. They go in
+    // groups that fill a block with some samples of each: the closer together the rays of a block lie, the fewer boxes and triangles it
+    // meets. 378,000 triangles under a sun take 0.9 of the time with 16 of each of four pixels, and not 4 of 16, and 0.98 of that with 64
+    // of one. Where so many would leave blocks half empty, fewer do: 20 of three pixels for 40 each.
     void sample(Tile& tile, const std::vector<uint16_t>& places, uint32_t begin, uint32_t half, uint32_t end, uint32_t batch,
                 const volatile int* stop) const {
         constexpr size_t MOST = PathIntegrator::MOST, CLOSE_ENOUGH = 16;
