@@ -2,7 +2,8 @@
 
 An input is followed to the node that feeds it: reroutes, muted nodes and node groups are looked through. What nothing feeds
 has a value of its own, and so has what a link feeds that counts for nothing: those that Blender marks as invalid, as where
-links go in a circle or from a shader to a color, and those from nodes that only EEVEE has, or that are muted and pass nothing on.
+links go in a circle or from a shader to a color, and those from nodes that only EEVEE has, or that are muted and pass nothing
+on.
 """
 
 from collections.abc import Iterator
