@@ -279,7 +279,7 @@ MUTED = {
 
 @pytest.mark.parametrize("what", MUTED)
 def test_a_muted_node_that_passes_nothing_on_is_none_as_in_cycles(pictures, floor, what):
-    """Where it is not muted, the floor has another color or shines."""
+    """The floor has another color or shines where the node is not muted."""
     tree, shader = floor.node_tree, floor.node_tree.nodes["Shader"]
     node = tree.nodes.new(MUTED[what])
     if what == "shader":
