@@ -287,10 +287,10 @@ def _pose(pinhole: Pinhole) -> dict[str, Any]:
 
 def _present(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     """The camera as it is stated or, where nothing is or what is makes no camera, as it stands."""
-    with contextlib.suppress(InputError):
-        if stated := cameras.stated(camera_object, scene):
-            return stated
-    return cameras.as_it_stands(camera_object, scene)
+    try:
+        return cameras.current(camera_object, scene)
+    except InputError:
+        return cameras.as_it_stands(camera_object, scene)
 
 
 def _differences(pinhole: Pinhole, before: Pinhole) -> str:

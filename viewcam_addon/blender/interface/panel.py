@@ -34,7 +34,7 @@ from . import (
     scene_cameras,
     swipe,
 )
-from .panel_rows import BelowProperties, BelowSidebar, CameraPanel, InProperties, InSidebar, SubPanel
+from .panel_rows import CameraPanel, InProperties, InSidebar, SubPanel
 
 
 @dataclass(frozen=True)
@@ -327,28 +327,9 @@ class VIEWCAM_PT_sidebar(_MainPanel, InSidebar, bpy.types.Panel):
         return context.scene is not None
 
 
-class VIEWCAM_PT_data_options(_OptionsPanel, BelowProperties, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_sidebar_options(_OptionsPanel, BelowSidebar, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_data_move(_MovePanel, BelowProperties, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_sidebar_move(_MovePanel, BelowSidebar, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_data_readouts(_ReadOutsPanel, BelowProperties, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_sidebar_readouts(_ReadOutsPanel, BelowSidebar, bpy.types.Panel):
-    pass
+VIEWCAM_PT_data_options, VIEWCAM_PT_sidebar_options = panel_rows.in_both_places("options", _OptionsPanel)
+VIEWCAM_PT_data_move, VIEWCAM_PT_sidebar_move = panel_rows.in_both_places("move", _MovePanel)
+VIEWCAM_PT_data_readouts, VIEWCAM_PT_sidebar_readouts = panel_rows.in_both_places("readouts", _ReadOutsPanel)
 
 
 class VIEWCAM_MT_cameras(bpy.types.Menu):
