@@ -561,7 +561,7 @@ def _match(solution: Solution, like: Pinhole, precision: float, reach: float, sp
         raise InputError(
             "the principal point can't be told from these: draw longer edges along all three axes, which converge, or keep it"
         )
-    if not (np.isfinite(errors).all() and errors[3] < _LARGEST_ERROR and _is_before(depth)):
+    if not (np.isfinite(errors).all() and errors[3] < _LARGEST_ERROR and (depth is None or depth > 0.0)):
         raise InputError(
             "the lens can't be told from these: draw longer edges, or choose a view that is not head-on, so that lines converge"
         )
@@ -591,7 +591,3 @@ def _match(solution: Solution, like: Pinhole, precision: float, reach: float, sp
     eye_error = tuple(errors[4:].tolist()) if depth is not None else None
     center_error = tuple(errors[4:].tolist()) if is_center_free else None
     return Match(pinhole, precision, left, (distance / factor, distance * factor), eye_error, center_error, pixels)
-
-
-def _is_before(depth: float | None) -> bool:
-    return depth is None or depth > 0.0

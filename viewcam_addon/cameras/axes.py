@@ -115,10 +115,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
         eye=eye,
         look_at=tuple(a - reach * b for a, b in zip(eye, z, strict=True)),
         up=y,
-        distance=plane.distance,
-        width=plane.width,
-        height=plane.height,
-        principal_point=plane.principal_point,
+        **vars(plane),
         mirrored=mirrored,
     )
     return camera, notes
