@@ -655,18 +655,8 @@ def sobol(seed: int, samples: int, pixels: NDArray, numbers: NDArray, first: int
     """(n, dimensions): the sampler's numbers, from dimension `first` on, of samples of n pixels; for tests and benchmarks."""
     pixels, numbers = array(pixels, np.uint32, (None,)), array(numbers, np.uint32, (len(pixels),))
     points = np.empty((len(pixels), dimensions))
-    arguments = (
-        seed & 0xFFFFFFFF,
-        samples,
-        3,
-        len(pixels),
-        _address(pixels),
-        _address(numbers),
-        first,
-        dimensions,
-        _address(points),
-    )
-    if core().probe_sobol(*arguments):
+    of_pixels = len(pixels), _address(pixels), _address(numbers)
+    if core().probe_sobol(seed & 0xFFFFFFFF, samples, 3, *of_pixels, first, dimensions, _address(points)):
         raise MemoryError
     return points
 
