@@ -235,11 +235,7 @@ def from_rectangle(
 
 
 def solve_edges(
-    ends: Array,
-    axes: NDArray[np.int_],
-    half: float,
-    known_distance: float | None = None,
-    is_principal_point_free: bool = False,
+    ends: Array, axes: NDArray[np.int_], half: float, known_distance: float | None = None, is_principal_point_free: bool = False
 ) -> tuple[Solution, NDArray[np.bool_]]:
     """The cameras of edges, and whether those that were drawn are of a mirrored picture.
 
@@ -412,10 +408,7 @@ def _point_residuals(
     d = distance[..., None, None]
     # ∂(column, row)/∂(seen)
     over = (distance[..., None] / away)[..., None, None]
-    to_picture = over * np.concatenate(
-        [np.broadcast_to(np.eye(2), (*away.shape, 2, 2)), slope[..., None]],
-        axis=-1,
-    )
+    to_picture = over * np.concatenate([np.broadcast_to(np.eye(2), (*away.shape, 2, 2)), slope[..., None]], axis=-1)
     turned = to_picture @ -_cross_matrix(seen)
     moved = -to_picture @ (rotation * scale[..., None, None])[..., None, :, :]
     jacobian = np.concatenate([turned, (slope * d)[..., None], moved], axis=-1)

@@ -243,10 +243,7 @@ class CameraSync:
 
     @classmethod
     def carry(
-        cls,
-        cameras: list[tuple["CameraSync", bpy.types.Object, bool]],
-        scene: bpy.types.Scene,
-        depsgraph: bpy.types.Depsgraph,
+        cls, cameras: list[tuple["CameraSync", bpy.types.Object, bool]], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
     ) -> list["CameraSync"]:
         """Bring those cameras, in one pass, of which a frame has changed the values alone, and to those that it has moved the
         values.

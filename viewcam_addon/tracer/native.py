@@ -180,10 +180,7 @@ class _Core(Structure):
         ("light_free", _function(None, c_void_p)),
         ("light_pairs", _function(c_size_t, c_void_p, c_size_t, c_void_p, c_void_p)),
         ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, c_uint32, c_void_p, c_void_p)),
-        (
-            "probe_sobol",
-            _function(c_int, c_uint32, c_uint32, c_int, c_size_t, c_void_p, c_void_p, c_int, c_int, c_void_p),
-        ),
+        ("probe_sobol", _function(c_int, c_uint32, c_uint32, c_int, c_size_t, c_void_p, c_void_p, c_int, c_int, c_void_p)),
         ("probe_filter", _function(c_int, c_int, c_double, c_size_t, c_void_p, c_void_p)),
         ("probe_function", _function(c_int, c_int, c_size_t, c_void_p, c_void_p, c_void_p)),
         ("probe_specular", _function(c_int, c_double, c_size_t, c_void_p, c_void_p)),

@@ -172,13 +172,7 @@ class BackgroundBatch:
     """
 
     def __init__(
-        self,
-        scene: bpy.types.Scene,
-        into: Path,
-        what: str,
-        shots: Sequence[Job],
-        files: str,
-        outputs: Outputs,
+        self, scene: bpy.types.Scene, into: Path, what: str, shots: Sequence[Job], files: str, outputs: Outputs
     ) -> None:
         self.count, self._files = len(shots), files
         stem = Path(bpy.data.filepath).stem or "untitled"

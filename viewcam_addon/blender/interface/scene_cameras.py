@@ -256,13 +256,7 @@ def _draw_add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 OPERATORS = (VIEWCAM_OT_add_camera, VIEWCAM_OT_step_camera, VIEWCAM_OT_make_camera_active)
-CLASSES = (
-    *OPERATORS,
-    VIEWCAM_UL_cameras,
-    VIEWCAM_PT_sidebar_cameras,
-    VIEWCAM_PT_data_picture,
-    VIEWCAM_PT_sidebar_picture,
-)
+CLASSES = (*OPERATORS, VIEWCAM_UL_cameras, VIEWCAM_PT_sidebar_cameras, VIEWCAM_PT_data_picture, VIEWCAM_PT_sidebar_picture)
 
 
 def register() -> None:

@@ -20,11 +20,7 @@ _DRAWN = (versions.EEVEE, "BLENDER_WORKBENCH")
 
 
 def obstacles(
-    shots: Sequence[Job],
-    outputs: Outputs,
-    scene: bpy.types.Scene,
-    own: Callable[[], bpy.types.Object],
-    settings: JobSettings,
+    shots: Sequence[Job], outputs: Outputs, scene: bpy.types.Scene, own: Callable[[], bpy.types.Object], settings: JobSettings
 ) -> Iterator[str]:
     """One sentence for each obstacle.
 
