@@ -20,7 +20,9 @@
 // as often far too small as too large. So s²/N is multiplied by what D²/4 is in the mean over 8 × 8 pixels, over what s²/N is
 // there: again without the pixel itself.
 //
-// Rejected: means over neighbors (a denoiser is no reference), and weighing rounds by their variance, which is bias.
+// Rejected: means over neighbors (a denoiser is no reference); weighing rounds by their variance, which is bias; four samples first
+// and not eight, with which six Suzannes take 0.81 of the time to an error of 0.003 and as long to 0.001, but the pixels that are
+// furthest off are twice as far.
 #pragma once
 #include <stdexcept>
 #include <utility>
