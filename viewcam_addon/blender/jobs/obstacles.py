@@ -51,7 +51,7 @@ def obstacles(
                     read.add(camera_object.name)
             else:
                 frame, camera = settings.frame_of(shot), own().data
-                plane = stated(shot, frame).plane  # of which Blender's numbers may hold none
+                plane = stated(shot, frame).plane  # Blender's numbers may hold no such
                 intrinsics.camera_data(plane, frame, *datablocks.own_sensor(camera), camera.sensor_fit)
         except InputError as error:
             yield f"the shot {checks.quoted(shot.name)}: {error}"
