@@ -19,10 +19,15 @@ _UNKNOWN_TO_CYCLES = ("SHADERTORGB", "EEVEE_SPECULAR")
 
 
 class Input(NamedTuple):
-    """An input of a node. groups : the group nodes that it stands in, the outermost first."""
+    """An input of a node.
+
+    groups : the group nodes that it stands in, the outermost first.
+    is_zero : true if 0 is its value, whatever it shows.
+    """
 
     socket: bpy.types.NodeSocket
     groups: tuple[bpy.types.Node, ...] = ()
+    is_zero: bool = False
 
 
 class Output(NamedTuple):
@@ -44,17 +49,22 @@ class Output(NamedTuple):
 
 
 def source(of: Input) -> Output | Input:
-    """The output that feeds an input, or the input, perhaps of a group around it, that nothing feeds."""
+    """The output that feeds an input, or the input, perhaps of a group around it, that nothing feeds.
+
+    What a muted node or a reroute passes on of its own is no value in Cycles: the input keeps its own, or is 0.
+    """
+    kept = of
     while True:
         links = of.socket.links if of.socket.is_linked else ()
         link = next((link for link in links if _counts(link)), None)
         if link is None:
-            return of
+            return kept if of is kept or versions.MUTED_NODES_HAVE_NO_VALUES else of._replace(is_zero=True)
         node, socket = link.from_node, link.from_socket
         through = _through(node, socket, of.groups)
         if through is None:
             return Output(node, socket, of.groups)
-        of = through
+        is_passed_on = node.type == "REROUTE" or node.mute
+        of, kept = through, kept if is_passed_on else through
 
 
 def _counts(link: bpy.types.NodeLink) -> bool:

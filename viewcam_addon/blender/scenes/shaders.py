@@ -126,11 +126,18 @@ def read(material: bpy.types.Material) -> Reading:
 
 def _displaced(reading: Reading, material: bpy.types.Material, output: bpy.types.Node, shines: bool) -> Reading:
     """A reading with what its displacement does to the normals, where that is all that it does."""
-    if is_only_bumped(material):
+    if shines and _loses_light(reading.material) and isinstance(nodes.source(Input(output.inputs["Displacement"])), Output):
+        reading.reasons.append("gives off light beside a displacement, where Cycles loses most of it")
+    elif is_only_bumped(material):
         reader = Tree(PLAIN_COLOR, shines)
         reader.reading = reading
         reading.material = replace(reading.material, displacement=reader.height(Input(output.inputs["Displacement"])))
     return reading
+
+
+def _loses_light(material: Material) -> bool:
+    """True if Cycles samples no light of a material where a displacement bumps it."""
+    return versions.LOSES_LIGHT_OF_BUMPED and any(each.node.type == "principled" for each in material.closures)
 
 
 def is_only_bumped(material: bpy.types.Material) -> bool:
@@ -674,7 +681,7 @@ def _constant(of: Input) -> object:
         return _constant(source.input("Strength")) if _constant(source.input("Smooth")) == 0 else None
     if isinstance(source, Output) and source.node.type not in ("RGB", "VALUE"):
         return None
-    return source.socket.default_value
+    return 0.0 if isinstance(source, Input) and source.is_zero else source.socket.default_value
 
 
 def possible(rgb: RGB) -> RGB | None:
