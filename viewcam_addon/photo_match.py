@@ -235,11 +235,7 @@ def from_rectangle(
 
 
 def solve_edges(
-    ends: Array,
-    axes: NDArray[np.int_],
-    half: float,
-    known_distance: float | None = None,
-    is_principal_point_free: bool = False,
+    ends: Array, axes: NDArray[np.int_], half: float, known_distance: float | None = None, is_principal_point_free: bool = False
 ) -> tuple[Solution, NDArray[np.bool_]]:
     """The cameras of edges, and whether those that were drawn are of a mirrored picture.
 
@@ -412,10 +408,7 @@ def _point_residuals(
     d = distance[..., None, None]
     # ∂(column, row)/∂(seen)
     over = (distance[..., None] / away)[..., None, None]
-    to_picture = over * np.concatenate(
-        [np.broadcast_to(np.eye(2), (*away.shape, 2, 2)), slope[..., None]],
-        axis=-1,
-    )
+    to_picture = over * np.concatenate([np.broadcast_to(np.eye(2), (*away.shape, 2, 2)), slope[..., None]], axis=-1)
     turned = to_picture @ -_cross_matrix(seen)
     moved = -to_picture @ (rotation * scale[..., None, None])[..., None, :, :]
     jacobian = np.concatenate([turned, (slope * d)[..., None], moved], axis=-1)
@@ -561,7 +554,7 @@ def _match(solution: Solution, like: Pinhole, precision: float, reach: float, sp
         raise InputError(
             "the principal point can't be told from these: draw longer edges along all three axes, which converge, or keep it"
         )
-    if not (np.isfinite(errors).all() and errors[3] < _LARGEST_ERROR and _is_before(depth)):
+    if not (np.isfinite(errors).all() and errors[3] < _LARGEST_ERROR and (depth is None or depth > 0.0)):
         raise InputError(
             "the lens can't be told from these: draw longer edges, or choose a view that is not head-on, so that lines converge"
         )
@@ -591,7 +584,3 @@ def _match(solution: Solution, like: Pinhole, precision: float, reach: float, sp
     eye_error = tuple(errors[4:].tolist()) if depth is not None else None
     center_error = tuple(errors[4:].tolist()) if is_center_free else None
     return Match(pinhole, precision, left, (distance / factor, distance * factor), eye_error, center_error, pixels)
-
-
-def _is_before(depth: float | None) -> bool:
-    return depth is None or depth > 0.0

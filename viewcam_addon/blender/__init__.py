@@ -33,17 +33,7 @@ def _rooms() -> list[ModuleType]:
     buttons = [operators, moving, clipboard, baking, converting, presets]
     interface = [panel, scene_cameras, photo_matching, swipe, proof, render_all, labels, overlay, gizmos]
     followers = [animation, resolution, own_picture]
-    return [
-        preferences,
-        properties,
-        render_settings,
-        *buttons,
-        *interface,
-        engine,
-        render_panels,
-        file_menu,
-        *followers,
-    ]
+    return [preferences, properties, render_settings, *buttons, *interface, engine, render_panels, file_menu, *followers]
 
 
 def register() -> None:

@@ -47,6 +47,7 @@ __all__ = [
     "apply",
     "as_it_stands",
     "check",
+    "current",
     "forget_all",
     "lens",
     "read",
@@ -242,10 +243,7 @@ class CameraSync:
 
     @classmethod
     def carry(
-        cls,
-        cameras: list[tuple["CameraSync", bpy.types.Object, bool]],
-        scene: bpy.types.Scene,
-        depsgraph: bpy.types.Depsgraph,
+        cls, cameras: list[tuple["CameraSync", bpy.types.Object, bool]], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
     ) -> list["CameraSync"]:
         """Bring those cameras, in one pass, of which a frame has changed the values alone, and to those that it has moved the
         values.
@@ -742,6 +740,11 @@ def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pin
     return (was_in_use and _agreed(camera_object, scene)) or _standing(camera_object, scene, was_in_use)
 
 
+def current(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
+    """The camera as its values state it, or where these are not enabled as it stands. Raises InputError as either does."""
+    return stated(camera_object, scene) or as_it_stands(camera_object, scene)
+
+
 def _standing(camera_object: bpy.types.Object, scene: bpy.types.Scene, was_in_use: bool) -> Pinhole:
     """`as_it_stands`, the look-at point as far from the eye as the values say if these were ever in use."""
     pinhole = read(camera_object, scene)
@@ -795,7 +798,8 @@ def roll(camera_object: bpy.types.Object) -> float:
         if "roll" in asked:
             return asked["roll"]
         values = targets.values(camera_object)
-        angle = values.roll_from(preferences.up_axis(), _held_roll(camera_object, values))
+        held = hold.roll(camera_object, values, datablocks.scene_of(camera_object.original))
+        angle = values.roll_from(preferences.up_axis(), held)
         return angle if abs(angle) > _UNSEEN else 0.0
     return 0.0
 
@@ -826,7 +830,3 @@ def _answered(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.
                 intrinsics.check_storable(camera_object.name, distance=(seeing.distance,))
                 values = seeing
     return replace(values, asked=())
-
-
-def _held_roll(camera_object: bpy.types.Object, values: CameraValues) -> float:
-    return hold.roll(camera_object, values, datablocks.scene_of(camera_object.original))

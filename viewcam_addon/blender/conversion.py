@@ -148,13 +148,5 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     # The look-at point is as far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.
     reach = 2.0 ** math.ceil(math.log2(max(1.0, np.abs(eye).max())))
     plane = datablocks.view_plane(datablocks.camera_data_of(camera), datablocks.frame_of(scene))
-    return Pinhole(
-        tuple(eye.tolist()),
-        tuple((eye - reach * w).tolist()),
-        tuple(v.tolist()),
-        plane.distance,
-        plane.width,
-        plane.height,
-        plane.principal_point,
-        mirrored,
-    )
+    view = tuple(eye.tolist()), tuple((eye - reach * w).tolist()), tuple(v.tolist())
+    return Pinhole(*view, **vars(plane), mirrored=mirrored)

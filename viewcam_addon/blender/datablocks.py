@@ -2,6 +2,7 @@
 
 import functools
 import math
+import operator
 from collections.abc import Iterable
 
 import bpy
@@ -29,15 +30,11 @@ _KINDS = {"ORTHO": "orthographic", "PANO": "panoramic", "CUSTOM": "a custom came
 
 def check_perspective(camera_object: bpy.types.Object) -> None:
     """Raise InputError, by name, if the object is no perspective camera."""
-    if camera_object.type != "CAMERA" or camera_object.data.type != "PERSP":
-        raise _no_perspective(camera_object)
-
-
-def _no_perspective(camera_object: bpy.types.Object) -> InputError:
     if camera_object.type != "CAMERA":
-        return InputError(f"object {camera_object.name!r} is no camera: choose a camera")
-    kind = _KINDS.get(camera_object.data.type, camera_object.data.type)
-    return InputError(f"camera {camera_object.name!r} is {kind}, no pinhole: set its lens type to Perspective")
+        raise InputError(f"object {camera_object.name!r} is no camera: choose a camera")
+    if (kind := camera_object.data.type) != "PERSP":
+        kind = _KINDS.get(kind, kind)
+        raise InputError(f"camera {camera_object.name!r} is {kind}, no pinhole: set its lens type to Perspective")
 
 
 _VALUES, _OWN = "virtual_pinhole", "virtual_pinhole."
@@ -123,8 +120,7 @@ def camera_data_of(camera_object: bpy.types.Object) -> intrinsics.CameraData:
 
     Raises InputError if the object is no perspective camera, or if a script has stored what is no number of a camera.
     """
-    if camera_object.type != "CAMERA" or camera_object.data.type != "PERSP":
-        raise _no_perspective(camera_object)
+    check_perspective(camera_object)
     camera = camera_object.data
     try:
         return _known_camera(
@@ -182,11 +178,8 @@ def bound_camera(bindings: Iterable[tuple[bpy.types.TimelineMarker, bpy.types.Ob
     before = [each for each in bound if each[0] <= frame]
     if not bound:
         return None
-    return (max(before, key=_frame) if before else min(bound, key=_frame))[1]
-
-
-def _frame(binding: tuple[int, bpy.types.Object]) -> int:
-    return binding[0]
+    by_frame = operator.itemgetter(0)
+    return (max(before, key=by_frame) if before else min(bound, key=by_frame))[1]
 
 
 def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:

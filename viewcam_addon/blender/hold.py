@@ -93,7 +93,8 @@ def _carried_since_first_frame(values: CameraValues, curves: list[bpy.types.FCur
     stated = np.array([*values.eye, *values.look_at, *values.up])
     frames = np.arange(min(first, whole), max(first, whole + 1) + 1)
     poses = _poses(stated, curves, frames)
-    frames, poses = _without_gaps(frames, poses)
+    valid = make_views(*_vectors(poses))  # across frames whose values make no camera the roll is carried
+    frames, poses = frames[valid], poses[valid]
     if not len(frames):
         return 0.0
     turns, near = rolls.steps(*_vectors(poses), values.hold_within)
@@ -112,12 +113,6 @@ def _poses(stated: Array, curves: list[bpy.types.FCurve], frames: Array) -> Arra
         column = _COLUMNS[curve.data_path] + curve.array_index
         poses[:, column] = np.fromiter(map(curve.evaluate, frames.tolist()), dtype=np.float64, count=len(frames))
     return poses
-
-
-def _without_gaps(frames: Array, poses: Array) -> tuple[Array, Array]:
-    """Only the frames whose values make a camera: the roll is carried across the others."""
-    valid = make_views(*_vectors(poses))
-    return frames[valid], poses[valid]
 
 
 def _vectors(poses: Array) -> tuple[Array, Array, Array]:

@@ -90,17 +90,15 @@ def _of_group(group: OwnPicture) -> dict[str, float]:
     return {name: getattr(group, name) for name in (*_RENDER, *_SCENE)}
 
 
-def _copy(numbers: dict[str, float], group: OwnPicture) -> None:
+def _copy(numbers: dict[str, float], owner: bpy.types.bpy_struct) -> None:
     for name, value in numbers.items():
-        if getattr(group, name) != value:  # setting a value makes Blender evaluate again
-            setattr(group, name, value)
+        if getattr(owner, name) != value:  # setting a value makes Blender evaluate again
+            setattr(owner, name, value)
 
 
 def _set(scene: bpy.types.Scene, numbers: dict[str, float]) -> None:
     for names, target in ((_RENDER, scene.render), (_SCENE, scene)):
-        for name in names:
-            if getattr(target, name) != numbers[name]:
-                setattr(target, name, numbers[name])
+        _copy({name: numbers[name] for name in names}, target)
 
 
 @persistent

@@ -21,11 +21,7 @@ def _update_passes(_group: "ReferenceSettings", context: bpy.types.Context) -> N
 
 
 class ReferenceSettings(bpy.types.PropertyGroup):
-    level: bpy.props.EnumProperty(
-        name="Level",
-        description="How much of the scene is modeled",
-        items=LEVELS,
-    )
+    level: bpy.props.EnumProperty(name="Level", description="How much of the scene is modeled", items=LEVELS)
     samples: bpy.props.IntProperty(
         name="Samples",
         description="Paths of light through each pixel. With 1 it is the path through the pixel's center",

@@ -130,7 +130,8 @@ def connect(camera_object: bpy.types.Object) -> None:
     """Make the drivers of `followed` those of the targets that are set."""
     for index, point in enumerate(POINTS):
         target = target_of(camera_object, point)
-        curve = next((each for each in _hooks(camera_object) if each.array_index == index), None)
+        drivers = (each for each in versions.drivers(camera_object) if each.data_path == _HOOK)
+        curve = next((each for each in drivers if each.array_index == index), None)
         if target is None:
             if curve:
                 camera_object.driver_remove(_HOOK, index)
@@ -142,15 +143,12 @@ def connect(camera_object: bpy.types.Object) -> None:
         elif group_of(camera_object, point, target):
             paths = (_SHAPE,)
         followed = [(target, bone.name if bone else "", ""), *((target, "", path) for path in paths)]
-        if curve and followed != [(aim.id, aim.bone_target, aim.data_path) for aim in _aims_of(curve.driver)]:
+        aims = [variable.targets[0] for variable in curve.driver.variables] if curve else []
+        if curve and followed != [(aim.id, aim.bone_target, aim.data_path) for aim in aims]:
             camera_object.driver_remove(_HOOK, index)
             curve = None
         if curve is None:
             _depend(camera_object.driver_add(_HOOK, index).driver, *followed)
-
-
-def _aims_of(driver: bpy.types.Driver) -> list[bpy.types.DriverTarget]:
-    return [variable.targets[0] for variable in driver.variables]
 
 
 def _depend(driver: bpy.types.Driver, *followed: tuple[bpy.types.Object, str, str]) -> None:
@@ -237,10 +235,6 @@ def _missing(camera_object: bpy.types.Object, point: str, target: bpy.types.Obje
 def can_be_target(camera_object: bpy.types.Object, candidate: bpy.types.Object) -> bool:
     """True if an object may be chosen: the camera does not move it."""
     return not _chain(candidate, camera_object)
-
-
-def _hooks(camera_object: bpy.types.Object) -> list[bpy.types.FCurve]:
-    return [curve for curve in versions.drivers(camera_object) if curve.data_path == _HOOK]
 
 
 def _is_led(block: bpy.types.Object) -> bool:

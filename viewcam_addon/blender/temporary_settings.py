@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import bpy
 
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 
 LARGEST_INDEX = 32767
 """The largest pass_index."""
@@ -39,7 +39,7 @@ class Overrides:
             self.afterwards(setattr, owner, name, before)
             setattr(owner, name, value)
 
-    def shared(self, make: Callable[..., Made], *arguments: Hashable) -> Made:
+    def shared(self, make: Callable[..., Result], *arguments: Hashable) -> Result:
         """The result of `make(overrides, *arguments)` while the overrides last, made for the first who asks."""
         key = make, *arguments
         if key not in self._shared:

@@ -112,14 +112,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
         notes = (*notes, f"The axes of {what} are left-handed: the picture is mirrored")
     reach = 2.0 ** math.ceil(math.log2(max(1.0, away)))
     camera = Pinhole(
-        eye=eye,
-        look_at=tuple(a - reach * b for a, b in zip(eye, z, strict=True)),
-        up=y,
-        distance=plane.distance,
-        width=plane.width,
-        height=plane.height,
-        principal_point=plane.principal_point,
-        mirrored=mirrored,
+        eye=eye, look_at=tuple(a - reach * b for a, b in zip(eye, z, strict=True)), up=y, **vars(plane), mirrored=mirrored
     )
     return camera, notes
 

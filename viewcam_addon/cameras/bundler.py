@@ -44,12 +44,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     poses = axes.pinholes(matrices, [plane for plane, *_ in lenses.values()], [names[index] for index in lenses])
     cameras = [
         Camera(
-            names[index],
-            pinhole,
-            stated,
-            (*notes, *more),
-            paths[index] if naming.has_suffix(paths[index]) else None,
-            lens=lens,
+            names[index], pinhole, stated, (*notes, *more), paths[index] if naming.has_suffix(paths[index]) else None, lens=lens
         )
         for (index, (_, stated, lens, notes)), (pinhole, more) in zip(lenses.items(), poses, strict=True)
     ]

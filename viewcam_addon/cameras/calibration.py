@@ -55,7 +55,7 @@ class Calibration:
 
     def at(self, pinhole: Pinhole) -> Pinhole:
         """The pinhole of the calibrated camera's own plane in another's place."""
-        return _with_plane(pinhole, self.plane)
+        return replace(pinhole, **vars(self.plane))
 
     @cached_property
     def cover(self) -> ViewPlane:
@@ -166,9 +166,3 @@ def of_cameras(read: Sequence[Camera], source: str, name: str | None = None) -> 
     if not bent:
         raise InputError(f"no camera of {source} has a lens that distorts: give a file whose cameras have")
     return Rig(source, bent)
-
-
-def _with_plane(pinhole: Pinhole, plane: ViewPlane) -> Pinhole:
-    return replace(
-        pinhole, distance=plane.distance, principal_point=plane.principal_point, width=plane.width, height=plane.height
-    )

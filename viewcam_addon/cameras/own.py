@@ -171,7 +171,7 @@ def camera(values: Values, options: Options, what: str) -> Camera:
     """
     if not values.keys() & {*VECTORS, *_LENS}:
         raise InputError("the text says neither eye, look-at, up nor distance of a camera: copy one, or write eye=1,2,3")
-    vectors = {}
+    vectors: dict[str, Any] = {}
     for name in VECTORS:
         value = values.get(name, getattr(options.base, name, None))
         if value is None:
@@ -179,14 +179,7 @@ def camera(values: Values, options: Options, what: str) -> Camera:
         vectors[name] = checks.vector(name, value, 3)
     plane, stated, notes = _plane(values, options, what)
     mirrored = values.get("mirrored", bool(options.base and options.base.mirrored and not values.keys() & _LENS))
-    pinhole = Pinhole(
-        **vectors,
-        distance=plane.distance,
-        width=plane.width,
-        height=plane.height,
-        principal_point=plane.principal_point,
-        mirrored=mirrored,
-    )
+    pinhole = Pinhole(**vectors, **vars(plane), mirrored=mirrored)
     return Camera("Camera", pinhole, stated, notes)
 
 

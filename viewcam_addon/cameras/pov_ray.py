@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..pinhole import ViewPlane
 from . import axes, naming, own, texts
 from .camera import Camera, Options, not_a_pinhole
 from .expressions import Expressions, Unknown, numbers
@@ -271,7 +270,8 @@ class _Block:
                 lengths[2] * exact / lengths[0], lengths[2] * size[1] / lengths[1], size[0] / 2, size[1] / 2, size
             )
             if abs(plane.distance[0] / plane.distance[1] - 1) < 2.0**-20:
-                plane = _square(plane, size)
+                d = math.sqrt(plane.distance[0] * plane.distance[1])  # both are one distance but for their rounding
+                plane = axes.view_plane(d, d, size[0] / 2, size[1] / 2, size)
             pinhole = texts.posed(tuple(eye.tolist()), look_at, tuple(sky), plane, is_left_handed)
             if self.moves:
                 u, v, w = pinhole.basis()
@@ -302,12 +302,6 @@ class _Block:
         if self._aspect_of_film or self._is_given:
             return self._filmed()
         return texts.film(self.options, "POV-Ray's camera", self.size, aspect, _SIZE)
-
-
-def _square(plane: ViewPlane, size: tuple[int, int]) -> ViewPlane:
-    """The view plane with one distance, where two differ by their rounding."""
-    d = math.sqrt(plane.distance[0] * plane.distance[1])
-    return axes.view_plane(d, d, size[0] / 2, size[1] / 2, size)
 
 
 def _place(value: object, at: int) -> int:

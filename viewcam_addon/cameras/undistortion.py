@@ -159,10 +159,7 @@ def straight(cameras: Sequence[Camera], blank: float) -> list[Camera]:
     for camera in cameras:
         pinhole = camera.pinhole
         if camera.lens is not None:
-            cut = undistorted(camera.lens, pinhole.plane, blank)
-            pinhole = dataclasses.replace(
-                pinhole, distance=cut.distance, principal_point=cut.principal_point, width=cut.width, height=cut.height
-            )
+            pinhole = dataclasses.replace(pinhole, **vars(undistorted(camera.lens, pinhole.plane, blank)))
         result.append(dataclasses.replace(camera, pinhole=pinhole, lens=None))
     return result
 

@@ -61,11 +61,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
 
     shots = added.add_argument_group("which shots: one of these")
     shots.add_argument(
-        "shots",
-        metavar="SHOTS",
-        type=types.path,
-        nargs="?",
-        help="a list (.csv, .json, .jsonl …) or any cameras",
+        "shots", metavar="SHOTS", type=types.path, nargs="?", help="a list (.csv, .json, .jsonl …) or any cameras"
     )
     shots.add_argument("--orbit", type=types.positive, metavar="N", help="N views around the camera's look-at point")
     shots.add_argument("--frames", metavar="A..B", help="a shot of the camera at each frame (from -5 on: --frames=-5..3)")

@@ -60,11 +60,7 @@ def add_reading_options(added: argparse._ActionsContainer, size: bool = True) ->
     added.add_argument("--scale", type=types.above_zero, metavar="S", default=1.0, help="1 unit of the file is S units here")
     added.add_argument("--distance", type=types.above_zero, metavar="D", help="view-plane distance in pixels, for poses alone")
     added.add_argument(
-        "--pixel-aspect",
-        type=types.above_zero,
-        metavar="A",
-        default=1.0,
-        help="a pixel's width over its height if not said",
+        "--pixel-aspect", type=types.above_zero, metavar="A", default=1.0, help="a pixel's width over its height if not said"
     )
     added.add_argument("--angles", choices=[*cameras.ANGLES], help="the unit of angles that have none")
     added.add_argument("--pixel", choices=[*cameras.PIXELS], help="where (0, 0) is, in place of the format's habit")

@@ -119,17 +119,8 @@ class Cluster:
         The work raises InputError if no worker can render any of the shots. If all are lost later, the shots in flight fail
         and no more are taken.
         """
-        scene = {
-            "blend": str(blend.absolute()),
-            "trust": trust,
-            "time_limit": time_limit,
-            "made_from": dict(made_from),
-        }
-
-        def work(shots: Iterator[Job | None]) -> Iterator[tuple[Job, Outcome]]:
-            yield from _Flight(self, scene, folder, settings, outputs or Outputs()).outcomes(shots)
-
-        return work
+        scene = {"blend": str(blend.absolute()), "trust": trust, "time_limit": time_limit, "made_from": dict(made_from)}
+        return lambda shots: _Flight(self, scene, folder, settings, outputs or Outputs()).outcomes(shots)
 
     def addresses(self) -> tuple[str, ...]:
         """The workers, as of a moment ago."""

@@ -201,11 +201,8 @@ def write_json(path: Path, document: Mapping[str, Any]) -> None:
     Raises InputError if it can't be written; FullDiskError if the disk is full.
     """
     with written_whole(path) as temporary:
-        temporary.write_text(_text(document), encoding="utf-8", newline="\n")
-
-
-def _text(document: Mapping[str, Any]) -> str:
-    return "{\n" + ",\n".join(f" {_compact(key)}: {_lines(value)}" for key, value in document.items()) + "\n}\n"
+        lines = ",\n".join(f" {_compact(key)}: {_lines(value)}" for key, value in document.items())
+        temporary.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8", newline="\n")
 
 
 def _lines(value: Any) -> str:

@@ -268,15 +268,15 @@ def _choice(place: str, value: object, *, among: tuple[str, ...]) -> str:
     return value
 
 
-def _point(place: str, value: object) -> Triple:
-    point = checks.vector(place, value, 3)
+def _vector(place: str, value: object, count: int = 3) -> tuple[Any, ...]:
+    point = checks.vector(place, value, count)
     for coordinate in point:
         checks.number(place, coordinate, -_LARGEST_FLOAT32, _LARGEST_FLOAT32)
     return point
 
 
-def _up(place: str, value: object) -> Triple:
-    up = _point(place, value)
+def _up(place: str, value: object) -> tuple[Any, ...]:
+    up = _vector(place, value)
     if not any(up):
         raise InputError(f"{place} is (0, 0, 0): it has no direction, give the vector that shall point up in the picture")
     return up
@@ -286,17 +286,6 @@ def _distance(place: str, value: object) -> float:
     d = checks.number(place, value)
     check_distance(d, place)
     return checks.number(place, d, _SMALLEST_FLOAT32, _LARGEST_FLOAT32)
-
-
-def _pair(place: str, value: object) -> tuple[float, float]:
-    point = checks.vector(place, value, 2)
-    for coordinate in point:
-        checks.number(place, coordinate, -_LARGEST_FLOAT32, _LARGEST_FLOAT32)
-    return point
-
-
-def _aspect(place: str, value: object) -> float:
-    return checks.number(place, value, *_ASPECTS)
 
 
 def _truth(place: str, value: object) -> bool:
@@ -313,8 +302,8 @@ def _whole(place: str, value: object, *, limits: tuple[int, int]) -> int:
 
 FIELDS: dict[str, Callable[[str, object], object]] = {
     "name": _name,
-    "eye": _point,
-    "look_at": _point,
+    "eye": _vector,
+    "look_at": _vector,
     "up": _up,
     "d": _distance,
     "camera": _text,
@@ -324,8 +313,8 @@ FIELDS: dict[str, Callable[[str, object], object]] = {
     "engine": partial(_choice, among=ENGINES),
     "samples": partial(_whole, limits=_SAMPLES),
     "level": partial(_choice, among=LEVELS),
-    "principal_point": _pair,
-    "pixel_aspect": _aspect,
+    "principal_point": partial(_vector, count=2),
+    "pixel_aspect": partial(checks.number, least=_ASPECTS[0], most=_ASPECTS[1]),
     "mirrored": _truth,
 }
 """The check of each field that a list may have: (what a sentence calls it, value) → the value as a Job keeps it; InputError."""

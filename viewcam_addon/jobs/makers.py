@@ -19,7 +19,7 @@ _MOST = 1_000_000
 _RANGE = re.compile(r"([-+]?\d{1,9})\.\.([-+]?\d{1,9})", re.ASCII)
 
 
-class _Made(Sequence[Job]):
+class _LazyJobs(Sequence[Job]):
     """Shots that are made when they are asked for: of a million views, one of many machines renders a few.
 
     make : a function: a number → its shot.
@@ -34,7 +34,7 @@ class _Made(Sequence[Job]):
 
     def __getitem__(self, index: int | slice) -> Any:
         if isinstance(index, slice):
-            return _Made(self._make, self._numbers[index])
+            return _LazyJobs(self._make, self._numbers[index])
         return self._make(self._numbers[index])
 
 
@@ -47,20 +47,14 @@ def orbit(pinhole: Pinhole, count: int) -> Sequence[Job]:
     Raises InputError if the count is not from 1 to a million.
     """
     count = _count(checks.whole("orbit's number of shots", count))
-    middle = (pinhole.width / 2, pinhole.height / 2)
-    beside: dict[str, Any] = {
-        "width": pinhole.width,
-        "height": pinhole.height,
-        "principal_point": None if pinhole.principal_point == middle else pinhole.principal_point,
-        "mirrored": pinhole.mirrored or None,
-    }
+    beside = _beside_the_pose(pinhole)
 
     def view(i: int) -> Job:
         moved = moves.orbited(pinhole, math.tau * i / count, 0.0)
         name = f"orbit_{i:0{_digits(count - 1)}d}"
         return Job(name, moved.eye, moved.look_at, moved.up, moved.distance[0], **beside)
 
-    return _Made(view, range(count))
+    return _LazyJobs(view, range(count))
 
 
 def frames(text: str, camera: str | None = None) -> Sequence[Job]:
@@ -84,7 +78,7 @@ def frames(text: str, camera: str | None = None) -> Sequence[Job]:
 
     for end in (first, last):  # Blender's limits: what lies between them is within, too
         still(end)
-    return _Made(still, range(first, last + 1))
+    return _LazyJobs(still, range(first, last + 1))
 
 
 def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> list[Job]:
@@ -135,23 +129,10 @@ def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Job]:
         if other != camera or len(files) <= len(shots):
             problems.add(f"the cameras {checks.quoted(other)} and {checks.quoted(camera)} would have one file: rename one")
             continue
-        (d_x, d_y), (width, height) = pinhole.distance, (pinhole.width, pinhole.height)
-        middle = (width / 2, height / 2)
+        d_x, d_y = pinhole.distance
+        pose = pinhole.eye, pinhole.look_at, pinhole.up, d_x
         with problems.caught():
-            shots.append(
-                Job(
-                    name,
-                    pinhole.eye,
-                    pinhole.look_at,
-                    pinhole.up,
-                    d_x,
-                    width=width,
-                    height=height,
-                    principal_point=None if pinhole.principal_point == middle else pinhole.principal_point,
-                    pixel_aspect=d_y / d_x,
-                    mirrored=pinhole.mirrored or None,
-                )
-            )
+            shots.append(Job(name, *pose, pixel_aspect=d_y / d_x, **_beside_the_pose(pinhole)))
     problems.raise_any()
     return shots
 
@@ -168,6 +149,17 @@ def calibrated(job: Job, calibration: Calibration, pose: Pinhole | None = None) 
     if pose is not None or job.eye is not None:
         values |= {"d": cover.distance[0], "principal_point": cover.principal_point, "pixel_aspect": 1.0}
     return dataclasses.replace(job, **values)
+
+
+def _beside_the_pose(pinhole: Pinhole) -> dict[str, Any]:
+    """The fields of a Job that a pinhole has beside eye, look-at, up and distance."""
+    middle = (pinhole.width / 2, pinhole.height / 2)
+    return {
+        "width": pinhole.width,
+        "height": pinhole.height,
+        "principal_point": None if pinhole.principal_point == middle else pinhole.principal_point,
+        "mirrored": pinhole.mirrored or None,
+    }
 
 
 def _count(count: int) -> int:

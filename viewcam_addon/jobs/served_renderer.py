@@ -47,13 +47,7 @@ class ServedRenderer:
     not write.
     """
 
-    def __init__(
-        self,
-        blend: Path,
-        trust: bool = False,
-        time_limit: float | None = None,
-        events: Events | None = None,
-    ) -> None:
+    def __init__(self, blend: Path, trust: bool = False, time_limit: float | None = None, events: Events | None = None) -> None:
         self.blend, self.program = blend, None
         self._opening = {"open": {"blend": str(blend), "trust": trust}}
         self._server: ServerProcess | None = None

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
@@ -68,7 +68,6 @@ class Summary:
     elsewhere : the number that another batch did meanwhile.
     seconds : the seconds that it took.
     signal : the number of the signal that ended it.
-    finished : the time of its end.
     """
 
     shots: tuple[Mapping[str, Any], ...]
@@ -77,7 +76,6 @@ class Summary:
     elsewhere: int
     seconds: float
     signal: int | None = None
-    finished: datetime = field(default_factory=lambda: datetime.now(UTC))
 
     @property
     def counts(self) -> dict[str, int]:
@@ -110,7 +108,7 @@ class Summary:
             "counts": self.counts,
             "timing": {
                 "seconds": round(self.seconds, 3),
-                "finished": self.finished.isoformat(timespec="seconds"),
+                "finished": datetime.now(UTC).isoformat(timespec="seconds"),
                 "rendered": self.rendered,
                 "kept": self.kept,
                 "elsewhere": self.elsewhere,

@@ -66,10 +66,10 @@ def write(
     objects = _Objects(pictures)
     scene: dict[str, dict[str, Any]] = {name: {} for name in _SCENE}
 
-    def may_replace(there: Path) -> bool:
-        return overwrite and files.holds(there, _FILES, (*_FILES, "rgb"))
-
-    with folder_written_whole(output, may_replace) as temporary, ThreadPoolExecutor(machine.cores()) as threads:
+    with (
+        folder_written_whole(output, lambda there: overwrite and files.holds(there, _FILES, (*_FILES, "rgb"))) as temporary,
+        ThreadPoolExecutor(machine.cores()) as threads,
+    ):
         for kind in ("depth", "mask", "mask_visib"):
             (temporary / kind).mkdir()
         for number, (path, document) in enumerate(pictures):

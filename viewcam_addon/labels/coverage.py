@@ -133,11 +133,8 @@ def _hex(mark: np.float32) -> str:
 
 @functools.lru_cache(maxsize=2**16)
 def _mark(name: str) -> np.float32:
-    return _as_float(murmur3(name.encode("utf-8", "surrogatepass")))
-
-
-def _as_float(number: int) -> np.float32:
-    """The float32 of these bits; where that were no plain number (zero, denormal, infinite, nan) with one bit turned."""
+    """The float32 of a name's hash; where that were no plain number (zero, denormal, infinite, nan) with one bit turned."""
+    number = murmur3(name.encode("utf-8", "surrogatepass"))
     if (number >> 23 & 255) in (0, 255):
         number ^= 1 << 23
     return np.uint32(number).view(np.float32)

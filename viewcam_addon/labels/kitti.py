@@ -51,10 +51,7 @@ def write(folder: Path, output: Path, overwrite: bool = False, words: stereo.Wor
     pictures, _ = read_pictures(folder)
     counts = {"depth": 0, "flow": 0}
 
-    def may_replace(there: Path) -> bool:
-        return overwrite and files.holds(there, (), _FOLDERS)
-
-    with folder_written_whole(output, may_replace) as temporary:
+    with folder_written_whole(output, lambda there: overwrite and files.holds(there, (), _FOLDERS)) as temporary:
         for path, document in pictures:
             planes = _planes(files.passes(path, document, ("Depth", "Forward Flow", "Forward Hidden")))
             if not planes:

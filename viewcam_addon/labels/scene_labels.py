@@ -171,7 +171,7 @@ def label(
         for name, other in others.items():
             if other is not None:
                 moved = motion(surfaces, Surfaces(other, threads, keepers.of(other), lens=lens))
-                passes |= _motions(name, moved)
+                passes |= {f"{name} Flow": moved.flow, f"{name} Motion": moved.displacement, f"{name} Hidden": moved.hidden}
                 lost[name.lower()] = list(moved.lost)
     if covered:
         passes |= covered.passes
@@ -188,10 +188,6 @@ def _depths(surfaces: Surfaces) -> dict[str, NDArray[Any]]:
         "Depth": np.where(hit, surfaces.depth, BACKGROUND_DEPTH),
         "Distance": np.where(hit, distance, BACKGROUND_DEPTH),
     }
-
-
-def _motions(name: str, motion: Motion) -> dict[str, NDArray[Any]]:
-    return {f"{name} Flow": motion.flow, f"{name} Motion": motion.displacement, f"{name} Hidden": motion.hidden}
 
 
 def _instances(

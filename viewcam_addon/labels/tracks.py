@@ -60,7 +60,8 @@ def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
         own = sampled.source == number
         for kept, matrix in _matrices(document, states):
             which = own & (sampled.state == kept)
-            at_home[which] = _extended(sampled.positions[which]) @ np.linalg.pinv(matrix).T  # a scale may be 0
+            positions = np.column_stack([sampled.positions[which], np.ones(which.sum())])
+            at_home[which] = positions @ np.linalg.pinv(matrix).T  # a scale may be 0
     trajs_2d, trajs_3d = np.zeros((*shape, 2), np.float32), np.zeros((*shape, 3), np.float32)
     visibs, valids = np.zeros(shape, bool), np.zeros(shape, bool)
     for number, (view, (path, document)) in enumerate(zip(views, pictures, strict=True)):
@@ -100,7 +101,3 @@ def _state(instance: Document) -> str:
 def _matrices(document: Document, states: dict[str, int]) -> list[tuple[int, np.ndarray]]:
     """The state and the matrix of each instance of a picture."""
     return [(states[_state(each)], np.array(each["object_to_world"], float)) for each in document["instances"]]
-
-
-def _extended(positions: np.ndarray) -> np.ndarray:
-    return np.concatenate([positions, np.ones((len(positions), 1))], axis=1)

@@ -36,10 +36,7 @@ def write(folder: Path, output: Path, overwrite: bool = False) -> dict[str, int]
     points = list(dict.fromkeys(name for names in keypoint_names(pictures).values() for name in names))
     boxes = 0
 
-    def may_replace(there: Path) -> bool:
-        return overwrite and files.holds(there, _NAMES, _NAMES)
-
-    with folder_written_whole(output, may_replace) as temporary:
+    with folder_written_whole(output, lambda there: overwrite and files.holds(there, _NAMES, _NAMES)) as temporary:
         for name in ("images", "labels"):
             (temporary / name).mkdir()
         for path, document in pictures:

@@ -180,10 +180,7 @@ class _Core(Structure):
         ("light_free", _function(None, c_void_p)),
         ("light_pairs", _function(c_size_t, c_void_p, c_size_t, c_void_p, c_void_p)),
         ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, c_uint32, c_void_p, c_void_p)),
-        (
-            "probe_sobol",
-            _function(c_int, c_uint32, c_uint32, c_int, c_size_t, c_void_p, c_void_p, c_int, c_int, c_void_p),
-        ),
+        ("probe_sobol", _function(c_int, c_uint32, c_uint32, c_int, c_size_t, c_void_p, c_void_p, c_int, c_int, c_void_p)),
         ("probe_filter", _function(c_int, c_int, c_double, c_size_t, c_void_p, c_void_p)),
         ("probe_function", _function(c_int, c_int, c_size_t, c_void_p, c_void_p, c_void_p)),
         ("probe_specular", _function(c_int, c_double, c_size_t, c_void_p, c_void_p)),
@@ -655,18 +652,8 @@ def sobol(seed: int, samples: int, pixels: NDArray, numbers: NDArray, first: int
     """(n, dimensions): the sampler's numbers, from dimension `first` on, of samples of n pixels; for tests and benchmarks."""
     pixels, numbers = array(pixels, np.uint32, (None,)), array(numbers, np.uint32, (len(pixels),))
     points = np.empty((len(pixels), dimensions))
-    arguments = (
-        seed & 0xFFFFFFFF,
-        samples,
-        3,
-        len(pixels),
-        _address(pixels),
-        _address(numbers),
-        first,
-        dimensions,
-        _address(points),
-    )
-    if core().probe_sobol(*arguments):
+    of_pixels = len(pixels), _address(pixels), _address(numbers)
+    if core().probe_sobol(seed & 0xFFFFFFFF, samples, 3, *of_pixels, first, dimensions, _address(points)):
         raise MemoryError
     return points
 

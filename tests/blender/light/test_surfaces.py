@@ -269,6 +269,42 @@ def test_what_cycles_makes_of_odd_nodes(pictures, floor, odd):
     assert sides[0].cycles[0]["Emission"].any() == (shines and output is None)
 
 
+MUTED = {
+    "color": "ShaderNodeRGB",
+    "coordinate": "ShaderNodeTexCoord",
+    "attribute": "ShaderNodeAttribute",
+    "shader": "ShaderNodeEmission",
+}
+
+
+@pytest.mark.parametrize("what", MUTED)
+def test_a_muted_node_that_passes_nothing_on_is_none_as_in_cycles(pictures, floor, what):
+    """The floor has another color or shines where the node is not muted."""
+    tree, shader = floor.node_tree, floor.node_tree.nodes["Shader"]
+    node = tree.nodes.new(MUTED[what])
+    if what == "shader":
+        mixed = tree.nodes.new("ShaderNodeMixShader")
+        for feeding, number in ((shader, 1), (node, 2)):
+            tree.links.new(feeding.outputs[0], mixed.inputs[number])
+        tree.links.new(mixed.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    elif what == "coordinate":
+        mapping, checker = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexChecker")
+        mapping.inputs["Location"].default_value = (0.3, 0.3, 0.3)
+        tree.links.new(node.outputs["Object"], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs[0], checker.inputs["Vector"])
+        tree.links.new(checker.outputs["Color"], shader.inputs["Color"])
+    else:
+        tree.links.new(node.outputs[0], shader.inputs["Color"])
+    node.mute = True
+    sides = pictures(scenes=1)
+    assert not reasons(sides)
+    for name in ("Diffuse Color", "Emission"):
+        assert np.abs(sides[0].traced[name] - sides[0].cycles[0][name]).max() <= FLAT
+    node.mute = False
+    (lively,) = pictures(scenes=1)
+    assert any(np.abs(lively.traced[name] - sides[0].traced[name]).max() > 0.1 for name in ("Diffuse Color", "Emission"))
+
+
 def test_links_that_go_in_a_circle_are_none_as_in_cycles(pictures, floor):
     lamp = bpy.data.lights[0]
     lamp.use_nodes = True

@@ -9,7 +9,7 @@ import shutil
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
@@ -21,7 +21,7 @@ from ...jobs.names import made_fit
 from ...jobs.plan import Plan
 from .. import datablocks, own_picture
 from . import comparing
-from .operators import NamesCamera
+from .operators import NamesCamera, possible
 
 
 class Background:
@@ -122,14 +122,11 @@ class StartsForCamera(NamesCamera):
 
     background: Background
     busy: str
-    poll_message_set: ClassVar[Callable[[str], None]]  # Blender's
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not cls.background.running and context.scene and datablocks.camera_in(context):
-            return True
-        cls.poll_message_set(cls.busy if cls.background.running else "There is no camera")
-        return False
+        has_camera = context.scene and datablocks.camera_in(context)
+        return possible(cls, not cls.background.running, cls.busy) and possible(cls, has_camera, "There is no camera")
 
 
 class Cancels:
@@ -175,13 +172,7 @@ class BackgroundBatch:
     """
 
     def __init__(
-        self,
-        scene: bpy.types.Scene,
-        into: Path,
-        what: str,
-        shots: Sequence[Job],
-        files: str,
-        outputs: Outputs,
+        self, scene: bpy.types.Scene, into: Path, what: str, shots: Sequence[Job], files: str, outputs: Outputs
     ) -> None:
         self.count, self._files = len(shots), files
         stem = Path(bpy.data.filepath).stem or "untitled"

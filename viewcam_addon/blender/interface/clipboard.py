@@ -8,7 +8,7 @@ well; size and pixel aspect are the scene's, and where they differ it is told, o
 import contextlib
 import dataclasses
 import math
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface
@@ -270,7 +270,8 @@ def paste(
     """
     frame = datablocks.frame_of(scene)
     if camera.pinhole.plane == picture.at_full_size(present, frame).plane:  # the text says none
-        pinhole = dataclasses.replace(present, **_pose(camera.pinhole), mirrored=camera.pinhole.mirrored)
+        pose = {name: getattr(camera.pinhole, name) for name in (*_NAMES, "mirrored")}
+        pinhole = dataclasses.replace(present, **pose)
         return [*camera.notes, *cameras.apply(camera_object, pinhole, scene)]
     with contextlib.ExitStack() as undo:
         if set_size:
@@ -281,16 +282,12 @@ def paste(
     return messages
 
 
-def _pose(pinhole: Pinhole) -> dict[str, Any]:
-    return {name: getattr(pinhole, name) for name in _NAMES}
-
-
 def _present(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     """The camera as it is stated or, where nothing is or what is makes no camera, as it stands."""
-    with contextlib.suppress(InputError):
-        if stated := cameras.stated(camera_object, scene):
-            return stated
-    return cameras.as_it_stands(camera_object, scene)
+    try:
+        return cameras.current(camera_object, scene)
+    except InputError:
+        return cameras.as_it_stands(camera_object, scene)
 
 
 def _differences(pinhole: Pinhole, before: Pinhole) -> str:

@@ -319,7 +319,8 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
     if "mismatches" in result:
         kinds = result["mismatches"]["kinds"].values()
         count, explained = (sum(kind[name] for kind in kinds) for name in ("count", "explained"))
-        rows.append(("Mismatches", f"{count:,}" + (f", {_of_all(explained, count)} explained" if count else "")))
+        share = "all" if explained == count else f"{explained:,}"
+        rows.append(("Mismatches", f"{count:,}" + (f", {share} explained" if count else "")))
     for light in result.get("quantities", ())[:1]:  # Combined
         if light["noise_free"]:
             rows += _percentiles(light["noise_free"], "of the light")
@@ -431,7 +432,3 @@ def _percentiles(row: dict[str, Any], unit: str) -> list[tuple[str, str]]:
 def _copy_whole(source: str, target: str) -> None:
     with written_whole(target) as temporary:
         shutil.copyfile(source, temporary)
-
-
-def _of_all(part: int, whole: int) -> str:
-    return "all" if part == whole else f"{part:,}"

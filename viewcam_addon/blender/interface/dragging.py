@@ -68,8 +68,7 @@ class Drag:
         for words, name in followed.items():
             if words == "eye" or kind == TRUCK:
                 raise InputError(f"the {words} follows {name!r}, and can't be dragged: clear that object first")
-        stated = cameras.stated(camera_object, scene)
-        self.start = stated or cameras.as_it_stands(camera_object, scene)
+        self.start = cameras.current(camera_object, scene)
         self._before = state(camera_object)
         self._camera, self._scene, self._kind = camera_object, scene, kind
         self._mouse, self.amount, self.text = (0.0, 0.0), (0.0, 0.0), ""

@@ -25,6 +25,7 @@ from .. import camera as cameras
 from .. import datablocks, dataset_cameras, picture
 from . import clipboard, readouts
 from .camera_options import READING, ReadingOptions, WorldOptions
+from .operators import ReportsErrors, possible
 
 _SUFFIX = ".json"
 _CAMERAS = "Cameras (COLMAP, fSpy, pbrt, …)"
@@ -34,7 +35,7 @@ _POPUP_ENTRIES = 12
 _POPUP_WIDTH = 480
 
 
-class VIEWCAM_OT_import_cameras(ReadingOptions, ImportHelper, bpy.types.Operator):
+class VIEWCAM_OT_import_cameras(ReadingOptions, ReportsErrors, ImportHelper, bpy.types.Operator):
     bl_idname = "viewcam.import_cameras"
     bl_label = "Import Cameras"
     bl_description = "Add the cameras of another program's file, or of the folder that is shown, in a collection of their own"
@@ -71,10 +72,7 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, ImportHelper, bpy.types.Operator
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene and not context.scene.library:
-            return True
-        cls.poll_message_set("The scene is linked from another file")
-        return False
+        return possible(cls, context.scene and not context.scene.library, "The scene is linked from another file")
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Ask for the file, or of a dropped one for the options. A scene without a camera takes the file's size."""
@@ -87,42 +85,32 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, ImportHelper, bpy.types.Operator
         for name in ("import_as", "set_size", "backgrounds", *READING, "distance"):
             self.layout.prop(self, name)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         from ..scenes import import_cameras  # here, since Blender starts without
 
-        try:
-            paths = self._paths()
-            read_cameras: list[formats.Camera] = []
-            notes: list[str] = []
-            kinds = set()
-            for path in paths:
-                kinds.add(formats.recognized(path))
-                more, more_notes = read(path, context.scene, self.distance, self)
-                read_cameras, notes = read_cameras + more, notes + more_notes
-            as_flight = self.import_as == "FLIGHT" or (self.import_as == "BY_FILE" and kinds == {"trajectories"})
-            folder = paths[0] if paths[0].is_dir() else paths[0].parent
-            imported = import_cameras.import_cameras(
-                read_cameras,
-                text(paths[0].stem) or "Cameras",
-                context.scene,
-                folder if self.backgrounds else None,
-                self.set_size,
-                as_flight,
-            )
-        except InputError as error:
-            self.report({"ERROR"}, text(datablocks.sentence(error)))
-            return {"CANCELLED"}
+        paths = self._paths()
+        read_cameras: list[formats.Camera] = []
+        notes: list[str] = []
+        kinds = set()
+        for path in paths:
+            kinds.add(formats.recognized(path))
+            more, more_notes = read(path, context.scene, self.distance, self)
+            read_cameras, notes = read_cameras + more, notes + more_notes
+        as_flight = self.import_as == "FLIGHT" or (self.import_as == "BY_FILE" and kinds == {"trajectories"})
+        folder = paths[0] if paths[0].is_dir() else paths[0].parent
+        imported = import_cameras.import_cameras(
+            read_cameras,
+            text(paths[0].stem) or "Cameras",
+            context.scene,
+            folder if self.backgrounds else None,
+            self.set_size,
+            as_flight,
+        )
         if context.mode == "OBJECT":
             select(imported.objects, imported.objects[0], context)
         notes = list(dict.fromkeys((*notes, *imported.notes)))
         title = ", ".join(formats.FORMATS[kind].TITLE for kind in sorted(kinds))
-        what = (
-            f"a flight of {len(read_cameras)} poses"
-            if as_flight
-            else "1 camera"
-            if len(read_cameras) == 1
-            else f"{len(read_cameras)} cameras"
-        )
+        what = f"a flight of {len(read_cameras)} poses" if as_flight else _counted(read_cameras)
         pictures = f", {imported.pictures} with pictures" if imported.pictures else ""
         noted = f"; {len(notes)} notes" if len(notes) > 1 else "; 1 note" if notes else ""
         for note in notes[:_MOST_NOTES]:
@@ -130,7 +118,6 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, ImportHelper, bpy.types.Operator
         self.report({"INFO"}, text(f"{paths[0].name}: {what}{pictures} ({title}){noted}"))
         if notes and not bpy.app.background:
             show(lines_of([(note, "INFO") for note in notes]), "Imported Cameras", context)
-        return {"FINISHED"}
 
     def _paths(self) -> list[Path]:
         names = [each.name for each in self.files if each.name]
@@ -170,7 +157,7 @@ def read(
     return read_cameras, notes
 
 
-class VIEWCAM_OT_export_cameras(WorldOptions, ExportHelper, bpy.types.Operator):
+class VIEWCAM_OT_export_cameras(WorldOptions, ReportsErrors, ExportHelper, bpy.types.Operator):
     bl_idname = "viewcam.export_cameras"
     bl_label = "Export Cameras"
     bl_description = "Write cameras for another program, in the picture at 100 %"
@@ -197,33 +184,25 @@ class VIEWCAM_OT_export_cameras(WorldOptions, ExportHelper, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene and any(each.type == "CAMERA" for each in context.scene.objects):
-            return True
-        cls.poll_message_set("The scene has no camera")
-        return False
+        has_camera = context.scene and any(each.type == "CAMERA" for each in context.scene.objects)
+        return possible(cls, has_camera, "The scene has no camera")
 
     def draw(self, _context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
         for name in ("format", "which", "axes", "scale"):
             self.layout.prop(self, name)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            suffix = formats.FORMATS[self.format].SUFFIX
-            path = Path(bpy.path.abspath(self.filepath))
-            if not path.name:
-                raise InputError("the cameras have no file name: give one")
-            if suffix and self.format != "sidecar" and not path.suffix:
-                path = path.with_suffix(suffix)
-            exported = self._at_each_frame(context.scene) if self.which == "FRAMES" else self._cameras(context)
-            written = formats.save(exported, path, self.format, self.chosen())
-        except InputError as error:
-            self.report({"ERROR"}, text(datablocks.sentence(error)))
-            return {"CANCELLED"}
-        count = "1 camera" if len(exported) == 1 else f"{len(exported)} cameras"
+    def run(self, context: bpy.types.Context) -> None:
+        suffix = formats.FORMATS[self.format].SUFFIX
+        path = Path(bpy.path.abspath(self.filepath))
+        if not path.name:
+            raise InputError("the cameras have no file name: give one")
+        if suffix and self.format != "sidecar" and not path.suffix:
+            path = path.with_suffix(suffix)
+        exported = self._at_each_frame(context.scene) if self.which == "FRAMES" else self._cameras(context)
+        written = formats.save(exported, path, self.format, self.chosen())
         files = "" if len(written) == 1 else f", {len(written)} files"
-        self.report({"INFO"}, text(f"{path.name}: {count} ({formats.FORMATS[self.format].TITLE}{files})"))
-        return {"FINISHED"}
+        self.report({"INFO"}, text(f"{path.name}: {_counted(exported)} ({formats.FORMATS[self.format].TITLE}{files})"))
 
     def _at_each_frame(self, scene: bpy.types.Scene) -> list[formats.Camera]:
         frames = makers.frames(f"{scene.frame_start}..{scene.frame_end}")[:: scene.frame_step]
@@ -258,7 +237,7 @@ class VIEWCAM_FH_cameras(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-class VIEWCAM_OT_export_scene(ExportHelper, bpy.types.Operator):
+class VIEWCAM_OT_export_scene(ReportsErrors, ExportHelper, bpy.types.Operator):
     bl_idname = "viewcam.export_scene"
     bl_label = "Export Scene"  # on its button, which is narrow
     bl_description = "Write the scene at the current frame, through the scene's camera, as the reference tracer reads it"
@@ -275,27 +254,23 @@ class VIEWCAM_OT_export_scene(ExportHelper, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene and datablocks.render_camera(context.scene):
-            return True
-        cls.poll_message_set("The scene has no camera")
-        return False
+        return possible(cls, context.scene and datablocks.render_camera(context.scene), "The scene has no camera")
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         from ...jobs.job import Job
         from ...tracer.scene import scene_file  # here, since Blender starts without
         from ..jobs import renderer
 
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), _SUFFIX))
-        try:
-            if path.name == _SUFFIX:
-                raise InputError("the scene has no file name: give one")
-            scene = renderer.export(Job(level="path" if self.light else "geometry", recenter=self.recenter))
-            scene_file.write(scene, path)
-        except InputError as error:
-            self.report({"ERROR"}, text(datablocks.sentence(error)))
-            return {"CANCELLED"}
+        if path.name == _SUFFIX:
+            raise InputError("the scene has no file name: give one")
+        scene = renderer.export(Job(level="path" if self.light else "geometry", recenter=self.recenter))
+        scene_file.write(scene, path)
         _tell(self, scene.ledger, path, context)
-        return {"FINISHED"}
+
+
+def _counted(read_cameras: Sequence[formats.Camera]) -> str:
+    return "1 camera" if len(read_cameras) == 1 else f"{len(read_cameras)} cameras"
 
 
 def select(objects: Sequence[bpy.types.Object], active: bpy.types.Object, context: bpy.types.Context) -> None:

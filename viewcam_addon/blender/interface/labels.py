@@ -19,7 +19,7 @@ from ...labels import DEPTH_STEPS, KINDS, PASSES, endings
 from .. import datablocks
 from . import panel_rows
 from .background import Background, BackgroundBatch, Cancels, StartsForCamera, shot
-from .panel_rows import BelowProperties, BelowSidebar, SubPanel
+from .panel_rows import SubPanel
 
 _SUMMARY = "summary.json"
 
@@ -36,10 +36,7 @@ _KINDS = (
 
 def _looked(_: object) -> None:
     if background.running is None:
-        for window in bpy.context.window_manager.windows:
-            for area in window.screen.areas:
-                if area.type in ("PROPERTIES", "VIEW_3D"):
-                    area.tag_redraw()
+        panel_rows.redraw()
 
 
 background = Background(0.2, _looked)
@@ -164,12 +161,7 @@ def _draw_latest(layout: bpy.types.UILayout, context: bpy.types.Context, folder:
         column.operator("wm.path_open", text="Open Folder", icon="FILE_FOLDER").filepath = str(folder)
 
 
-class VIEWCAM_PT_data_labels(_LabelsPanel, BelowProperties, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_sidebar_labels(_LabelsPanel, BelowSidebar, bpy.types.Panel):
-    pass
+VIEWCAM_PT_data_labels, VIEWCAM_PT_sidebar_labels = panel_rows.in_both_places("labels", _LabelsPanel)
 
 
 CLASSES = (VIEWCAM_OT_write_labels, VIEWCAM_OT_cancel_labels, VIEWCAM_PT_data_labels, VIEWCAM_PT_sidebar_labels)

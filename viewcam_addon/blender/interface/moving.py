@@ -21,7 +21,7 @@ from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, preferences, targets
 from . import dragging, readouts, selection, viewport
-from .operators import CameraOperator
+from .operators import CameraOperator, possible
 
 
 class _Move(CameraOperator):
@@ -30,17 +30,11 @@ class _Move(CameraOperator):
     moved: Callable[[Pinhole, bpy.types.Object, bpy.types.Scene], Pinhole]
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
-        pinhole = _pinhole(camera_object, scene)
+        pinhole = cameras.current(camera_object, scene)
         before = dragging.state(camera_object)
         for finding in cameras.apply(camera_object, self.moved(pinhole, camera_object, scene), scene):
             self.report({"WARNING"}, finding)
         dragging.key_changes(camera_object, before, scene)
-
-
-def _pinhole(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
-    """The camera's values, or the camera as it stands if they are not enabled."""
-    stated = cameras.stated(camera_object, scene)
-    return cameras.as_it_stands(camera_object, scene) if stated is None else stated
 
 
 class _SelectionMove(_Move):
@@ -48,10 +42,8 @@ class _SelectionMove(_Move):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not super().poll(context):
             return False
-        if selection.objects(context, datablocks.camera_in(context)):
-            return True
-        cls.poll_message_set("Nothing but the camera is selected: select what it shall look at")
-        return False
+        chosen = selection.objects(context, datablocks.camera_in(context))
+        return possible(cls, chosen, "Nothing but the camera is selected: select what it shall look at")
 
 
 class VIEWCAM_OT_adopt_view(_Move, bpy.types.Operator):
@@ -64,12 +56,8 @@ class VIEWCAM_OT_adopt_view(_Move, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if viewport.area_in(context):
-            return True
-        cls.poll_message_set("There is no 3D viewport in this window: open one")
-        return False
+        sentence = "There is no 3D viewport in this window: open one"
+        return super().poll(context) and possible(cls, viewport.area_in(context), sentence)
 
     def moved(self, pinhole: Pinhole, _camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
         area = viewport.area_in(bpy.context)
@@ -115,12 +103,9 @@ class VIEWCAM_OT_look_at_active(_Move, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if context.active_object and context.active_object != datablocks.camera_in(context):
-            return True
-        cls.poll_message_set("No object but the camera is active: make another one active")
-        return False
+        is_other = context.active_object and context.active_object != datablocks.camera_in(context)
+        sentence = "No object but the camera is active: make another one active"
+        return super().poll(context) and possible(cls, is_other, sentence)
 
     def moved(self, pinhole: Pinhole, camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
         active = bpy.context.active_object
@@ -150,7 +135,7 @@ class VIEWCAM_OT_dolly_camera(_Move, bpy.types.Operator):
         if camera_object is None or self.properties.is_property_set("reach"):
             return self.execute(context)
         with contextlib.suppress(InputError):  # which is told where the distance is confirmed
-            pinhole = _pinhole(camera_object, datablocks.scene_of(camera_object))
+            pinhole = cameras.current(camera_object, datablocks.scene_of(camera_object))
             self.reach = math.dist(pinhole.eye, pinhole.look_at)
         return context.window_manager.invoke_props_dialog(self)
 

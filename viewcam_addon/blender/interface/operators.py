@@ -5,7 +5,7 @@ They work in any mode and on any camera: the one that is named, else the active 
 
 import dataclasses
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import bpy
 
@@ -14,6 +14,16 @@ from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks
 from . import readouts
+
+
+def possible(operator: Any, condition: object, otherwise: str) -> bool:
+    """The answer of an operator's `poll`: whether a condition holds.
+
+    otherwise : a sentence that Blender shows beside the disabled button.
+    """
+    if not condition:
+        operator.poll_message_set(otherwise)
+    return bool(condition)
 
 
 class NamesCamera:
@@ -37,31 +47,36 @@ class NamesCamera:
         return result
 
 
-class CameraOperator(NamesCamera):
-    """The base of all operators of a camera. A subclass says in `work(camera_object, scene)` what it does."""
+class ReportsErrors:
+    """An operator that says in `run(context)` what it does; an InputError there is its report, and cancels it."""
 
-    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
-    work: Callable[[bpy.types.Object, bpy.types.Scene], None]
-    report: Callable[[set[str], str], None]  # this and the next one: Blender's
-    poll_message_set: ClassVar[Callable[[str], None]]
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene and len(bpy.data.cameras):
-            return True
-        cls.poll_message_set("There is no camera")
-        return False
+    run: Callable[[bpy.types.Context], None]
+    report: Callable[[set[str], str], None]  # Blender's
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            camera_object = self.target_camera(context)
-            if camera_object is None:
-                raise InputError(f"there is no camera {self.camera!r}" if self.camera else "there is no camera: select one")
-            self.work(camera_object, datablocks.scene_of(camera_object))
+            self.run(context)
         except InputError as error:
             self.report({"ERROR"}, datablocks.sentence(error))
             return {"CANCELLED"}
         return {"FINISHED"}
+
+
+class CameraOperator(NamesCamera, ReportsErrors):
+    """The base of all operators of a camera. A subclass says in `work(camera_object, scene)` what it does."""
+
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+    work: Callable[[bpy.types.Object, bpy.types.Scene], None]
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return possible(cls, context.scene and len(bpy.data.cameras), "There is no camera")
+
+    def run(self, context: bpy.types.Context) -> None:
+        camera_object = self.target_camera(context)
+        if camera_object is None:
+            raise InputError(f"there is no camera {self.camera!r}" if self.camera else "there is no camera: select one")
+        self.work(camera_object, datablocks.scene_of(camera_object))
 
 
 class VIEWCAM_OT_apply_camera(CameraOperator, bpy.types.Operator):

@@ -25,7 +25,7 @@ from ...pinhole import Pinhole, Triple
 from .. import camera as cameras
 from .. import datablocks, preferences
 from . import panel_rows
-from .panel_rows import BelowProperties, BelowSidebar, SubPanel
+from .panel_rows import SubPanel
 
 _NAMES = ("u", "v", "w")
 _LETTER_SIZE = 16  # points
@@ -253,12 +253,7 @@ class _ShowPanel(SubPanel):
         row.prop(group, "plane_at")
 
 
-class VIEWCAM_PT_data_show(_ShowPanel, BelowProperties, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_sidebar_show(_ShowPanel, BelowSidebar, bpy.types.Panel):
-    pass
+VIEWCAM_PT_data_show, VIEWCAM_PT_sidebar_show = panel_rows.in_both_places("show", _ShowPanel)
 
 
 CLASSES = (VIEWCAM_PT_data_show, VIEWCAM_PT_sidebar_show)

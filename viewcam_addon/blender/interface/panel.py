@@ -34,7 +34,7 @@ from . import (
     scene_cameras,
     swipe,
 )
-from .panel_rows import BelowProperties, BelowSidebar, CameraPanel, InProperties, InSidebar, SubPanel
+from .panel_rows import CameraPanel, InProperties, InSidebar, SubPanel
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,8 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
     panel_rows.point(turned, group, "up", is_free=True, followers=[])
     zoomed = column.column()
     zoomed.enabled = findings.DISTANCE not in followed
-    _draw_lens(zoomed, group)
+    field = {unit: look for look, unit in datablocks.LENSES.items()}.get(group.lens_unit, "distance")
+    panel_rows.value(zoomed, group, field, choice="lens_unit")
     is_override = bool(group.id_data.override_library)  # which keeps values, and not the other looks at them
     if is_override and group.lens_unit != "PIXELS":
         _draw_why(column, "Override: edit in px")
@@ -147,12 +148,6 @@ def _draw_why(column: bpy.types.UILayout, word: str | None) -> None:
         row = column.row()
         row.alignment = "RIGHT"
         row.label(text=word, icon="LOCKED")
-
-
-def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
-    """Draw the lens: one field, and beside it the list of what it is."""
-    field = {unit: look for look, unit in datablocks.LENSES.items()}.get(group.lens_unit, "distance")
-    panel_rows.value(column, group, field, choice="lens_unit")
 
 
 def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:
@@ -327,28 +322,9 @@ class VIEWCAM_PT_sidebar(_MainPanel, InSidebar, bpy.types.Panel):
         return context.scene is not None
 
 
-class VIEWCAM_PT_data_options(_OptionsPanel, BelowProperties, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_sidebar_options(_OptionsPanel, BelowSidebar, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_data_move(_MovePanel, BelowProperties, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_sidebar_move(_MovePanel, BelowSidebar, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_data_readouts(_ReadOutsPanel, BelowProperties, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_sidebar_readouts(_ReadOutsPanel, BelowSidebar, bpy.types.Panel):
-    pass
+VIEWCAM_PT_data_options, VIEWCAM_PT_sidebar_options = panel_rows.in_both_places("options", _OptionsPanel)
+VIEWCAM_PT_data_move, VIEWCAM_PT_sidebar_move = panel_rows.in_both_places("move", _MovePanel)
+VIEWCAM_PT_data_readouts, VIEWCAM_PT_sidebar_readouts = panel_rows.in_both_places("readouts", _ReadOutsPanel)
 
 
 class VIEWCAM_MT_cameras(bpy.types.Menu):

@@ -46,6 +46,25 @@ class BelowSidebar(InSidebar):
     bl_parent_id = "VIEWCAM_PT_sidebar"
 
 
+def in_both_places(name: str, panel: type) -> tuple[type, type]:
+    """The two classes of a panel below Virtual Pinhole, among the camera data's properties and in the sidebar."""
+    data, sidebar = (
+        type(f"VIEWCAM_PT_{place}_{name}", (panel, below, bpy.types.Panel), {"__module__": panel.__module__})
+        for place, below in (("data", BelowProperties), ("sidebar", BelowSidebar))
+    )
+    return data, sidebar
+
+
+def redraw() -> None:
+    """Draw the panels of all windows anew, and nothing else of the screen."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in ("PROPERTIES", "VIEW_3D"):
+                for region in (region for region in area.regions if region.type in ("UI", "WINDOW")):
+                    if area.type == "PROPERTIES" or region.type == "UI":
+                        region.tag_redraw()
+
+
 _NARROW = 250  # pixels
 _LABEL = 0.4  # share of a row, as Blender splits it
 _BESIDE_TEXT = 60  # pixels, of what stands left and right of a sentence

@@ -25,7 +25,7 @@ from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, targets
 from . import dragging, overlay, panel_rows, readouts
-from .operators import CameraOperator
+from .operators import CameraOperator, possible
 from .panel_rows import BelowSidebar, SubPanel
 
 EDGES, RECTANGLE, POINTS = "EDGES", "RECTANGLE", "POINTS"
@@ -221,13 +221,10 @@ class VIEWCAM_OT_match_photo(CameraOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
         area = context.area
-        if area and area.type == "VIEW_3D" and area.spaces.active.region_3d.view_perspective == "CAMERA":
-            return True
-        cls.poll_message_set("Look through the camera first (Numpad 0): the edges are drawn in camera view")
-        return False
+        is_through = area and area.type == "VIEW_3D" and area.spaces.active.region_3d.view_perspective == "CAMERA"
+        sentence = "Look through the camera first (Numpad 0): the edges are drawn in camera view"
+        return super().poll(context) and possible(cls, is_through, sentence)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         global _drawn
@@ -331,8 +328,7 @@ def begun(camera_object: bpy.types.Object | None, context: bpy.types.Context) ->
         raise InputError(f"camera {camera_object.name!r} has animated values: clear their keyframes and drivers first")
     if scene.render.use_border and scene.render.use_crop_to_border:
         raise InputError("the picture is cropped to the render region: switch Crop to Render Region off")
-    stated = cameras.stated(camera_object, scene)
-    like = cameras.as_it_stands(camera_object, scene) if stated is None else stated
+    like = cameras.current(camera_object, scene)
     if like.mirrored or like.distance[0] != like.distance[1]:
         raise InputError("the picture is mirrored or its pixels are not square: a photo's are neither")
     drawing = Drawing(like, settings.kind, settings.axes, tuple(settings.sides), tuple(scene.cursor.location))

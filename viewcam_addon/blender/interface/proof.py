@@ -20,7 +20,7 @@ from ..render_settings import LEVELS
 from . import panel_rows, proof_image, swipe
 from .background import Background, Cancels, StartsForCamera
 from .comparing import Outcome, RunningComparison
-from .panel_rows import BelowProperties, BelowSidebar, CameraPanel
+from .panel_rows import CameraPanel
 
 _SIZE = 32
 _THICK = 2.6
@@ -272,12 +272,7 @@ class _ProofPanel(CameraPanel):
             _draw_settings(body, context)
 
 
-class VIEWCAM_PT_data_proof(_ProofPanel, BelowProperties, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_sidebar_proof(_ProofPanel, BelowSidebar, bpy.types.Panel):
-    pass
+VIEWCAM_PT_data_proof, VIEWCAM_PT_sidebar_proof = panel_rows.in_both_places("proof", _ProofPanel)
 
 
 def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -356,12 +351,7 @@ def _draw_render_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None
 
 def _redraw(context: bpy.types.Context, status_bar: bool = True) -> None:
     """The panels and the status bar; nothing else of the screen."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in ("PROPERTIES", "VIEW_3D"):
-                for region in (region for region in area.regions if region.type in ("UI", "WINDOW")):
-                    if area.type == "PROPERTIES" or region.type == "UI":
-                        region.tag_redraw()
+    panel_rows.redraw()
     if status_bar and context.workspace:
         context.workspace.status_text_set(None)  # as no status bar is in a screen's areas, nothing else tells it to draw
 

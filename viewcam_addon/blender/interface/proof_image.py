@@ -87,9 +87,7 @@ def load(outcome: Outcome, view: str = "ALL", swipe: float = 0.5) -> bpy.types.I
     height, width = (min(side.shape[axis] for side in sides.values()) for axis in (0, 1))
     # Where pictures are wider than a screen, what differs is made smaller by another rule, and may have a pixel less.
     picture = composed({name: side[-height:, :width] for name, side in sides.items()}, view, swipe)
-    image = bpy.data.images.get((NAME, None))
-    if image is None:
-        image = bpy.data.images.new(NAME, 1, 1)
+    image = loaded() or bpy.data.images.new(NAME, 1, 1)
     if image.packed_file:
         image.unpack(method="REMOVE")
     if image.source != "GENERATED":

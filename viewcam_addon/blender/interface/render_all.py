@@ -17,6 +17,7 @@ from ...jobs.names import made_fit, one_file
 from .. import own_picture
 from . import scene_cameras
 from .background import Background, BackgroundBatch, Cancels, shot
+from .operators import possible
 
 _SHEET = "contact-sheet.html"
 
@@ -114,13 +115,9 @@ class VIEWCAM_OT_render_all_cameras(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if background.running:
-            cls.poll_message_set("The cameras are being rendered")
-            return False
-        if context.scene and scene_cameras.of_scene(context.scene):
-            return True
-        cls.poll_message_set("There is no camera")
-        return False
+        has_camera = context.scene and scene_cameras.of_scene(context.scene)
+        is_free = possible(cls, not background.running, "The cameras are being rendered")
+        return is_free and possible(cls, has_camera, "There is no camera")
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)

@@ -4,7 +4,6 @@ The panel shows the active object if that is a camera, else the scene's camera, 
 the active object, as a click in the viewport would. Rejected: a choice of the panel's own (two ideas of what is active).
 """
 
-from collections.abc import Callable
 from typing import Any, ClassVar
 
 import bpy
@@ -14,7 +13,8 @@ from ...errors import InputError
 from .. import camera as cameras
 from .. import datablocks, own_picture, preferences, storage
 from . import file_menu, panel_rows, viewport
-from .panel_rows import BelowProperties, BelowSidebar, SubPanel
+from .operators import NamesCamera, ReportsErrors, possible
+from .panel_rows import BelowSidebar, SubPanel
 
 _NAME = "Virtual Pinhole"
 _FROM = (7.0, -7.0, 5.0)  # a new camera's eye, from the point that it looks at
@@ -48,26 +48,13 @@ def choose(camera_object: bpy.types.Object, context: bpy.types.Context) -> None:
         layer.objects.active = camera_object
 
 
-class _SceneOperator:
+class _SceneOperator(ReportsErrors):
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
-    work: Callable[[bpy.types.Context], None]
-    report: Callable[[set[str], str], None]  # this and the next one: Blender's
-    poll_message_set: ClassVar[Callable[[str], None]]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene and context.mode == "OBJECT":
-            return True
-        cls.poll_message_set("Leave the mode first: cameras are chosen in Object Mode")
-        return False
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            self.work(context)
-        except InputError as error:
-            self.report({"ERROR"}, datablocks.sentence(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        is_in_object_mode = context.scene and context.mode == "OBJECT"
+        return possible(cls, is_in_object_mode, "Leave the mode first: cameras are chosen in Object Mode")
 
 
 class VIEWCAM_OT_add_camera(_SceneOperator, bpy.types.Operator):
@@ -81,16 +68,14 @@ class VIEWCAM_OT_add_camera(_SceneOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene and context.scene.library:
-            cls.poll_message_set("The scene is linked from another file")
-            return False
-        return super().poll(context)
+        is_linked = context.scene and context.scene.library
+        return possible(cls, not is_linked, "The scene is linked from another file") and super().poll(context)
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         return "Add a camera that shows all that the 3D viewport shows" if properties.from_view else cls.bl_description
 
-    def work(self, context: bpy.types.Context) -> None:
+    def run(self, context: bpy.types.Context) -> None:
         area = viewport.area_in(context) if self.from_view else None
         if self.from_view and area is None:
             raise InputError("there is no 3D viewport in this window: open one")
@@ -125,25 +110,19 @@ class VIEWCAM_OT_step_camera(_SceneOperator, bpy.types.Operator):
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         return "Go back to the previous camera of the scene" if properties.step < 0 else cls.bl_description
 
-    def work(self, context: bpy.types.Context) -> None:
+    def run(self, context: bpy.types.Context) -> None:
         neighbor = beside(datablocks.camera_in(context), context.scene, self.step)
         if neighbor is None:
             raise InputError("there is no camera: add one")
         choose(neighbor, context)
 
 
-class VIEWCAM_OT_make_camera_active(_SceneOperator, bpy.types.Operator):
+class VIEWCAM_OT_make_camera_active(NamesCamera, _SceneOperator, bpy.types.Operator):
     bl_idname = "viewcam.make_camera_active"
     bl_label = "Make Active"
     bl_description = "Let the scene render through this camera, and the viewport's camera view show it"
 
-    camera: bpy.props.StringProperty(
-        name="Camera",
-        description="Name of the camera object, or empty for the active or the scene's camera",
-        options={"SKIP_SAVE"},
-    )
-
-    def work(self, context: bpy.types.Context) -> None:
+    def run(self, context: bpy.types.Context) -> None:
         camera_object = context.scene.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
         if camera_object is None or camera_object.type != "CAMERA":
             raise InputError(f"scene {context.scene.name!r} has no camera {self.camera!r}: name another")
@@ -243,12 +222,7 @@ _LABELS = {
 }
 
 
-class VIEWCAM_PT_data_picture(_PicturePanel, BelowProperties, bpy.types.Panel):
-    pass
-
-
-class VIEWCAM_PT_sidebar_picture(_PicturePanel, BelowSidebar, bpy.types.Panel):
-    pass
+VIEWCAM_PT_data_picture, VIEWCAM_PT_sidebar_picture = panel_rows.in_both_places("picture", _PicturePanel)
 
 
 class VIEWCAM_PT_sidebar_cameras(SubPanel, BelowSidebar, bpy.types.Panel):
@@ -282,13 +256,7 @@ def _draw_add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 OPERATORS = (VIEWCAM_OT_add_camera, VIEWCAM_OT_step_camera, VIEWCAM_OT_make_camera_active)
-CLASSES = (
-    *OPERATORS,
-    VIEWCAM_UL_cameras,
-    VIEWCAM_PT_sidebar_cameras,
-    VIEWCAM_PT_data_picture,
-    VIEWCAM_PT_sidebar_picture,
-)
+CLASSES = (*OPERATORS, VIEWCAM_UL_cameras, VIEWCAM_PT_sidebar_cameras, VIEWCAM_PT_data_picture, VIEWCAM_PT_sidebar_picture)
 
 
 def register() -> None:

@@ -20,6 +20,7 @@ from .. import datablocks
 from ..rendering.live_view import LiveView
 from ..rendering.picture_files import displayed
 from . import proof_image, viewport
+from .operators import possible
 
 _SECONDS = 1 / 30  # between two looks at view and scene
 _NEAR = 8  # points from the line at which the mouse takes it
@@ -252,10 +253,8 @@ class VIEWCAM_OT_swipe_reference(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not bpy.app.background and context.window and viewport.area_in(context):
-            return True
-        cls.poll_message_set("There is no 3D viewport")
-        return False
+        has_viewport = not bpy.app.background and context.window and viewport.area_in(context)
+        return possible(cls, has_viewport, "There is no 3D viewport")
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if _running:

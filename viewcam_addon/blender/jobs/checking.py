@@ -59,12 +59,7 @@ class Checker:
         self._files = self._ends.enter_context(SceneFiles())
 
     def check_picture(
-        self,
-        job: Job,
-        scene: bpy.types.Scene,
-        camera_object: bpy.types.Object,
-        pinhole: Pinhole,
-        stated: Pinhole | None = None,
+        self, job: Job, scene: bpy.types.Scene, camera_object: bpy.types.Object, pinhole: Pinhole, stated: Pinhole | None = None
     ) -> dict[str, Any]:
         """Compare what Cycles renders through a camera, as the scene stands, with what `pinhole` sees.
 

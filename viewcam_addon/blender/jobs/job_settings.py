@@ -25,14 +25,7 @@ from . import origins, persistent_data
 
 _ENGINES = {"CYCLES": "CYCLES", "EEVEE": versions.EEVEE, "VIEWCAM": "VIEWCAM", "WORKBENCH": "BLENDER_WORKBENCH"}
 
-_OF_RENDER = (
-    "engine",
-    "resolution_x",
-    "resolution_y",
-    "resolution_percentage",
-    "pixel_aspect_x",
-    "pixel_aspect_y",
-)
+_OF_RENDER = ("engine", "resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y")
 
 
 def engine_name(engine: str) -> str:

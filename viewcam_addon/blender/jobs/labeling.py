@@ -68,11 +68,7 @@ class ShotLabels:
         return self._tracing.label(frames, picture, kinds, depth_steps, job.threads, lens, annotations)
 
     def _seen(
-        self,
-        scene: bpy.types.Scene,
-        camera_object: bpy.types.Object,
-        pinhole: Pinhole | None,
-        calibration: Calibration | None,
+        self, scene: bpy.types.Scene, camera_object: bpy.types.Object, pinhole: Pinhole | None, calibration: Calibration | None
     ) -> dict[str, Any]:
         """The request of the tracer's process about the scene at its frame."""
         with staged(Job(), scene, camera_object, whole=True) as stage:

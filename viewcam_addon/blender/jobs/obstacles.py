@@ -20,11 +20,7 @@ _DRAWN = (versions.EEVEE, "BLENDER_WORKBENCH")
 
 
 def obstacles(
-    shots: Sequence[Job],
-    outputs: Outputs,
-    scene: bpy.types.Scene,
-    own: Callable[[], bpy.types.Object],
-    settings: JobSettings,
+    shots: Sequence[Job], outputs: Outputs, scene: bpy.types.Scene, own: Callable[[], bpy.types.Object], settings: JobSettings
 ) -> Iterator[str]:
     """One sentence for each obstacle.
 
@@ -54,7 +50,9 @@ def obstacles(
                     cameras.read(camera_object, scene)
                     read.add(camera_object.name)
             else:
-                _check_storable(stated(shot, settings.frame_of(shot)), settings.frame_of(shot), own().data)
+                frame, camera = settings.frame_of(shot), own().data
+                plane = stated(shot, frame).plane  # Blender's numbers may hold no such
+                intrinsics.camera_data(plane, frame, *datablocks.own_sensor(camera), camera.sensor_fit)
         except InputError as error:
             yield f"the shot {checks.quoted(shot.name)}: {error}"
 
@@ -89,8 +87,3 @@ def stated(shot: Job, frame: intrinsics.Frame) -> Pinhole:
     distance = (shot.d, shot.d * (frame.pixel_aspect_x / frame.pixel_aspect_y))
     whole = Pinhole(shot.eye, shot.look_at, shot.up, distance, *frame.size, shot.principal_point, bool(shot.mirrored))
     return whole.cropped(*frame.window) if frame.crop else whole
-
-
-def _check_storable(pinhole: Pinhole, frame: intrinsics.Frame, camera: bpy.types.Camera) -> None:
-    """Raise InputError if Blender's numbers hold no such camera."""
-    intrinsics.camera_data(pinhole.plane, frame, *datablocks.own_sensor(camera), camera.sensor_fit)

@@ -61,7 +61,7 @@ def made_from() -> dict[str, Any]:
     return {
         "blend": blend,
         "linked": _hashes(_linked(), Path(bpy.data.filepath).parent),
-        "colors": _digest(_hashes(*_colors())),
+        "colors": hashlib.sha256(json.dumps(_hashes(*_colors())).encode()).hexdigest(),
         "versions": versions(),
         **({"unknown": list(lacking)} if lacking else {}),
     }
@@ -117,10 +117,6 @@ def _check_kinds(paths: Iterable[Path]) -> None:
             raise InputError(
                 f"the .blend reads more than {_MOST_BYTES / 2**30:g} GiB of other files, as {path}: take out what is not needed"
             )
-
-
-def _digest(hashes: list[list[str]]) -> str:
-    return hashlib.sha256(json.dumps(hashes).encode()).hexdigest()
 
 
 def _linked() -> set[Path]:

@@ -151,7 +151,8 @@ def override_settings(
         overrides.set(scene.render, "film_transparent", light.film.transparent)
         override_all(overrides, scene.cycles, _LIGHT | _settings_of(light))
         passes = LIGHT_PASSES + (_PASSES_OF_CENTERS if light.samples == 1 else ())
-    _override_passes(overrides, view_layer, passes)
+    for setting in ("use_pass_combined", *(SETTINGS[name] for name in passes if name in SETTINGS)):
+        overrides.set(view_layer, setting, True)
     if light and not light.bounces.parts_diffuse:
         overrides.set(view_layer, SETTINGS["Diffuse Indirect"], False)
     if not everything:
@@ -187,12 +188,6 @@ def override_all(overrides: Overrides, owner: bpy.types.bpy_struct, settings: Ma
     for name, value in settings.items():
         if hasattr(owner, name):  # versions know fewer of them
             overrides.set(owner, name, value)
-
-
-def _override_passes(overrides: Overrides, view_layer: bpy.types.ViewLayer, passes: Iterable[str]) -> None:
-    """Passes beside those that are on."""
-    for setting in ("use_pass_combined", *(SETTINGS[name] for name in passes if name in SETTINGS)):
-        overrides.set(view_layer, setting, True)
 
 
 def _override_file(overrides: Overrides, scene: bpy.types.Scene, path: os.PathLike[str]) -> None:

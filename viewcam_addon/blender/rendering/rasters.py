@@ -90,9 +90,7 @@ def render(
     if not can_draw():
         raise InputError(f"{engine} needs a graphics driver, and there is none: install one (llvmpipe draws in software)")
     with overridden() as overrides:
-        for name, value in _RENDER.items():
-            if hasattr(scene.render, name):
-                overrides.set(scene.render, name, value)
+        cycles.override_all(overrides, scene.render, _RENDER)
         seen_through = camera_object or datablocks.require_render_camera(scene)
         overrides.set(view_layer, "use_pass_combined", True)
         overrides.set(scene.render, "use_stamp_note", True)

@@ -85,11 +85,7 @@ class Lighting:
 
 
 def export_scene(
-    scene: bpy.types.Scene,
-    view_layer: bpy.types.ViewLayer,
-    camera_object: bpy.types.Object,
-    ledger: Ledger,
-    lit: bool = False,
+    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False
 ) -> Scene:
     """The scene as a render of this view layer through this camera sees it, at the scene's current frame.
 
@@ -103,11 +99,7 @@ def export_scene(
 
 
 def survey(
-    scene: bpy.types.Scene,
-    view_layer: bpy.types.ViewLayer,
-    camera_object: bpy.types.Object,
-    ledger: Ledger,
-    lit: bool = False,
+    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False
 ) -> Lighting | None:
     """Fill the ledger as `export_scene` does, without reading any geometry; returns the light of the scene, if wanted."""
 

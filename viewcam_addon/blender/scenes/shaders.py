@@ -386,7 +386,7 @@ class Tree:
         if name == "Anisotropy":
             value = abs(value)  # which way, Tree.surface asks
         most = 1.0 if isinstance(name, int) else LARGEST_RADIANCE
-        if not math.isfinite(value) or value > LARGEST_RADIANCE or (value < 0 and name == "Strength"):
+        if not math.isfinite(value) or value > LARGEST_RADIANCE or (value < 0 and str(name).endswith("Strength")):
             self._reason(output, f"has a {output.node.inputs[name].name} of {value:g}")
             value = 0.0
         return Color((min(max(value, 0.0), most),) * 3)

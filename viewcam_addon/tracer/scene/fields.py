@@ -10,15 +10,17 @@ import math
 import os
 import zipfile
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ... import checks, machine, npy
 from ...errors import InputError
+
+Result = TypeVar("Result")
 
 _LARGEST_WHOLE = 2**31 - 1
 
@@ -43,6 +45,13 @@ class Field:
         if str(error).startswith(f"{self.file}: "):
             raise error
         raise InputError(f"{self.file}: {self.name}: {error}") from error
+
+    def build(self, kind: Callable[..., Result], *arguments: Any, **values: Any) -> Result:
+        """The result of `kind` with what this value says; an InputError there is raised as `hand_on` does."""
+        try:
+            return kind(*arguments, **values)
+        except InputError as error:
+            self.hand_on(error)
 
     def fields(self, required: tuple[str, ...], optional: tuple[str, ...] = (), others: bool = False) -> dict[str, "Field"]:
         """The values of an object's keys. All required ones must be there and, unless others=True, only known ones."""

@@ -64,10 +64,7 @@ def geometry(field: Field, arrays: Arrays) -> Mesh | Spheres:
     readers: dict[str, Callable[[Field, Arrays], Mesh | Spheres]] = {"mesh": _mesh, "spheres": _spheres, "plane": _plane}
     if kind.text() not in readers:
         kind.fail(f"is {quoted(kind.value)}: give one of {', '.join(readers)}")
-    try:
-        return readers[kind.text()](field, arrays)
-    except InputError as error:
-        field.hand_on(error)
+    return field.build(readers[kind.text()], field, arrays)
 
 
 def _mesh(field: Field, arrays: Arrays) -> Mesh:
@@ -219,10 +216,7 @@ def _picture(field: Field, arrays: Arrays) -> Picture:
     pixels = keys["pixels"].array(arrays, np.float32, (None, None, None), kept=TEXELS)
     if pixels.shape[2] not in (3, 4) and pixels.dtype != RGBE:
         keys["pixels"].fail(f"has {pixels.shape[2]} numbers a pixel and must have 3 or 4: correct it")
-    try:
-        return Picture(pixels, keys["srgb"].truth() if "srgb" in keys else False)
-    except InputError as error:
-        field.hand_on(error)
+    return field.build(Picture, pixels, keys["srgb"].truth() if "srgb" in keys else False)
 
 
 def _material(field: Field) -> Material:
@@ -251,15 +245,10 @@ def _node(field: Field, deep: int = 1) -> Node:
         kind.fail(f"is {quoted(kind.value)}: give one of {', '.join(KINDS)}")
     known = KINDS[kind.text()]
     keys = field.fields(("type",), tuple(known.inputs))
-    try:
-        stated = (
-            (name, _node_input(keys[name], default, known.is_value, deep))
-            for name, default in known.inputs.items()
-            if name in keys
-        )
-        return Node(kind.text(), tuple(stated))
-    except InputError as error:
-        field.hand_on(error)
+    stated = [
+        (name, _node_input(keys[name], default, known.is_value, deep)) for name, default in known.inputs.items() if name in keys
+    ]
+    return field.build(Node, kind.text(), tuple(stated))
 
 
 def _node_input(field: Field, default: object, of_value: bool, deep: int) -> Any:
@@ -281,15 +270,13 @@ def _color(field: Field) -> Color:
     """Three numbers, or an object where an image or the mesh's own colors come in."""
     is_varied = isinstance(field.value, dict)
     keys = field.fields((), ("rgb", "image", "closest", "vertex")) if is_varied else {"rgb": field}
-    try:
-        return Color(
-            rgb=keys["rgb"].vector(3) if "rgb" in keys else _WHITE,
-            image=keys["image"].text() if "image" in keys else None,
-            closest=keys["closest"].truth() if "closest" in keys else False,
-            vertex=keys["vertex"].truth() if "vertex" in keys else False,
-        )
-    except InputError as error:
-        field.hand_on(error)
+    return field.build(
+        Color,
+        rgb=keys["rgb"].vector(3) if "rgb" in keys else _WHITE,
+        image=keys["image"].text() if "image" in keys else None,
+        closest=keys["closest"].truth() if "closest" in keys else False,
+        vertex=keys["vertex"].truth() if "vertex" in keys else False,
+    )
 
 
 def _lamp(field: Field) -> Lamp:
@@ -303,20 +290,13 @@ def _lamp(field: Field) -> Lamp:
     values = _values(lamp, {name: keys[name] for name in declared if name in keys})
     if is_placed:
         values["matrix"] = fields.matrix(field, keys)
-    try:
-        return lamp(keys["name"].text(), **values)
-    except InputError as error:
-        field.hand_on(error)
+    return field.build(lamp, keys["name"].text(), **values)
 
 
 def _simple(kind: type, field: Field, without: tuple[str, ...] = ()) -> Any:
     """A World, Film or Bounces."""
     keys = field.fields((), tuple(each.name for each in dataclasses.fields(kind) if each.name not in without))
-    values = _values(kind, keys)
-    try:
-        return kind(**values)
-    except InputError as error:
-        field.hand_on(error)
+    return field.build(kind, **_values(kind, keys))
 
 
 def _values(kind: type, keys: dict[str, Field]) -> dict[str, Any]:
@@ -384,21 +364,17 @@ def read(path: str | os.PathLike[str]) -> Scene:
         geometries = {name: geometry(field, arrays) for name, field in fields["geometries"].named("geometry").items()}
         light = _light(fields, arrays)
         objects = tuple(_object(field, arrays) for field in fields["objects"].items("object"))
-    try:
-        return Scene(
-            camera=_camera(fields["camera"]),
-            geometries=geometries,
-            objects=objects,
-            stated_camera=_camera(fields["stated_camera"]) if "stated_camera" in fields else None,
-            clip=_clip(fields["clip"]) if "clip" in fields else (0.0, float("inf")),
-            ledger=tuple(_ledger_entry(field) for field in fields["ledger"].items("ledger entry"))
-            if "ledger" in fields
-            else (),
-            origin=fields["origin"].vector(3) if "origin" in fields else (0.0, 0.0, 0.0),
-            **light,
-        )
-    except InputError as error:
-        document.hand_on(error)
+    return document.build(
+        Scene,
+        camera=_camera(fields["camera"]),
+        geometries=geometries,
+        objects=objects,
+        stated_camera=_camera(fields["stated_camera"]) if "stated_camera" in fields else None,
+        clip=_clip(fields["clip"]) if "clip" in fields else (0.0, float("inf")),
+        ledger=tuple(map(_ledger_entry, fields["ledger"].items("ledger entry"))) if "ledger" in fields else (),
+        origin=fields["origin"].vector(3) if "origin" in fields else (0.0, 0.0, 0.0),
+        **light,
+    )
 
 
 def _document(scene: Scene, arrays: dict[str, NDArray]) -> dict:
@@ -480,19 +456,17 @@ def _parsed(path: Path) -> object:
 def _camera(field: Field) -> Pinhole:
     keys = field.fields(("eye", "look_at", "up", "distance", "width", "height"), ("principal_point", "mirrored"))
     distance = keys["distance"]
-    try:
-        return Pinhole(
-            eye=keys["eye"].vector(3),
-            look_at=keys["look_at"].vector(3),
-            up=keys["up"].vector(3),
-            distance=distance.vector(2) if isinstance(distance.value, list) else distance.number(),
-            width=keys["width"].whole(1),
-            height=keys["height"].whole(1),
-            principal_point=keys["principal_point"].vector(2) if "principal_point" in keys else None,
-            mirrored=keys["mirrored"].truth() if "mirrored" in keys else False,
-        )
-    except InputError as error:
-        field.hand_on(error)
+    return field.build(
+        Pinhole,
+        eye=keys["eye"].vector(3),
+        look_at=keys["look_at"].vector(3),
+        up=keys["up"].vector(3),
+        distance=distance.vector(2) if isinstance(distance.value, list) else distance.number(),
+        width=keys["width"].whole(1),
+        height=keys["height"].whole(1),
+        principal_point=keys["principal_point"].vector(2) if "principal_point" in keys else None,
+        mirrored=keys["mirrored"].truth() if "mirrored" in keys else False,
+    )
 
 
 def _clip(field: Field) -> tuple[float, float]:
