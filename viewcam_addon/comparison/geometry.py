@@ -141,20 +141,20 @@ def compare(
     )
 
 
-def _mistaken_depth(pinhole: Pinhole, expected: Seen, seen: Seen, given: str) -> str:
+def _mistaken_depth(pinhole: Pinhole, expected: Seen, seen: Seen, name: str) -> str:
     """The sentence that the test's Depth is the distance from the eye, or its Distance the depth; empty where neither is.
 
-    given : the pass that the test's depths come from. The other one it is where this leaves a tenth of the error.
+    name : the pass that the test's depths come from. It is the other one where reading it so leaves a tenth of the error.
     """
     hits = np.flatnonzero(tolerances.is_hit(expected) & tolerances.is_hit(seen))
     hits = hits[:: max(len(hits) // _READ_ANEW, 1)]
     rows, columns = np.divmod(hits, pinhole.width)
     cosine = -pinhole.ray_directions(columns, rows) @ pinhole.basis()[2]
     ratio = seen["Depth"][hits, 0].astype(np.float64) / expected["Depth"][hits, 0]
-    read_anew = ratio * cosine if given == "Depth" else ratio / cosine
+    read_anew = ratio * cosine if name == "Depth" else ratio / cosine
     if not len(hits) or not np.median(np.abs(read_anew - 1)) < 0.1 * np.median(np.abs(ratio - 1)):
         return ""
-    if given == "Depth":
+    if name == "Depth":
         return "Depth is the distance from the eye and not that along the view's axis: give it as distance"
     return "Distance is the depth along the view's axis and not that from the eye: give it as depth"
 
