@@ -52,7 +52,7 @@ class LightRow:
     hypothesis_tests : none where there is no noise.
     noise_free, edges : the exact comparison, None where there is noise.
     broken : pixels that are no numbers on one side or both.
-    breaks : of the reference and of the test, true if some of them are its own.
+    breaks : a flag for the reference and one for the test, true if some of them are its own.
     factor : the one that explains all of the difference, or None.
     """
 

@@ -44,7 +44,7 @@ class Sides:
         only.
     variance : the variance of `reference`; inf where it is not known.
     broken : (height, width) bool, true where one side or both have no number; there both are 0.
-    breaks : of the reference and of the tests, true if some of `broken` is theirs.
+    breaks : a flag for the reference and one for the tests, true if some of `broken` is theirs.
     shared : the variance of `reference` that its pixels may have shared with their neighbors, or 0.
     certain : (height, width, 1) bool, true for pixels that have no noise, whatever is beside them.
     """
