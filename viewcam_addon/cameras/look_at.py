@@ -121,6 +121,10 @@ _ORTHOGRAPHIC = {
     "glortho", "ortho", "orthographiccamera", "gluortho2d", "xmmatrixorthographiclh", "enableparallelprojection",
     "parallelprojectionon", "fovorthographiccameras", "orthographiccameras",
 }  # fmt: skip
+_ROLES_OF_POSES = {
+    "eye", "target", "look_at", "set_view", "camera_position", "direction", "position_x", "position_y", "position_z",
+    "lookatviewtransform", "computeviewmatrixfromyawpitchroll",
+}  # fmt: skip
 _PYTORCH3D_LOOK = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))  # eye, at and up where they are not given
 _MOVES = {
     "rotatex", "rotatey", "rotatez", "rotateonaxis", "translatex", "translatey", "translatez", "azimuth", "elevation",
@@ -351,23 +355,7 @@ class _Code:
         return sign == "(" and texts.plain(parts[-1]) in _CHANGES
 
     def says_pose(self) -> bool:
-        for parts, sign, _, _ in self.statements:
-            role = self._role(parts, sign)
-            if role in (
-                "eye",
-                "target",
-                "look_at",
-                "set_view",
-                "camera_position",
-                "direction",
-                "position_x",
-                "position_y",
-                "position_z",
-            ):
-                return True
-            if role in ("lookatviewtransform", "computeviewmatrixfromyawpitchroll"):
-                return True
-        return False
+        return any(self._role(parts, sign) in _ROLES_OF_POSES for parts, sign, _, _ in self.statements)
 
     def _role(self, parts: list[str], sign: str) -> str | None:
         """The role of a statement in placing a camera; None if it has none."""
@@ -577,6 +565,12 @@ class _Code:
         if before is None or _is_unknown(value):  # a value known once and computed once: nobody knows which counts
             scene.values[role] = (value, at)
 
+    def _place(self, scene: _Scene, start: int, *vectors: object) -> None:
+        """Set the eye, and the target and up as far as they are given."""
+        scene.moved.append(start)
+        for role, vector in zip(("eye", "target", "up"), vectors, strict=False):
+            self._set(scene, role, vector, start)
+
     def _plain(self, scene: _Scene, role: str, parts: list[str], sign: str, at: int, start: int) -> None:
         if sign in "({":
             values, named, _ = self.reader.arguments(at - 1)
@@ -637,9 +631,7 @@ class _Code:
         vectors = [numbers(value, 3) for value in values[:2]]
         if len(vectors) < 2 or None in vectors:
             texts.fail(self.text, start, "give position and target as plain numbers")
-        scene.moved.append(start)
-        for role, vector in zip(("eye", "target"), vectors, strict=True):
-            self._set(scene, role, vector, start)
+        self._place(scene, start, *vectors)
 
     def _of_pybullet(self, scene: _Scene, opened: int, start: int) -> None:
         """A point of view on a sphere about the target: degrees, whose roll, which also moves the eye, must be 0."""
@@ -654,10 +646,8 @@ class _Code:
         distance, yaw, pitch, _, axis = rest
         around, sideways = texts.turn(yaw, np.eye(3)[int(axis)]), texts.turn(pitch if axis == 2 else -pitch, np.eye(3)[0])
         offset = around @ sideways @ (-distance * np.eye(3)[1 if axis == 2 else 2])
-        scene.moved.append(start)
-        self._set(scene, "eye", tuple((np.array(target) + offset).tolist()), start)
-        self._set(scene, "target", target, start)
-        self._set(scene, "up", tuple((around @ sideways @ np.eye(3)[int(axis)]).tolist()), start)
+        eye, up = np.array(target) + offset, around @ sideways @ np.eye(3)[int(axis)]
+        self._place(scene, start, tuple(eye.tolist()), target, tuple(up.tolist()))
 
     def _of_pytorch3d(self, scene: _Scene, role: str, opened: int, start: int) -> None:
         values, named, _ = self.reader.arguments(opened)
@@ -686,22 +676,17 @@ class _Code:
             eye = tuple(a + b for a, b in zip(at, offset, strict=True))
         if None in (eye, at, up):
             texts.fail(self.text, start, "give eye, at and up as plain numbers")
-        scene.moved.append(start)
-        for name, vector in zip(("eye", "target", "up"), (eye, at, up), strict=True):
-            self._set(scene, name, vector, start)
+        self._place(scene, start, eye, at, up)
         scene.is_height_first = True
 
     def _camera_position(self, scene: _Scene, at: int, start: int) -> None:
         value = self.reader.value(at)[0]
         if single := numbers(value, 3):
-            scene.moved.append(start)
-            return self._set(scene, "eye", single, start)
+            return self._place(scene, start, single)
         vectors = [numbers(part, 3) for part in value] if isinstance(value, tuple) and len(value) == 3 else [None]
         if None in vectors:
             texts.fail(self.text, start, "give position, focal point and up as three numbers each")
-        scene.moved.append(start)
-        for role, vector in zip(("eye", "target", "up"), vectors, strict=True):
-            self._set(scene, role, vector, start)
+        self._place(scene, start, *vectors)
 
     def _perspective(self, scene: _Scene, parts: list[str], opened: int, start: int) -> None:
         values, named, _ = self.reader.arguments(opened)
