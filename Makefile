@@ -215,7 +215,7 @@ extension: .venv/extension
 
 artist-pictures: .venv/test
 	BLENDER=$$(.ci/find-blender) || exit 1; export BLENDER; \
-	VIEWCAM_PICTURES=docs/images/artists .venv/bin/python -m pytest tests/real_blender/test_window.py -k tour -o faulthandler_timeout=0
+	VIEWCAM_PICTURES=docs/images .venv/bin/python -m pytest tests/real_blender/test_window.py -k tour -o faulthandler_timeout=0
 
 # Blender 4.2 writes them, so that every later one opens them.
 scenes: .venvs/4.2/ready

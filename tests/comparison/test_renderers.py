@@ -46,6 +46,22 @@ def test_a_fiftieth_of_a_pixel_is_found_by_each_of_them(names, off, paper_scene)
     assert not all(row.ok for row in comparison.rows) or len(comparison.mismatches.kinds) > 1000, comparison.sentence
 
 
+@pytest.mark.parametrize(("name", "taken_for"), [("Distance", "Depth"), ("Depth", "Distance")])
+@pytest.mark.parametrize("others", [(), ("Position",)])
+def test_a_distance_that_is_taken_for_the_depth_is_told_and_so_is_the_other_way_round(name, taken_for, others, paper_scene):
+    test = only(paper_scene.rendered(), name, *others)
+    mistaken = {taken_for: test[name], **{other: test[other] for other in others}}
+    comparison = judged(paper_scene, replace(test, passes=mistaken))
+    assert not comparison.passed
+    assert f": {taken_for} is the " in comparison.sentence and f"give it as {name.lower()}" in comparison.sentence
+
+
+def test_a_depth_that_is_off_otherwise_is_no_distance(paper_scene):
+    test = only(paper_scene.rendered(), "Depth")
+    comparison = judged(paper_scene, replace(test, passes={"Depth": test["Depth"] * np.float32(1.01)}))
+    assert not comparison.passed and "give it as" not in comparison.sentence, comparison.sentence
+
+
 def test_with_a_position_alone_a_moved_ball_is_found(paper_scene):
     other = replace(paper_scene, spheres=((0.001, 0.0, 1.0, 1.0), *paper_scene.spheres[1:]))
     assert not judged(paper_scene, only(other.picture(), "Position")).passed

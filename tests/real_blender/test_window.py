@@ -1,7 +1,7 @@
 """The add-on in a window, used by mouse and keyboard on a virtual screen: handles, a first day, files of cameras, Compare with
 Cycles and the artist's tour (tour.py), whose pictures `make artist-pictures` keeps.
 
-VIEWCAM_PICTURES : a folder for pictures of the window; without it none are taken.
+VIEWCAM_PICTURES : a folder for pictures of the window, laid out as docs/images; without it none are taken.
 """
 
 import contextlib
@@ -104,10 +104,11 @@ def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_b
         go_through(real_blender, "tour", size=TALL, scale=0.5)
 
 
-def take_the_pictures(real_blender, scratch, folder):
+def take_the_pictures(real_blender, scratch, images):
     """The tour's, the README's moving one, and those of docs/artists.md that no step of the tour takes."""
-    images = folder.parent
-    go_through(real_blender, "tour", folder, attempts=1, size=TALL, patience=MOST_FOR_PICTURES)  # drawn finely
+    artists = images / "artists"
+    artists.mkdir(parents=True, exist_ok=True)
+    go_through(real_blender, "tour", artists, attempts=1, size=TALL, patience=MOST_FOR_PICTURES)  # drawn finely
     make_the_moving_picture(real_blender, scratch / "frames", images / "moving.webp")
     photo = scratch / "photo.png"
     subprocess.run([sys.executable, Path(__file__).with_name("photo_of_a_room.py"), photo], check=True)

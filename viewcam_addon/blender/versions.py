@@ -29,6 +29,11 @@ CYCLES_HAS_VERTEX_NORMALS = bpy.app.version < (5, 1)
 NODE_TYPES = {"DIFFUSE_BSDF": "BSDF_DIFFUSE"}
 # True if nodes whose links go in a circle are black; before, Cycles left these links out. Measured: 4.2, 5.0 and 5.2.
 CIRCLES_ARE_BLACK = bpy.app.version >= (5, 0)
+# True if an input keeps its value where a muted node or a reroute feeds it that nothing feeds; before, Cycles made it 0.
+# Measured: 4.2, 4.5, 5.0 and 5.2.
+MUTED_NODES_HAVE_NO_VALUES = bpy.app.version >= (5, 0)
+# True if Cycles samples no light of a Principled surface that a displacement bumps. Measured: in 5.2, not in 4.2, 4.5 and 5.0.
+LOSES_LIGHT_OF_BUMPED = bpy.app.version >= (5, 1)
 
 
 def node_tree(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree | None:

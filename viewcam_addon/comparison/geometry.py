@@ -40,6 +40,8 @@ from .verdict import GeometryComparison, allowed_unexplained, far_from_origin
 _NEEDED = ("Depth", "Position", "Object Index")
 # Pixels whose centers are traced again, to see whether the reference shows the scene.
 _ASKED_OF_THE_REFERENCE = 1000
+# Pixels whose depths are read as distances from the eye, and the other way round.
+_READ_ANEW = 1000
 # Passes that only the reference has: what tolerances are evaluated with.
 _FOR_TOLERANCES = ("Magnitude", "Facing")
 
@@ -135,7 +137,26 @@ def compare(
         lacking,
         in_one_place,
         renderer.name,
+        mistaken_depth=_mistaken_depth(pinhole, expected, seen, "Distance" if "Distance" in test.passes else "Depth"),
     )
+
+
+def _mistaken_depth(pinhole: Pinhole, expected: Seen, seen: Seen, name: str) -> str:
+    """The sentence that the test's Depth is the distance from the eye, or its Distance the depth; empty where neither is.
+
+    name : the pass that the test's depths come from. It is the other one where reading it so leaves a tenth of the error.
+    """
+    hits = np.flatnonzero(tolerances.is_hit(expected) & tolerances.is_hit(seen))
+    hits = hits[:: max(len(hits) // _READ_ANEW, 1)]
+    rows, columns = np.divmod(hits, pinhole.width)
+    cosine = -pinhole.ray_directions(columns, rows) @ pinhole.basis()[2]
+    ratio = seen["Depth"][hits, 0].astype(np.float64) / expected["Depth"][hits, 0]
+    read_anew = ratio * cosine if name == "Depth" else ratio / cosine
+    if not len(hits) or not np.median(np.abs(read_anew - 1)) < 0.1 * np.median(np.abs(ratio - 1)):
+        return ""
+    if name == "Depth":
+        return "Depth is the distance from the eye and not that along the view's axis: give it as distance"
+    return "Distance is the depth along the view's axis and not that from the eye: give it as depth"
 
 
 def _passes(reference: Image, test: Image, pinhole: Pinhole, partial: bool) -> tuple[Seen, Seen]:

@@ -104,6 +104,7 @@ class GeometryComparison:
     in_one_place : pixels that show another of several surfaces in one place, which is as right as the reference's.
     renderer : the name of the renderer that made the test picture.
     not_modeled : the part of the picture that neither side models as it is.
+    mistaken_depth : the sentence that the test's depths are distances, or the other way round; empty where they are neither.
     """
 
     pinhole: Pinhole
@@ -121,6 +122,7 @@ class GeometryComparison:
     in_one_place: InOnePlace = NOWHERE
     renderer: str = "Cycles"
     not_modeled: NotModeled = field(default_factory=NotModeled)
+    mistaken_depth: str = ""
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -269,7 +271,7 @@ def _agreement(comparison: GeometryComparison) -> str:
 
 def _faults(comparison: GeometryComparison) -> list[str]:
     """The faults, the gravest first."""
-    faults = []
+    faults = [comparison.mistaken_depth] if comparison.mistaken_depth else []
     position, rest = comparison.rows[0], comparison.rows[1:]
     if position.name != "Position":
         rest = comparison.rows

@@ -269,6 +269,58 @@ def test_what_cycles_makes_of_odd_nodes(pictures, floor, odd):
     assert sides[0].cycles[0]["Emission"].any() == (shines and output is None)
 
 
+MUTED = {
+    "color": "ShaderNodeRGB",
+    "coordinate": "ShaderNodeTexCoord",
+    "attribute": "ShaderNodeAttribute",
+    "shader": "ShaderNodeEmission",
+    "a color that it passes on": "ShaderNodeInvert",
+    "reroute": "NodeReroute",
+}
+
+
+@pytest.mark.parametrize("what", MUTED)
+def test_a_muted_node_or_reroute_that_nothing_feeds_is_what_it_is_in_cycles(pictures, floor, what):
+    """The floor has another color or shines where the node is not muted."""
+    tree, shader = floor.node_tree, floor.node_tree.nodes["Shader"]
+    node = tree.nodes.new(MUTED[what])
+    if what == "shader":
+        mixed = tree.nodes.new("ShaderNodeMixShader")
+        for feeding, number in ((shader, 1), (node, 2)):
+            tree.links.new(feeding.outputs[0], mixed.inputs[number])
+        tree.links.new(mixed.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    elif what == "coordinate":
+        mapping, checker = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexChecker")
+        mapping.inputs["Location"].default_value = (0.3, 0.3, 0.3)
+        tree.links.new(node.outputs["Object"], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs[0], checker.inputs["Vector"])
+        tree.links.new(checker.outputs["Color"], shader.inputs["Color"])
+    else:
+        tree.links.new(node.outputs[0], shader.inputs["Color"])
+    node.mute = True
+    sides = pictures(scenes=1)
+    assert not reasons(sides)
+    for name in ("Diffuse Color", "Emission"):
+        assert np.abs(sides[0].traced[name] - sides[0].cycles[0][name]).max() <= FLAT
+    node.mute = False
+    (other,) = pictures(scenes=1)
+    differs = any(np.abs(other.traced[name] - sides[0].traced[name]).max() > 0.1 for name in ("Diffuse Color", "Emission"))
+    assert differs == (what != "reroute")
+
+
+def test_a_surface_that_shines_beside_a_displacement_lights_a_floor_as_in_cycles(pictures, floor, make_material):
+    """In 5.2 Cycles would light it by a third of that: there it is shown without the displacement, and the ledger tells."""
+    bpy.data.objects.remove(next(block for block in bpy.data.objects if block.type == "LIGHT"))
+    glow = make_material("Glow", "ShaderNodeBsdfPrincipled", Emission_Color=(1, 1, 1, 1), Emission_Strength=2.0)
+    raised = glow.node_tree.nodes.new("ShaderNodeDisplacement")
+    glow.node_tree.links.new(raised.outputs[0], glow.node_tree.get_output_node("CYCLES").inputs["Displacement"])
+    bpy.data.objects["Monkey"].data.materials[0] = glow
+    (sides,) = pictures(scenes=1, samples=64)
+    traced, cycles = (each["Diffuse Direct"].mean() for each in (sides.traced, sides.cycles[0]))
+    assert traced == pytest.approx(cycles, rel=0.1)  # calibrated: five standard errors
+    assert bool(reasons([sides])) == versions.LOSES_LIGHT_OF_BUMPED
+
+
 def test_links_that_go_in_a_circle_are_none_as_in_cycles(pictures, floor):
     lamp = bpy.data.lights[0]
     lamp.use_nodes = True

@@ -92,6 +92,18 @@ def test_as_many_panes_are_gone_through_as_in_cycles(stage, both, scene, below, 
     assert sides[0].bounces.transparent == most and passes[..., :3].max() > 0.1
 
 
+@pytest.mark.parametrize(("below", "above"), [(GLOWING, "ShaderNodeBsdfTransparent"), (None, GLOWING)])
+def test_light_that_nodes_make_negative_is_that_as_in_cycles(stage, both, below, above):
+    pane = stage(below, above)
+    node = pane.node_tree.nodes.new("ShaderNodeCombineXYZ")
+    for socket, value in zip(node.inputs, (-0.5, 0.9, 0.7), strict=True):
+        socket.default_value = value
+    pane.node_tree.links.new(node.outputs[0], pane.node_tree.nodes["Shader"].inputs["Color"])
+    sides = both("direct")
+    check(sides)
+    assert (sides[1]["Combined"][4, :, 0] < -0.1).any()
+
+
 @pytest.mark.parametrize("is_seen_through", [False, True])
 def test_shadows_of_what_is_transparent(stage, both, scene, is_seen_through):
     """The floor lies in the panes' shadow, and light comes through them, or not."""

@@ -203,6 +203,12 @@ def test_muted_nodes_do_nothing(material):
     assert "is transparent" not in materials.departures(material)
 
 
+def test_a_material_whose_shader_is_muted_has_no_surface(material):
+    (shader,) = (node for node in material.node_tree.nodes if not node.type.startswith("OUTPUT"))
+    shader.mute = True
+    assert materials.departures(material) == ["has no surface"]
+
+
 def test_adaptive_subdivision_is_subdivision_at_the_render_level(monkey, scene, both_sides):
     subdivision = monkey.modifiers.new("Subdivision", "SUBSURF")
     subdivision.levels, subdivision.render_levels = 0, 1

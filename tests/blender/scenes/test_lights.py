@@ -331,6 +331,12 @@ def test_the_view_layers_own_world_counts(set_world, scene, export_world):
     assert export_world()[0].world.radiance == (1.0, 0.0, 0.0)
 
 
+def test_a_view_layer_that_leaves_the_world_out_is_dark(set_world, export_world):
+    set_world((0, 1, 0))
+    bpy.context.view_layer.use_sky = False
+    assert export_world()[0].world == World()
+
+
 @pytest.mark.skipif(bpy.app.version >= (5, 0), reason="since 5.0 nodes always count")
 def test_a_world_without_nodes_has_its_plain_color(set_world, export_world):
     world = set_world()

@@ -524,6 +524,11 @@ def test_colors_that_light_can_not_have_are_named(diffuse, value):
     approximately(diffuse, "'Shader'", "Color")
 
 
+def test_a_principled_surface_that_takes_light_away_is_named(make_material):
+    material = make_material("p", "ShaderNodeBsdfPrincipled", Emission_Color=color(RED), Emission_Strength=-1.0)
+    approximately(material, "'Shader'", "Emission Strength of -1")
+
+
 def test_without_nodes_or_without_an_output_the_viewports_color_counts(diffuse):
     diffuse.diffuse_color = color(GREEN)
     diffuse.node_tree.nodes.remove(diffuse.node_tree.nodes["Output"])

@@ -43,9 +43,9 @@ def departures(material: bpy.types.Material, lit: bool = False) -> list[str]:
     if output is None:
         return ["has no output, so that Cycles draws nothing"]
     reasons = []
-    if output.inputs["Displacement"].is_linked and not (lit and shaders.is_only_bumped(material)):
+    if _is_fed(output, "Displacement") and not (lit and shaders.is_only_bumped(material)):
         reasons.append("is displaced")
-    if output.inputs["Volume"].is_linked:
+    if _is_fed(output, "Volume"):
         reasons.append("has a volume")
     all_nodes = list(nodes.all_of(tree))
     if not lit and any(node.type in _TRANSPARENT or _sees_through(node) for node in all_nodes):
@@ -54,7 +54,7 @@ def departures(material: bpy.types.Material, lit: bool = False) -> list[str]:
         reasons.append("turns the normals")
     if any(node.type in _UNKNOWN for node in all_nodes):
         reasons.append("runs a script")
-    if not output.inputs["Surface"].is_linked:
+    if not _is_fed(output, "Surface"):
         reasons.append("has no surface")
     return reasons
 
@@ -63,7 +63,12 @@ def is_volume_alone(material: bpy.types.Material | None) -> bool:
     """True if a material fills what it covers with a volume and has no surface, as fog in a box."""
     tree = material and versions.node_tree(material)
     output = tree.get_output_node("CYCLES") if tree else None
-    return output is not None and output.inputs["Volume"].is_linked and not output.inputs["Surface"].is_linked
+    return output is not None and _is_fed(output, "Volume") and not _is_fed(output, "Surface")
+
+
+def _is_fed(output: bpy.types.Node, name: str) -> bool:
+    """True if a node feeds an input of a material's output."""
+    return isinstance(nodes.source(nodes.Input(output.inputs[name])), nodes.Output)
 
 
 def make_transparent(overrides: Overrides, material: bpy.types.Material) -> None:

@@ -2,7 +2,8 @@
 
 An input is followed to the node that feeds it: reroutes, muted nodes and node groups are looked through. What nothing feeds
 has a value of its own, and so has what a link feeds that counts for nothing: those that Blender marks as invalid, as where
-links go in a circle or from a shader to a color, and those from nodes that only EEVEE has.
+links go in a circle or from a shader to a color, and those from nodes that only EEVEE has, or that are muted and pass nothing
+on.
 """
 
 from collections.abc import Iterator
@@ -18,10 +19,15 @@ _UNKNOWN_TO_CYCLES = ("SHADERTORGB", "EEVEE_SPECULAR")
 
 
 class Input(NamedTuple):
-    """An input of a node. groups : the group nodes that it stands in, the outermost first."""
+    """An input of a node.
+
+    groups : the group nodes that it stands in, the outermost first.
+    is_zero : true if 0 is its value, whatever it shows.
+    """
 
     socket: bpy.types.NodeSocket
     groups: tuple[bpy.types.Node, ...] = ()
+    is_zero: bool = False
 
 
 class Output(NamedTuple):
@@ -43,22 +49,33 @@ class Output(NamedTuple):
 
 
 def source(of: Input) -> Output | Input:
-    """The output that feeds an input, or the input, perhaps of a group around it, that nothing feeds."""
+    """The output that feeds an input, or the input, perhaps of a group around it, that nothing feeds.
+
+    What a muted node or a reroute passes on of its own is no value in Cycles: the input keeps its own, or is 0.
+    """
+    kept = of
     while True:
         links = of.socket.links if of.socket.is_linked else ()
         link = next((link for link in links if _counts(link)), None)
         if link is None:
-            return of
+            return kept if of is kept or versions.MUTED_NODES_HAVE_NO_VALUES else of._replace(is_zero=True)
         node, socket = link.from_node, link.from_socket
         through = _through(node, socket, of.groups)
         if through is None:
             return Output(node, socket, of.groups)
-        of = through
+        is_passed_on = node.type == "REROUTE" or node.mute
+        of, kept = through, kept if is_passed_on else through
 
 
 def _counts(link: bpy.types.NodeLink) -> bool:
     """True if Cycles has a link, too."""
-    return link.is_valid and not link.is_muted and link.from_node.type not in _UNKNOWN_TO_CYCLES
+    is_one = link.is_valid and not link.is_muted and link.from_node.type not in _UNKNOWN_TO_CYCLES
+    return is_one and not (link.from_node.mute and _passed_on(link.from_node, link.from_socket) is None)
+
+
+def _passed_on(node: bpy.types.Node, socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
+    """The input that a muted node shows at an output, or None where it has none of its type."""
+    return next((inner.from_socket for inner in node.internal_links if inner.to_socket == socket), None)
 
 
 def _through(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...]) -> Input | None:
@@ -66,7 +83,7 @@ def _through(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: tuple[b
     if node.type == "REROUTE":
         return Input(node.inputs[0], groups)
     if node.mute:
-        inner = next((link.from_socket for link in node.internal_links if link.to_socket == socket), None)
+        inner = _passed_on(node, socket)
         return inner and Input(inner, groups)
     if node.type == "GROUP" and node.node_tree:
         ends = [each for each in node.node_tree.nodes if each.type == "GROUP_OUTPUT"]

@@ -126,11 +126,18 @@ def read(material: bpy.types.Material) -> Reading:
 
 def _displaced(reading: Reading, material: bpy.types.Material, output: bpy.types.Node, shines: bool) -> Reading:
     """A reading with what its displacement does to the normals, where that is all that it does."""
-    if is_only_bumped(material):
+    if shines and _loses_light(reading.material) and isinstance(nodes.source(Input(output.inputs["Displacement"])), Output):
+        reading.reasons.append("gives off light beside a displacement, where Cycles loses most of it")
+    elif is_only_bumped(material):
         reader = Tree(PLAIN_COLOR, shines)
         reader.reading = reading
         reading.material = replace(reading.material, displacement=reader.height(Input(output.inputs["Displacement"])))
     return reading
+
+
+def _loses_light(material: Material) -> bool:
+    """True if Cycles samples no light of a material where a displacement bumps it."""
+    return versions.LOSES_LIGHT_OF_BUMPED and any(each.node.type == "principled" for each in material.closures)
 
 
 def is_only_bumped(material: bpy.types.Material) -> bool:
@@ -386,7 +393,7 @@ class Tree:
         if name == "Anisotropy":
             value = abs(value)  # which way, Tree.surface asks
         most = 1.0 if isinstance(name, int) else LARGEST_RADIANCE
-        if not math.isfinite(value) or value > LARGEST_RADIANCE or (value < 0 and name == "Strength"):
+        if not math.isfinite(value) or value > LARGEST_RADIANCE or (value < 0 and str(name).endswith("Strength")):
             self._reason(output, f"has a {output.node.inputs[name].name} of {value:g}")
             value = 0.0
         return Color((min(max(value, 0.0), most),) * 3)
@@ -674,7 +681,7 @@ def _constant(of: Input) -> object:
         return _constant(source.input("Strength")) if _constant(source.input("Smooth")) == 0 else None
     if isinstance(source, Output) and source.node.type not in ("RGB", "VALUE"):
         return None
-    return source.socket.default_value
+    return 0.0 if isinstance(source, Input) and source.is_zero else source.socket.default_value
 
 
 def possible(rgb: RGB) -> RGB | None:

@@ -18,8 +18,8 @@ _RAYS = ("camera", "diffuse", "glossy", "transmission")
 
 
 def shown_world(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> bpy.types.World | None:
-    """The world that a view layer is rendered with."""
-    return view_layer.world_override or scene.world
+    """The world that a view layer is rendered with, if any."""
+    return (view_layer.world_override or scene.world) if view_layer.use_sky else None
 
 
 def world_of(

@@ -96,7 +96,7 @@ template <class T> class BSDFOf {
     Vec3 transparency() const { return transparency_; }
     // The share of it in all that goes on from here, by which a path is let through.
     double chance_through() const {
-        double through = transparency_.x + transparency_.y + transparency_.z;
+        double through = std::fabs(transparency_.x + transparency_.y + transparency_.z);
         return through > 0 ? through / (through + total_) : 0;
     }
     // Makes `sample` choose lobes of a kind so much less often.

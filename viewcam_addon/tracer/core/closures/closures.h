@@ -69,14 +69,14 @@ struct RefractionClosure {
     }
 };
 
-// Light that a surface gives off, to both sides.
+// Light that a surface gives off, to both sides: below 0, too, where nodes make it so.
 struct EmissionClosure {
     static constexpr const char* NAME = "emission";
     static constexpr uint32_t KINDS = 0;
     Color color, strength;
 
     explicit EmissionClosure(const Inputs& in) : color(in["color"]), strength(in["strength"]) {}
-    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const { bsdf.emit(weight * at.color(color) * at.number(strength)); }
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const { bsdf.emit(weight * at.value(color) * at.number(strength)); }
     bool shines_evenly() const { return !color.varies() && !strength.varies(); }
     // In the mean over the images of its inputs.
     Vec3 mean_emission(const std::vector<Texture>& textures) const { return color.mean(textures) * strength.mean(textures); }
@@ -90,7 +90,7 @@ struct TransparentClosure {
 
     explicit TransparentClosure(const Inputs& in) : color(in["color"]) {}
     bool lets_through() const { return !color.is_black(); }
-    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const { bsdf.let_through(weight * at.color(color)); }
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const { bsdf.let_through(weight * at.value(color)); }
 };
 
 // Reflection of one color by facets without a Fresnel term: a mirror where it is not rough.

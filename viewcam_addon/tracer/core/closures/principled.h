@@ -56,7 +56,7 @@ struct PrincipledClosure {
             weight = below_sheen(bsdf, at, weight, shading);
         }
         weight = below_coat(bsdf, at, weight);
-        if constexpr (IS_ONE<At>) bsdf.emit(weight * at.color(emission_color) * at.number(emission_strength));
+        if constexpr (IS_ONE<At>) bsdf.emit(weight * at.value(emission_color) * at.number(emission_strength));
         if (T share = unit_range(at.number(metallic)); any(share > NEGLIGIBLE)) {
             Mask<T> metal(share > NEGLIGIBLE);
             auto fresnel = F82Of<T>::of(clamped, unit_range(tint));

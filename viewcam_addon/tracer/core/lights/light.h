@@ -130,7 +130,7 @@ class Light {
             },
             kind_);
         const Illumination& light = scene_->illumination;
-        return ShadingPoint{point, ahead, light.textures, light.version, &light.nodes, nullptr, scene_->origin, nullptr, {.kind = NO_RAY, .length = distance - start}}.color(emission_);
+        return ShadingPoint{point, ahead, light.textures, light.version, &light.nodes, nullptr, scene_->origin, nullptr, {.kind = NO_RAY, .length = distance - start}}.value(emission_);
     }
 
     Kind kind_;
