@@ -177,7 +177,7 @@ def _values(text: str) -> Mapping[str, Any]:
     if alone := _alone(text):
         return {"pose": alone}
     text = _SHOWN.sub(_as_written, _GOES_ON.sub("   ", text))
-    text = texts.without(_COMMENT_OF_C if _IN_C.search(text) else _COMMENT, text)
+    text = texts.without(_COMMENT_OF_C, text) if _IN_C.search(text) else texts.without(_COMMENT, text)
     values = _Code(text.replace("−", "-")).values()
     if all(isinstance(values.get(name), float) for name in _SCALARS) and not opencv.says_intrinsics(values):
         f_x, f_y, c_x, c_y = (values.pop(name) for name in _SCALARS)

@@ -46,8 +46,9 @@ _FITTED_LENSES = (  # projection, terms and whether the focal length is fitted, 
 )
 _BETTER = 0.95  # a further term's error must be below this share of the simpler lens's
 _FITTED_TO = 20_000  # observations, about: more tell no more of a few numbers
-# For depth maps: from where to where values are tried, how many of them first, and how finely the best is told.
-_LOG_OF_FACTOR = (-math.log(8), math.log(8), 25, 1e-5)  # of the focal length
+# For depth maps: from where to where values are tried, how many of them first, and how finely the best is told. The first is
+# the logarithm of a factor of the focal length.
+_LOG_OF_FACTOR = (-math.log(8), math.log(8), 25, 1e-5)
 _K1 = (-0.4, 0.4, 21, 1e-3)
 _EXPLAINED = 1e-4  # share of the depth: steps of millimeters at ten meters; a fit as good needs no lens
 _COUNTED = 2000  # at most: a systematic error repeats in each, so more of them add no certainty
