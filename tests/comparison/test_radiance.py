@@ -207,7 +207,9 @@ def test_one_pixel_that_is_no_number_fails():
     combined[5, 6, 1] = np.nan
     tests[3] = replace(tests[3], passes={**tests[3].passes, "Combined": combined})
     comparison = radiance.compare(reference, tests, PINHOLE)
-    assert comparison.sentence == "Different here: Combined has 1 pixel without a number."
+    assert comparison.sentence == "Different here: Combined has 1 pixel without a number, in Cycles."
+    wrong = replace(reference, passes={**reference.passes, "Combined": combined})
+    assert "number, in the reference" in radiance.compare(wrong, both()[1], PINHOLE).sentence
 
 
 def test_a_softer_picture_is_said_to_be_softer():

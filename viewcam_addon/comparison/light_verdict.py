@@ -52,6 +52,7 @@ class LightRow:
     hypothesis_tests : none where there is no noise.
     noise_free, edges : the exact comparison, None where there is noise.
     broken : pixels that are no numbers on one side or both.
+    breaks : a flag for the reference and one for the test, true if some of them are its own.
     factor : the one that explains all of the difference, or None.
     """
 
@@ -61,6 +62,7 @@ class LightRow:
     ratio_error: float
     visible: float
     broken: int
+    breaks: tuple[bool, bool] = (False, False)
     hypothesis_tests: tuple[HypothesisTest, ...] = ()
     noise_free: PassErrors | None = None
     edges: Edges | None = None
@@ -344,7 +346,8 @@ def _edges(row: LightRow) -> str:
 
 def _difference(row: LightRow) -> str:
     if row.broken:
-        return f"{row.name} has {row.broken:,} pixel{'s' if row.broken > 1 else ''} without a number"
+        whose = {(True, False): "the reference", (False, True): RadianceComparison.renderer}.get(row.breaks, "both pictures")
+        return f"{row.name} has {row.broken:,} pixel{'s' if row.broken > 1 else ''} without a number, in {whose}"
     test = worst_test(row)
     if test is None:
         noise_free, edges = row.without_noise

@@ -174,7 +174,9 @@ def _noise_free(sides: Sides, rounding: noise_free.Rounding) -> tuple[LightRow, 
     row, edges, roundings = noise_free.compare(sides, allowed, rounding.belongs)
     factor = None if row.ok else _factor(sides, lambda scaled: noise_free.compare(scaled, allowed, rounding.belongs)[0].ok)
     drawn = {"difference": sides.difference.mean(axis=-1), "roundings": roundings}
-    return LightRow(*_means(sides), 0.0, 0.0, int(sides.broken.sum()), noise_free=row, edges=edges, factor=factor), drawn
+    return LightRow(
+        *_means(sides), 0.0, 0.0, int(sides.broken.sum()), sides.breaks, noise_free=row, edges=edges, factor=factor
+    ), drawn
 
 
 def _noisy(
@@ -186,7 +188,7 @@ def _noisy(
     # Channels share their samples, so that each pixel's sum over them is one error; but each channel is asked by itself.
     ratio_error = _relative(np.sqrt((errors.sum(axis=-1) ** 2).sum()), sides.reference.sum())
     visible = hypothesis_tests.least_findable(tests)
-    row = LightRow(*_means(sides), ratio_error, visible, int(sides.broken.sum()), tests)
+    row = LightRow(*_means(sides), ratio_error, visible, int(sides.broken.sum()), sides.breaks, tests)
     if not row.ok:
         scaled_passes = _factor(sides, lambda scaled: all(q.ok for q in hypothesis_tests.run(scaled, *settings)))
         row = replace(row, factor=scaled_passes)

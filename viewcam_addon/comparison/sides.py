@@ -44,6 +44,7 @@ class Sides:
         only.
     variance : the variance of `reference`; inf where it is not known.
     broken : (height, width) bool, true where one side or both have no number; there both are 0.
+    breaks : a flag for the reference and one for the tests, true if some of `broken` is theirs.
     shared : the variance of `reference` that its pixels may have shared with their neighbors, or 0.
     certain : (height, width, 1) bool, true for pixels that have no noise, whatever is beside them.
     """
@@ -54,6 +55,7 @@ class Sides:
     variance: Array
     test_variance: Array
     broken: NDArray[np.bool_]
+    breaks: tuple[bool, bool] = (False, False)
     shared: Array | float = 0.0
     certain: NDArray[np.bool_] | bool = False
 
@@ -175,13 +177,20 @@ def _sides(name: str, references: Sequence[Image], tests: Sequence[Image], varia
     """
     expected, own = _mean_and_variance(name, references)
     mean, test_variance = _mean_and_variance(name, tests)
-    broken = ~(np.isfinite(expected).all(axis=-1) & np.isfinite(mean).all(axis=-1))
-    if broken.any():
+    each = [~np.isfinite(values).all(axis=-1) for values in (expected, mean)]
+    broken, breaks = each[0] | each[1], (bool(each[0].any()), bool(each[1].any()))
+    if any(breaks):
         expected, mean, test_variance, own = (
             np.where(broken[..., None], 0.0, array) for array in (expected, mean, test_variance, own)
         )
     return Sides(
-        name, expected, mean, own if variance is None else np.broadcast_to(variance, expected.shape), test_variance, broken
+        name,
+        expected,
+        mean,
+        own if variance is None else np.broadcast_to(variance, expected.shape),
+        test_variance,
+        broken,
+        breaks,
     )
 
 

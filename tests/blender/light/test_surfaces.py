@@ -154,6 +154,25 @@ def test_images_from_files(pictures, floor, image, tmp_path, kind, opacity, pack
     assert not reasons(sides)
 
 
+@pytest.mark.parametrize("setting", ["smaller textures", "Open Shading Language"])
+def test_an_image_has_all_of_its_pixels_and_its_encoding_whatever_the_scene_sets(pictures, floor, scene, tmp_path, setting):
+    block = bpy.data.images.new("Checks", 256, 256)
+    pixels = np.random.default_rng(2).random((256 * 256, 4), np.float32)
+    pixels[:, 3] = 1
+    block.pixels.foreach_set(pixels.ravel())
+    block.filepath_raw, block.file_format = str(tmp_path / "file.png"), "PNG"
+    block.save()
+    texture(floor, bpy.data.images.load(block.filepath_raw), "Linear")
+    if setting == "smaller textures":
+        scene.render.use_simplify, scene.cycles.texture_limit_render = True, "128"
+    else:
+        scene.cycles.shading_system = True
+    sides = pictures(scenes=1)
+    colors = [each["Diffuse Color"] for each in (sides[0].traced, sides[0].cycles[0])]
+    assert np.percentile(np.abs(colors[0] - colors[1]), 90) <= 2e-3  # calibrated: 256 pixels across a floor seen obliquely
+    assert "Scene" in reasons(sides)
+
+
 @pytest.mark.parametrize("space", ["sRGB", "Non-Color"])
 @pytest.mark.parametrize("opacity", [65535, 40000])
 def test_a_file_of_two_bytes_a_number(pictures, floor, tmp_path, space, opacity):

@@ -501,3 +501,12 @@ def test_every_filter_of_cycles_is_modeled(scene, export_world):
 def test_what_of_film_and_bounces_is_approximated_is_told(scene, export_world):
     scene.cycles.caustics_reflective = False
     assert "caustics" in export_world()[1]["Scene"]
+
+
+def test_smaller_textures_and_open_shading_language_are_told(scene, export_world):
+    scene.cycles.texture_limit_render = "128"
+    assert not export_world()[1]
+    scene.render.use_simplify = True
+    assert "smaller" in export_world()[1]["Scene"]
+    scene.cycles.shading_system = True
+    assert "Open Shading Language" in export_world()[1]["Scene"]

@@ -62,7 +62,14 @@ _LIGHT = {
     "film_transparent_glass": False,
 }
 # Settings that the tracer has no choice about; a picture with everything in it has the scene's.
-_LIGHT_OF_SURFACES = {"volume_bounces": 0, "caustics_reflective": True, "caustics_refractive": True}
+_LIGHT_OF_SURFACES = {
+    "volume_bounces": 0,
+    "caustics_reflective": True,
+    "caustics_refractive": True,
+    "shading_system": False,
+    "texture_limit_render": "OFF",
+    "texture_resolution_render": 1.0,
+}
 
 
 @dataclass(frozen=True)

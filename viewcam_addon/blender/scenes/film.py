@@ -35,6 +35,11 @@ def bounces_of(scene: bpy.types.Scene, ledger: Ledger) -> Bounces:
         return Bounces()
     if not all(getattr(cycles, name) for name in CAUSTICS):
         ledger.note(scene.name, "approximated", "caustics are on on both sides")
+    if cycles.shading_system:  # which decodes images before it interpolates
+        ledger.note(scene.name, "approximated", "Open Shading Language is off on both sides")
+    is_coarse = cycles.texture_limit_render != "OFF" or getattr(cycles, "texture_resolution_render", 1.0) < 1.0
+    if scene.render.use_simplify and is_coarse:
+        ledger.note(scene.name, "approximated", "Simplify makes textures smaller, which have all of their pixels on both sides")
     bounces = Bounces(**{field: getattr(cycles, setting) for field, setting in BOUNCES.items()})
     if not bounces.parts_diffuse:
         reason = (
