@@ -94,7 +94,7 @@ _SPECIFIC = {
 # Names that say something of a camera only where the object is one.
 _GENERIC = {
     **dict.fromkeys(["position", "location", "origin", "pos", "from"], "eye"),
-    **dict.fromkeys(["center", "center", "target", "at", "to"], "target"),
+    **dict.fromkeys(["center", "centre", "target", "at", "to"], "target"),
     **dict.fromkeys(["direction", "forward", "front", "dir"], "direction"),
     "size": "size",
     "width": "width",
@@ -535,7 +535,7 @@ class _Code:
         elif role == "camera_position":
             self._camera_position(scene, at, start)
         else:
-            self._plain(scene, role, parts, sign, at, start)
+            self._plain(scene, role, sign, at, start)
 
     def _refuse_moves(self, scene: _Scene) -> None:
         """Raise InputError where the camera, or one coordinate of it, is moved from where it was."""
@@ -576,7 +576,7 @@ class _Code:
         for role, vector in zip(("eye", "target", "up"), vectors, strict=False):
             self._set(scene, role, vector, start)
 
-    def _plain(self, scene: _Scene, role: str, parts: list[str], sign: str, at: int, start: int) -> None:
+    def _plain(self, scene: _Scene, role: str, sign: str, at: int, start: int) -> None:
         if sign in "({":
             values, named, _ = self.reader.arguments(at - 1)
             value: object = values[0] if len(values) == 1 else tuple(values)
