@@ -44,6 +44,11 @@ def message_of(error: Exception) -> str:
     return str(error) if isinstance(error, InputError) else bug(error)
 
 
+def operator_reason(error: RuntimeError) -> str:
+    """The reason that an operator of Blender gives for its failure, as a part of a sentence."""
+    return str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
+
+
 def bug(error: Exception) -> str:
     """One sentence for an error that no input should have caused, and where in the code it came from."""
     place = traceback.extract_tb(error.__traceback__)[-1]

@@ -198,11 +198,8 @@ def lens_in(unit: str, distance: float, frame: Frame, sensor: tuple[float, float
     distance : pixels of the picture of `frame` at 100 %.
     sensor : width and height in mm.
     """
-    return (
-        distance * _scale(unit, frame, sensor, sensor_fit)
-        if unit in _LENGTHS
-        else 2 * math.atan(0.5 / (distance * _scale(unit, frame, sensor, sensor_fit)))
-    )
+    scaled = distance * _scale(unit, frame, sensor, sensor_fit)
+    return scaled if unit in _LENGTHS else 2 * math.atan(0.5 / scaled)
 
 
 def distance_by_lens(unit: str, value: float, frame: Frame, sensor: tuple[float, float], sensor_fit: str) -> float:

@@ -87,10 +87,6 @@ def _case(name: str, kind: str | None, sentence: str, figures: Mapping[str, Any]
     return case
 
 
-def _seconds(shot: Mapping[str, Any]) -> float:
-    return float(shot.get("timing", {}).get("seconds", 0.0))
-
-
 def _outcome_of(shot: Mapping[str, Any], strict: bool) -> tuple[str | None, str]:
     """The outcome of a shot of a summary, and why.
 

@@ -39,6 +39,32 @@ def add_camera(fresh_blender, scene):
 
 
 @pytest.fixture
+def link_object(fresh_blender):
+    """A function that links an object of another .blend, by its name, into the scene that is open."""
+
+    def link(library, name="Camera"):
+        with fresh_blender.data.libraries.load(str(library), link=True) as (_, names):
+            names.objects = [name]
+        (linked,) = names.objects
+        fresh_blender.context.scene.collection.objects.link(linked)
+        return linked
+
+    return link
+
+
+@pytest.fixture
+def link_camera(fresh_blender, link_object, tmp_path):
+    """A function that saves the open file as library.blend, opens an empty one, and links the camera there."""
+
+    def link():
+        fresh_blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+        fresh_blender.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        return link_object(tmp_path / "library.blend")
+
+    return link
+
+
+@pytest.fixture
 def add_rig(fresh_blender, scene):
     """A function that adds an armature of one bone, Head, from (0, 0, 1) to (0, 1, 2)."""
 

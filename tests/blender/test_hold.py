@@ -248,16 +248,10 @@ def test_saving_and_opening_keep_the_roll_and_where_it_came_from(held_camera, tm
     assert abs(expected[0]) > 3
 
 
-def test_a_library_override_holds_and_keeps_its_roll(held_camera, tmp_path, over_the_top):
+def test_a_library_override_holds_and_keeps_its_roll(held_camera, tmp_path, over_the_top, link_camera):
     held_camera.virtual_pinhole.eye = over_the_top(-2)
-    library, shot = str(tmp_path / "library.blend"), str(tmp_path / "shot.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=library)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(library, link=True) as (_, names):
-        names.objects = ["Camera"]
-    linked = bpy.data.objects["Camera"]
-    bpy.context.scene.collection.objects.link(linked)
-    override = linked.override_create(remap_local_usages=True)
+    shot = str(tmp_path / "shot.blend")
+    override = link_camera().override_create(remap_local_usages=True)
     override.data.override_create(remap_local_usages=True)
     override.virtual_pinhole.eye = over_the_top(2)
     roll, before = override.virtual_pinhole.held_roll, axes(override)

@@ -476,16 +476,14 @@ def test_a_pipe_in_place_of_an_image_is_refused_by_every_command_and_not_waited_
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes in folders here")
-def test_a_pipe_in_place_of_a_library_is_refused_and_not_waited_for(fresh_blender, tmp_path, monkeypatch):
+def test_a_pipe_in_place_of_a_library_is_refused_and_not_waited_for(link_object, tmp_path, monkeypatch):
     """Blender opens it before anybody can look."""
     monkeypatch.setattr(opening, "_WAITED", 0.2)
     library = tmp_path / "library.blend"
     bpy.ops.mesh.primitive_cube_add()
     bpy.ops.wm.save_as_mainfile(filepath=str(library))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(str(library), link=True) as (_, linked):
-        linked.objects = ["Cube"]
-    bpy.context.scene.collection.objects.link(linked.objects[0])
+    link_object(library, "Cube")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "hostile.blend"))
     library.unlink()
     os.mkfifo(library)

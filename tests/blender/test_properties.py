@@ -344,15 +344,8 @@ def test_linked_duplicates_share_the_artists_sensor(posed_camera, scene):
     assert twin.data.sensor_width == 36
 
 
-def test_a_library_override_keeps_its_values(posed_camera, tmp_path):
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(path, link=True) as (_, names):
-        names.objects = ["Camera"]
-    linked = bpy.data.objects["Camera"]
-    bpy.context.scene.collection.objects.link(linked)
-    override = linked.override_create(remap_local_usages=True)
+def test_a_library_override_keeps_its_values(posed_camera, tmp_path, link_camera):
+    override = link_camera().override_create(remap_local_usages=True)
     override.data.override_create(remap_local_usages=True)
     group = override.virtual_pinhole
     group.eye, group.roll, group.zoom, group.keeps = (0, -9, 0), 0.5, 2, "FIELD_OF_VIEW"

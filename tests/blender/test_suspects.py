@@ -138,14 +138,8 @@ def test_a_changed_size_that_leaves_the_camera_right_is_not_told(posed_camera, s
     assert findings_later(posed_camera, scene) == []
 
 
-def test_a_linked_camera_is_told_once_with_its_library_and_so_are_linked_data_of_a_local_one(posed_camera, tmp_path):
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(path, link=True) as (_, names):
-        names.objects = ["Camera"]
-    scene, linked = bpy.context.scene, bpy.data.objects["Camera"]
-    scene.collection.objects.link(linked)
+def test_a_linked_camera_is_told_once_with_its_library_and_so_are_linked_data_of_a_local_one(posed_camera, link_camera):
+    linked, scene = link_camera(), bpy.context.scene
     (of_both,) = findings_later(linked, scene)
     assert of_both.startswith("Camera 'Camera' is linked from 'library.blend'")
     local = linked.copy()

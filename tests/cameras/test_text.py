@@ -94,6 +94,7 @@ def test_what_is_written_has_the_keys_of_a_scene_file():
         '{"eye": [7, -6, 4], "look_at": [0, 0, 1], "up": [0, 0, 1], "distance": 1200}',
         '"camera": {"eye": [7, -6, 4], "look_at": [0, 0, 1], "up": [0, 0, 1], "distance": 1200},',
         "lookfrom 7 -6 4\nlookat 0 0 1\nvup 0 0 1\nd 1200",
+        "eye 7 -6 4\ncentre 0 0 1\nup 0 0 1\nd 1200",
     ],
 )
 def test_people_write_the_four_values_in_many_ways(text):

@@ -19,7 +19,7 @@ from typing import Any
 
 import bpy
 
-from ..errors import InputError
+from ..errors import InputError, operator_reason
 from . import ensure_registered
 from .temporary_settings import Overrides, overridden
 
@@ -97,7 +97,7 @@ def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, 
         try:
             bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=trust)
         except RuntimeError as error:
-            reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
+            reason = operator_reason(error)
             if not is_read:
                 raise InputError(
                     f"{path} can't be opened by Blender {bpy.app.version_string} ({reason}): save it again"

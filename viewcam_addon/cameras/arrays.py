@@ -137,7 +137,7 @@ def _of_toolbox(text: str) -> dict[str, dict[str, Any]]:
     skew = stated.get("alpha_c", [0.0])[0] * stated["fc"][0]
     (f_x, f_y), (c_x, c_y) = stated["fc"], stated["cc"]
     shared: dict[str, Any] = {"k": [[f_x, skew, c_x], [0.0, f_y, c_y], [0.0, 0.0, 1.0]]}
-    shared |= {own_name: stated[name] for name, own_name in (("kc", "dist"),) if name in stated}
+    shared |= {"dist": stated["kc"]} if "kc" in stated else {}
     shared |= {own_name: stated[name][0] for name, own_name in (("nx", "width"), ("ny", "height")) if name in stated}
     turns = {name.removeprefix("omc_"): turn for name, turn in stated.items() if name.startswith("omc_")}
     posed = {
@@ -178,8 +178,7 @@ def _values(text: str) -> Mapping[str, Any]:
         return {"pose": alone}
     text = _SHOWN.sub(_as_written, _GOES_ON.sub("   ", text))
     text = texts.without(_COMMENT_OF_C, text) if _IN_C.search(text) else texts.without(_COMMENT, text)
-    code = _Code(text.replace("−", "-"))
-    values = code.values()
+    values = _Code(text.replace("−", "-")).values()
     if all(isinstance(values.get(name), float) for name in _SCALARS) and not opencv.says_intrinsics(values):
         f_x, f_y, c_x, c_y = (values.pop(name) for name in _SCALARS)
         values["k"] = [[f_x, 0.0, c_x], [0.0, f_y, c_y], [0.0, 0.0, 1.0]]

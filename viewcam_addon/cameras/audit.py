@@ -46,8 +46,10 @@ _FITTED_LENSES = (  # projection, terms and whether the focal length is fitted, 
 )
 _BETTER = 0.95  # a further term's error must be below this share of the simpler lens's
 _FITTED_TO = 20_000  # observations, about: more tell no more of a few numbers
-_FACTORS, _STEPS, _FINEST = (1 / 8, 8.0), 25, 1e-5  # depth maps' factors: tried first, and how fine they are told
-_K1 = (-0.4, 0.4, 21, 1e-3)  # depth maps' k1: from where to where, how many are tried first, and how finely it is told
+# For depth maps: from where to where values are tried, how many of them first, and how finely the best is told. The first is
+# the logarithm of a factor of the focal length.
+_LOG_OF_FACTOR = (-math.log(8), math.log(8), 25, 1e-5)
+_K1 = (-0.4, 0.4, 21, 1e-3)
 _EXPLAINED = 1e-4  # share of the depth: steps of millimeters at ten meters; a fit as good needs no lens
 _COUNTED = 2000  # at most: a systematic error repeats in each, so more of them add no certainty
 _FARTHEST = 1e6  # times the usual error: what is behind the camera counts as that
@@ -273,23 +275,19 @@ def _stretched(views: Views, aspect: float | Array) -> Views:
     return replace(views, focal=views.focal * np.stack([np.ones(len(views.eye)), np.broadcast_to(aspect, len(views.eye))], -1))
 
 
-_SIZES = {
-    "1/4": 0.25,
-    "1/3": 1 / 3,
-    "1/2": 0.5,
-    "2/3": 2 / 3,
-    "3/4": 0.75,
-    "4/3": 4 / 3,
-    "3/2": 1.5,
-    "2": 2.0,
-    "3": 3.0,
-    "4": 4.0,
-}
-_HALVES = {"1/4": 0.25, "1/2": 0.5, "2": 2.0, "4": 4.0}
-_ASPECTS = {"2": 2.0, "1/2": 0.5, "3/2": 1.5, "2/3": 2 / 3, "4/3": 4 / 3, "3/4": 0.75}
-_ASPECTS |= {"12/11": 12 / 11, "11/12": 11 / 12, "16/11": 16 / 11, "11/16": 11 / 16, "10/11": 10 / 11, "11/10": 1.1}
-_UNITS = {"1000": 1000.0, "100": 100.0, "10": 10.0, "1/10": 0.1, "1/100": 0.01, "1/1000": 0.001}
-_UNITS |= {"0.3048 (feet)": 0.3048, "0.0254 (inches)": 0.0254, "1/0.3048 (feet)": 1 / 0.3048, "1/0.0254 (inches)": 1 / 0.0254}
+def _factors(*names: str) -> dict[str, float]:
+    """Factors by the names that sentences have for them: "2/3", or "0.3048 (feet)"."""
+    fractions = {name: name.split()[0].partition("/") for name in names}
+    return {name: float(numerator) / float(denominator or 1) for name, (numerator, _, denominator) in fractions.items()}
+
+
+_SIZES = _factors("1/4", "1/3", "1/2", "2/3", "3/4", "4/3", "3/2", "2", "3", "4")
+_HALVES = _factors("1/4", "1/2", "2", "4")
+_ASPECTS = _factors("2", "1/2", "3/2", "2/3", "4/3", "3/4", "12/11", "11/12", "16/11", "11/16", "10/11", "11/10")
+_UNITS = _factors(
+    *("1000", "100", "10", "1/10", "1/100", "1/1000"),
+    *("0.3048 (feet)", "0.0254 (inches)", "1/0.3048 (feet)", "1/0.0254 (inches)"),
+)
 
 
 @dataclass(frozen=True)
@@ -524,21 +522,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
         return Verdict(
             "unsure", f"{len(as_is)} observations are too few to tell: {_FEWEST} are needed", observations=len(as_is)
         )
-    of_depth = isinstance(evidence, Depths)
-    tried = [mistake for mistake in MISTAKES if not (mistake.of_world if of_depth else mistake.of_depth)]
-    tried += _OF_LENSES if any(views.lenses) else []
-    tried.append(_of_focal_factor(views, evidence))
-    if isinstance(evidence, Tracks) and np.abs(views.center - views.size / 2).max() <= 0.5:
-        tried += _left_out(views, evidence)
-    errors = [evidence.errors(mistake.undone(views)) for mistake in tried]
-    known = (as_is, *(each for each, mistake in zip(errors, tried, strict=True) if not mistake.is_fitted))
-    if isinstance(evidence, Depths):
-        lenses = _lenses_of_depths(views, evidence) if min(_usual(each, evidence) for each in known) > _EXPLAINED else []
-    else:  # a lens's shift is seen in the largest errors but for outliers
-        nearest = min(float(np.sort(each)[int(0.95 * (len(each) - 1))]) for each in known)
-        lenses = _lens_of_tracks(views, evidence) if nearest > _SEEN / 2 * evidence.floor else []
-    tried += lenses
-    errors += [evidence.errors(mistake.undone(views)) for mistake in lenses]
+    tried, errors = _explanations(views, evidence, as_is)
     # The usual error is that of the best explanation, so that it does not hide in the worse ones.
     usual = max(evidence.floor, min(_usual(each, evidence) for each in (as_is, *errors)))
     costs = np.array([_cost(each, usual) for each in (as_is, *errors)])
@@ -560,7 +544,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
             possible = tuple(dict.fromkeys(kind for sure, kind in over if sure < _SURE))
             if possible:
                 sentence += f"; it is too little to exclude: {', '.join(possible)}"
-            if of_depth:
+            if isinstance(evidence, Depths):
                 turns = tuple(dict.fromkeys(mistake.kind for mistake in MISTAKES if mistake.of_world))
                 sentence += f"; depth maps do not show how the whole world is turned: {', '.join(turns)}"
                 possible += turns
@@ -576,6 +560,27 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     if others:
         sentence += f"; the evidence can't tell it from: {', '.join(others)}"
     return Verdict(first.kind, sentence, others, **measured)
+
+
+def _explanations(views: Views, evidence: "Tracks | Depths", as_is: Array) -> tuple[list[Mistake], list[Array]]:
+    """The mistakes that this evidence can show, and its errors once each of them is undone.
+
+    as_is : the errors with the cameras as they are.
+    """
+    of_depth = isinstance(evidence, Depths)
+    tried = [mistake for mistake in MISTAKES if not (mistake.of_world if of_depth else mistake.of_depth)]
+    tried += _OF_LENSES if any(views.lenses) else []
+    tried.append(_of_focal_factor(views, evidence))
+    if isinstance(evidence, Tracks) and np.abs(views.center - views.size / 2).max() <= 0.5:
+        tried += _left_out(views, evidence)
+    errors = [evidence.errors(mistake.undone(views)) for mistake in tried]
+    known = (as_is, *(each for each, mistake in zip(errors, tried, strict=True) if not mistake.is_fitted))
+    if isinstance(evidence, Depths):
+        lenses = _lenses_of_depths(views, evidence) if min(_usual(each, evidence) for each in known) > _EXPLAINED else []
+    else:  # a lens's shift is seen in the largest errors but for outliers
+        nearest = min(float(np.sort(each)[int(0.95 * (len(each) - 1))]) for each in known)
+        lenses = _lens_of_tracks(views, evidence) if nearest > _SEEN / 2 * evidence.floor else []
+    return tried + lenses, errors + [evidence.errors(mistake.undone(views)) for mistake in lenses]
 
 
 def _usual(errors: Array, evidence: "Tracks | Depths") -> float:
@@ -608,13 +613,12 @@ def _factor_of_tracks(views: Views, evidence: Tracks) -> float:
 
 
 def _factor_of_depths(views: Views, evidence: Depths) -> float:
-    """The factor with the least usual error: of some, then of those around the best, until it is told finely enough."""
+    """The factor with the least usual error."""
 
     def usual(log: float) -> float:
         return _usual(evidence.errors(_scaled(views, math.exp(log))), evidence)
 
-    first, last = np.log(_FACTORS)
-    return math.exp(_least(usual, first, last, _STEPS, _FINEST))
+    return math.exp(_least(usual, *_LOG_OF_FACTOR))
 
 
 def _least(cost: Callable[[float], float], first: float, last: float, steps: int, finest: float) -> float:

@@ -74,17 +74,17 @@ _SENSORS = {"CAMERA": 0, "IMU": 1}
 _AS_THE_RIG = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # the pose in it of a rig's first sensor
 _SAME_POSE = 1e-5  # relative: what two poses of one image may differ by for the six digits of one
 
-TEXTS = ("images.txt", "cameras.txt", "points3D.txt")
-RIG_CONFIG = "rig_config.json"
 _MOMENT = re.compile(r"(?P<prefix>.*?)(?P<moment>[0-9]+[^0-9]*)", re.DOTALL)
 _ROUNDINGS = 16 * 2.0**-24  # float32 in two of Blender's matrices and those of their parents, relative to the farthest eye
+
+TEXTS = ("images.txt", "cameras.txt", "points3D.txt")
 """The files of a model that is written."""
+RIG_CONFIG = "rig_config.json"
 NOTES = "virtual_pinhole.txt"
 FORMS_OF_RIGS = tuple(f"{name}{suffix}" for name in _RIGS for suffix in (".txt", ".bin"))
 NOT_BESIDE = (*FORMS_OF_RIGS, "cameras.bin", "images.bin", "points3D.bin")
 """Files of another model that count before those that are written: for COLMAP binary ones do, and rigs have the poses."""
 _FOLDERS = ((), ("0",), ("sparse", "0"), ("sparse",), ("colmap", "sparse", "0"))
-
 
 _Model = tuple[tuple[str, ...], str]  # the folder's parts below the source, and the files' suffix
 

@@ -42,7 +42,6 @@ _INVERSE: dict[str, Callable[..., float]] = {"atan": math.atan, "atan2": math.at
 _PI = {
     "pi": 1.0,
     "mpi": 1.0,
-    "mathpi": 1.0,
     "d3dxpi": 1.0,
     "xmpi": 1.0,
     "glmpi": 1.0,
@@ -178,9 +177,8 @@ class Expressions:
             if self._token(end).text in (".", "["):
                 return Unknown(first.start), self._past_calls(end, depth)
             return value, end
-        key = texts.plain(last.text)
-        if key in _PI or key.removeprefix("math") in _PI:
-            return Radians(_PI[key if key in _PI else key.removeprefix("math")] * math.pi), last.end
+        if (key := texts.plain(last.text).removeprefix("math")) in _PI:
+            return Radians(_PI[key] * math.pi), last.end
         value = self._names("".join(path))
         return (Unknown(first.start) if value is None else value), last.end
 

@@ -8,6 +8,7 @@ by the specification.
 Source: Khronos' glTF 2.0 specification, sections 3.10 and 5.12.
 """
 
+import dataclasses
 import json
 import math
 import re
@@ -54,7 +55,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             if moving & {index, *worlds.above(index)}:
                 result[-1] = result[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
     names = naming.distinct([camera.name for camera in result])
-    return left_out.with_notes([_renamed(camera, name) for camera, name in zip(result, names, strict=True)])
+    return left_out.with_notes([dataclasses.replace(camera, name=name) for camera, name in zip(result, names, strict=True)])
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
@@ -202,10 +203,6 @@ def _size(camera: Record, what: str, options: Options) -> tuple[tuple[int, int],
         stated_size = Record(extras, what)
         return (stated_size.size("width"), stated_size.size("height")), True
     return options.size_or_refuse(what), False
-
-
-def _renamed(camera: Camera, name: str) -> Camera:
-    return Camera(name, camera.pinhole, camera.size_stated, camera.notes)
 
 
 def _node(index: int, camera: Camera) -> dict:

@@ -94,7 +94,7 @@ _SPECIFIC = {
 # Names that say something of a camera only where the object is one.
 _GENERIC = {
     **dict.fromkeys(["position", "location", "origin", "pos", "from"], "eye"),
-    **dict.fromkeys(["center", "center", "target", "at", "to"], "target"),
+    **dict.fromkeys(["center", "centre", "target", "at", "to"], "target"),
     **dict.fromkeys(["direction", "forward", "front", "dir"], "direction"),
     "size": "size",
     "width": "width",
@@ -120,6 +120,10 @@ _PYTORCH3D = {"lookatviewtransform", "fovperspectivecameras", "openglperspective
 _ORTHOGRAPHIC = {
     "glortho", "ortho", "orthographiccamera", "gluortho2d", "xmmatrixorthographiclh", "enableparallelprojection",
     "parallelprojectionon", "fovorthographiccameras", "orthographiccameras",
+}  # fmt: skip
+_ROLES_OF_POSES = {
+    "eye", "target", "look_at", "set_view", "camera_position", "direction", "position_x", "position_y", "position_z",
+    "lookatviewtransform", "computeviewmatrixfromyawpitchroll",
 }  # fmt: skip
 _PYTORCH3D_LOOK = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))  # eye, at and up where they are not given
 _MOVES = {
@@ -351,23 +355,7 @@ class _Code:
         return sign == "(" and texts.plain(parts[-1]) in _CHANGES
 
     def says_pose(self) -> bool:
-        for parts, sign, _, _ in self.statements:
-            role = self._role(parts, sign)
-            if role in (
-                "eye",
-                "target",
-                "look_at",
-                "set_view",
-                "camera_position",
-                "direction",
-                "position_x",
-                "position_y",
-                "position_z",
-            ):
-                return True
-            if role in ("lookatviewtransform", "computeviewmatrixfromyawpitchroll"):
-                return True
-        return False
+        return any(self._role(parts, sign) in _ROLES_OF_POSES for parts, sign, _, _ in self.statements)
 
     def _role(self, parts: list[str], sign: str) -> str | None:
         """The role of a statement in placing a camera; None if it has none."""
@@ -472,23 +460,9 @@ class _Code:
         for at in self._all(*_LENSES):
             if self._words[at + 1] == "*" or self._words[at - 1] == "new":
                 not_a_pinhole("the text's camera", f"a {self._words[at]}")
-        for parts, place in self._changed:
-            if self._is_camera(parts[:1]) and self._role(parts, "=") not in (None, "width", "height", "size"):
-                texts.fail(self.text, place, "this moves the camera from where it was, write where it is then")
-        for parts, place in self._coordinates:
-            if self._role(parts, "=") in _VECTORS:
-                texts.fail(self.text, place, "this is one coordinate, write the whole vector where it is set")
-        for parts, sign, _, start in self.statements:
-            if len(parts) < 2 or sign != "=" or parts[-1] not in _COORDINATES or self._role(parts, sign):
-                continue
-            if self._role(parts[:-1], sign) in _VECTORS:
-                texts.fail(self.text, start, "this is one coordinate, write the whole vector where it is set")
-        if scene.three and (turning := self._made_new(_OTHER_CONTROLS)) is not None:
-            texts.fail(self.text, self._places[turning], "these turn the camera by themselves, write where it looks then")
+        self._refuse_moves(scene)
         if scene.three and (turning := self._made_new(_CONTROLS)) is not None:
             scene.controls = self._words[turning]
-        if (moved := self._view_moved()) is not None:
-            texts.fail(self.text, moved, "this moves the view by other means, write eye, look-at and up")
         parts_of: dict[str, dict[str, float]] = {}
         placed: dict[str, str] = {}  # position or up: whose
         moved_before = None  # the matrix of OpenGL that gluLookAt multiplies
@@ -508,41 +482,9 @@ class _Code:
                 whose = ".".join(parts[: parts.index(name, 1)])
                 if placed.setdefault(name, whose) != whose:
                     texts.fail(self.text, start, f"this is another camera than {placed[name][:40]}, copy one camera")
-            if role == "moves" and sign != ":":
-                texts.fail(self.text, start, "this moves or bends the camera by other means, write eye, look-at and up")
-            elif role == "moves":
-                continue
-            elif role == "look_at":
-                if scene.three and len(parts) > 1 and not self._is_camera(parts[:-1]):
-                    continue  # a mesh's or a lamp's
-                self._look_at(scene, parts, at - 1, start)
-            elif role == "perspective":
-                self._perspective(scene, parts, at - 1, start)
-            elif role == "set_view":
-                self._of_potree(scene, at - 1, start)
-            elif role in _PYTORCH3D:
-                self._of_pytorch3d(scene, role, at - 1, start)
-            elif role == "computeviewmatrixfromyawpitchroll":
-                self._of_pybullet(scene, at - 1, start)
-            elif role == "getcameraimage":
-                values, named, _ = self.reader.arguments(at - 1)
-                self._set(
-                    scene, "size", tuple((*values[:2], *(named[key] for key in ("width", "height") if key in named))), start
-                )
-            elif role == "frustum":
-                values, _, _ = self.reader.arguments(at - 1)
-                scene.frustum = numbers(tuple(values[:6]), 6) if len(values) >= 6 else None
-                if scene.frustum is None:
-                    texts.fail(self.text, start, "give six plain numbers for the frustum")
-            elif role == "setviewoffset":
-                values, _, _ = self.reader.arguments(at - 1)
-                self._set(scene, "view_offset", numbers(tuple(values), 6) or Unknown(start), start)
-            elif role == "clearviewoffset":
-                scene.values.pop("view_offset", None)
-            elif role == "orthographic":
-                scene.orthographic = start
-            elif role == "camera_position":
-                self._camera_position(scene, at, start)
+            if role == "moves":
+                if sign != ":":
+                    texts.fail(self.text, start, "this moves or bends the camera by other means, write eye, look-at and up")
             elif role[:-1] in ("position_", "up_"):
                 value = self.reader.value(at)[0]
                 if not isinstance(value, float):
@@ -552,7 +494,7 @@ class _Code:
                 if value != before:
                     texts.fail(self.text, at, f"this is {before:g} elsewhere in the text, copy one camera")
             else:
-                self._plain(scene, role, parts, sign, at, start)
+                self._take(scene, role, parts, sign, at, start)
         for name, stated in parts_of.items():
             role = {"position": "eye", "up": "up"}[name]
             usual = (0.0, 0.0, 0.0) if role == "eye" else (0.0, 1.0, 0.0)
@@ -561,6 +503,57 @@ class _Code:
                 continue  # computed before: refused where it is needed
             scene.values[role] = (tuple(stated.get(axis, old) for axis, old in zip("xyz", now, strict=True)), 0)
         return scene
+
+    def _take(self, scene: _Scene, role: str, parts: list[str], sign: str, at: int, start: int) -> None:
+        """Take what a call of another program's function says, or a plain value."""
+        if role == "look_at":
+            if not scene.three or len(parts) == 1 or self._is_camera(parts[:-1]):  # else it is a mesh's or a lamp's
+                self._look_at(scene, parts, at - 1, start)
+        elif role == "perspective":
+            self._perspective(scene, parts, at - 1, start)
+        elif role == "set_view":
+            self._of_potree(scene, at - 1, start)
+        elif role in _PYTORCH3D:
+            self._of_pytorch3d(scene, role, at - 1, start)
+        elif role == "computeviewmatrixfromyawpitchroll":
+            self._of_pybullet(scene, at - 1, start)
+        elif role == "getcameraimage":
+            values, named, _ = self.reader.arguments(at - 1)
+            self._set(scene, "size", tuple((*values[:2], *(named[key] for key in ("width", "height") if key in named))), start)
+        elif role == "frustum":
+            values, _, _ = self.reader.arguments(at - 1)
+            scene.frustum = numbers(tuple(values[:6]), 6) if len(values) >= 6 else None
+            if scene.frustum is None:
+                texts.fail(self.text, start, "give six plain numbers for the frustum")
+        elif role == "setviewoffset":
+            values, _, _ = self.reader.arguments(at - 1)
+            self._set(scene, "view_offset", numbers(tuple(values), 6) or Unknown(start), start)
+        elif role == "clearviewoffset":
+            scene.values.pop("view_offset", None)
+        elif role == "orthographic":
+            scene.orthographic = start
+        elif role == "camera_position":
+            self._camera_position(scene, at, start)
+        else:
+            self._plain(scene, role, sign, at, start)
+
+    def _refuse_moves(self, scene: _Scene) -> None:
+        """Raise InputError where the camera, or one coordinate of it, is moved from where it was."""
+        for parts, place in self._changed:
+            if self._is_camera(parts[:1]) and self._role(parts, "=") not in (None, "width", "height", "size"):
+                texts.fail(self.text, place, "this moves the camera from where it was, write where it is then")
+        for parts, place in self._coordinates:
+            if self._role(parts, "=") in _VECTORS:
+                texts.fail(self.text, place, "this is one coordinate, write the whole vector where it is set")
+        for parts, sign, _, start in self.statements:
+            if len(parts) < 2 or sign != "=" or parts[-1] not in _COORDINATES or self._role(parts, sign):
+                continue
+            if self._role(parts[:-1], sign) in _VECTORS:
+                texts.fail(self.text, start, "this is one coordinate, write the whole vector where it is set")
+        if scene.three and (turning := self._made_new(_OTHER_CONTROLS)) is not None:
+            texts.fail(self.text, self._places[turning], "these turn the camera by themselves, write where it looks then")
+        if (moved := self._view_moved()) is not None:
+            texts.fail(self.text, moved, "this moves the view by other means, write eye, look-at and up")
 
     def _adds_camera(self, parts: list[str], sign: str, at: int) -> bool:
         """True if the statement makes a camera part of something else than the scene."""
@@ -577,7 +570,13 @@ class _Code:
         if before is None or _is_unknown(value):  # a value known once and computed once: nobody knows which counts
             scene.values[role] = (value, at)
 
-    def _plain(self, scene: _Scene, role: str, parts: list[str], sign: str, at: int, start: int) -> None:
+    def _place(self, scene: _Scene, start: int, *vectors: object) -> None:
+        """Set the eye, and the target and up as far as they are given."""
+        scene.moved.append(start)
+        for role, vector in zip(("eye", "target", "up"), vectors, strict=False):
+            self._set(scene, role, vector, start)
+
+    def _plain(self, scene: _Scene, role: str, sign: str, at: int, start: int) -> None:
         if sign in "({":
             values, named, _ = self.reader.arguments(at - 1)
             value: object = values[0] if len(values) == 1 else tuple(values)
@@ -637,9 +636,7 @@ class _Code:
         vectors = [numbers(value, 3) for value in values[:2]]
         if len(vectors) < 2 or None in vectors:
             texts.fail(self.text, start, "give position and target as plain numbers")
-        scene.moved.append(start)
-        for role, vector in zip(("eye", "target"), vectors, strict=True):
-            self._set(scene, role, vector, start)
+        self._place(scene, start, *vectors)
 
     def _of_pybullet(self, scene: _Scene, opened: int, start: int) -> None:
         """A point of view on a sphere about the target: degrees, whose roll, which also moves the eye, must be 0."""
@@ -654,10 +651,8 @@ class _Code:
         distance, yaw, pitch, _, axis = rest
         around, sideways = texts.turn(yaw, np.eye(3)[int(axis)]), texts.turn(pitch if axis == 2 else -pitch, np.eye(3)[0])
         offset = around @ sideways @ (-distance * np.eye(3)[1 if axis == 2 else 2])
-        scene.moved.append(start)
-        self._set(scene, "eye", tuple((np.array(target) + offset).tolist()), start)
-        self._set(scene, "target", target, start)
-        self._set(scene, "up", tuple((around @ sideways @ np.eye(3)[int(axis)]).tolist()), start)
+        eye, up = np.array(target) + offset, around @ sideways @ np.eye(3)[int(axis)]
+        self._place(scene, start, tuple(eye.tolist()), target, tuple(up.tolist()))
 
     def _of_pytorch3d(self, scene: _Scene, role: str, opened: int, start: int) -> None:
         values, named, _ = self.reader.arguments(opened)
@@ -686,22 +681,17 @@ class _Code:
             eye = tuple(a + b for a, b in zip(at, offset, strict=True))
         if None in (eye, at, up):
             texts.fail(self.text, start, "give eye, at and up as plain numbers")
-        scene.moved.append(start)
-        for name, vector in zip(("eye", "target", "up"), (eye, at, up), strict=True):
-            self._set(scene, name, vector, start)
+        self._place(scene, start, eye, at, up)
         scene.is_height_first = True
 
     def _camera_position(self, scene: _Scene, at: int, start: int) -> None:
         value = self.reader.value(at)[0]
         if single := numbers(value, 3):
-            scene.moved.append(start)
-            return self._set(scene, "eye", single, start)
+            return self._place(scene, start, single)
         vectors = [numbers(part, 3) for part in value] if isinstance(value, tuple) and len(value) == 3 else [None]
         if None in vectors:
             texts.fail(self.text, start, "give position, focal point and up as three numbers each")
-        scene.moved.append(start)
-        for role, vector in zip(("eye", "target", "up"), vectors, strict=True):
-            self._set(scene, role, vector, start)
+        self._place(scene, start, *vectors)
 
     def _perspective(self, scene: _Scene, parts: list[str], opened: int, start: int) -> None:
         values, named, _ = self.reader.arguments(opened)
@@ -853,17 +843,7 @@ def _plane(scene: _Scene, text: str, options: Options) -> tuple:
     elif scene.is_height_first and size:
         size = (size[1], size[0])
     if scene.frustum:
-        left, right, bottom, top, near, _ = scene.frustum
-        if not (left != right and bottom != top and near > 0):
-            raise InputError("the frustum is empty: give left, right, bottom, top, near and far")
-        film = texts.film(options, what, size, abs((right - left) / (top - bottom)))
-        exact = film.width if film.is_stated else film.height * abs((right - left) / (top - bottom)) / film.pixel_aspect
-        d_x, d_y = near * exact / (right - left), near * film.height / (top - bottom)
-        if d_x <= 0 or d_y <= 0:
-            raise InputError("the frustum turns the picture over: give left < right and bottom < top")
-        c_x = -left / (right - left) * exact + (film.width - exact) / 2
-        plane = axes.view_plane(d_x, d_y, c_x, film.height * top / (top - bottom), (film.width, film.height))
-        return plane, film.is_stated, film.notes
+        return _of_frustum(scene.frustum, options, size)
     if "view_distance" in values:
         film = texts.film(options, what, size, None if size else aspect)
         d, zoom, s = (
@@ -886,6 +866,50 @@ def _plane(scene: _Scene, text: str, options: Options) -> tuple:
             )
         kept = () if options.view_plane else ("The text does not say how the camera sees: as the camera before does",)
         return options.plane_or_refuse(what), False, kept
+    radians, axis = _angle(scene, text, options, said_angles)
+    if scene.three and (zoom := _plain_number(values, "zoom", 1.0, text)) != 1 and zoom > 0:
+        radians = 2 * math.atan(math.tan(radians / 2) / zoom)
+    if "view_offset" in values:
+        return _part_of_picture(scene, text, options, size, radians)
+    film = texts.film(options, what, size, aspect)
+    plane = film.plane(radians, axis)
+    if not film.is_stated and aspect and axis == "x":
+        half = math.tan(radians / 2)
+        plane = film.centered(film.height * aspect / 2 / half / film.pixel_aspect)
+    if size and "aspect_of_lens" in values and aspect and abs(film.aspect / aspect - 1) * film.width > 1:
+        d_y = plane.distance[1]
+        plane = axes.view_plane(d_y * film.aspect / aspect, d_y, film.width / 2, film.height / 2, size)
+    if "window_center" in values:
+        shift = numbers(_known(values, "window_center", text, "write the window's center in numbers"), 2)
+        if shift is None:
+            texts.fail(text, values["window_center"][1], "write the window's center in numbers")
+        c_x, c_top = (1 - shift[0]) / 2 * film.width, (1 + shift[1]) / 2 * film.height
+        plane = axes.view_plane(*plane.distance, c_x, c_top, (film.width, film.height))
+    return plane, film.is_stated, film.notes
+
+
+def _of_frustum(frustum: tuple[float, ...], options: Options, size: tuple[int, int] | None) -> tuple:
+    """The view plane of left, right, bottom, top, near and far. See `_plane`."""
+    left, right, bottom, top, near, _ = frustum
+    if not (left != right and bottom != top and near > 0):
+        raise InputError("the frustum is empty: give left, right, bottom, top, near and far")
+    aspect = abs((right - left) / (top - bottom))
+    film = texts.film(options, "the text", size, aspect)
+    exact = film.width if film.is_stated else film.height * aspect / film.pixel_aspect
+    d_x, d_y = near * exact / (right - left), near * film.height / (top - bottom)
+    if d_x <= 0 or d_y <= 0:
+        raise InputError("the frustum turns the picture over: give left < right and bottom < top")
+    c_x = -left / (right - left) * exact + (film.width - exact) / 2
+    plane = axes.view_plane(d_x, d_y, c_x, film.height * top / (top - bottom), (film.width, film.height))
+    return plane, film.is_stated, film.notes
+
+
+def _angle(scene: _Scene, text: str, options: Options, said_angles: Sequence[str]) -> tuple[float, str]:
+    """The field of view in radians, and the side of the picture that it is along: one of texts.AXES.
+
+    said_angles : the roles of the angles that the text says, one at least.
+    """
+    values = scene.values
     role = said_angles[0]
     if len(said_angles) > 1:
         known = {value for each in said_angles if not isinstance(value := values[each][0], Unknown)}
@@ -906,35 +930,13 @@ def _plane(scene: _Scene, text: str, options: Options) -> tuple:
             value, axis = Radians(value), "larger"
         else:
             raise InputError(f"a field of view of {value:g} may be meant across or upwards: say vfov or hfov")
-    name = "the field of view"
-    radians = (
-        float(value)
-        if isinstance(value, Radians)
-        else math.radians(value)
-        if isinstance(value, Degrees)
-        else texts.angle_of(value, name, options)
-    )
+    if isinstance(value, Radians):
+        radians = float(value)
+    else:
+        radians = math.radians(value) if isinstance(value, Degrees) else texts.angle_of(value, "the field of view", options)
     if not 0 < radians < math.pi:
         raise InputError(f"the field of view is {math.degrees(radians):g}°: give an angle between 0 and 180")
-    if scene.three and (zoom := _plain_number(values, "zoom", 1.0, text)) != 1 and zoom > 0:
-        radians = 2 * math.atan(math.tan(radians / 2) / zoom)
-    if "view_offset" in values:
-        return _part_of_picture(scene, text, options, size, radians)
-    film = texts.film(options, what, size, aspect)
-    plane = film.plane(radians, axis, name)
-    if not film.is_stated and aspect and axis == "x":
-        half = math.tan(radians / 2)
-        plane = film.centered(film.height * aspect / 2 / half / film.pixel_aspect)
-    if size and "aspect_of_lens" in values and aspect and abs(film.aspect / aspect - 1) * film.width > 1:
-        d_y = plane.distance[1]
-        plane = axes.view_plane(d_y * film.aspect / aspect, d_y, film.width / 2, film.height / 2, size)
-    if "window_center" in values:
-        shift = numbers(_known(values, "window_center", text, "write the window's center in numbers"), 2)
-        if shift is None:
-            texts.fail(text, values["window_center"][1], "write the window's center in numbers")
-        c_x, c_top = (1 - shift[0]) / 2 * film.width, (1 + shift[1]) / 2 * film.height
-        plane = axes.view_plane(*plane.distance, c_x, c_top, (film.width, film.height))
-    return plane, film.is_stated, film.notes
+    return radians, axis
 
 
 def _part_of_picture(

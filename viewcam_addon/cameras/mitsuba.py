@@ -235,10 +235,8 @@ def _sensor(element: ElementTree.Element, name: str, kind: str, text: Callable[[
     values: dict[str, object] = {}
     film, pose = None, None
     children = [by_id.get(text(child.get("id", "")), child) if child.tag.lower() == "ref" else child for child in element]
-    if element.tag.lower() == "lookat" or element.tag.lower() == "transform":
-        children = [element] if element.tag.lower() == "transform" else [ElementTree.Element("transform", {"name": "to_world"})]
-        if element.tag.lower() == "lookat":
-            children[0].append(element)
+    if element.tag.lower() in ("lookat", "transform"):
+        children = [element]
     for child in children:
         tag, key = child.tag.lower(), texts.plain(child.get("name", ""))
         if tag == "transform" or (tag == "lookat" and name == "fragment"):
@@ -268,8 +266,7 @@ def _read(element: ElementTree.Element, text: Callable[[str], str]) -> str:
 
 
 def _transform(steps: Sequence[ElementTree.Element], name: str, text: Callable[[str], str]) -> "np.ndarray | _Look":
-    moves = [step for step in steps if isinstance(step.tag, str)]
-    matrices = [_step(step, name, text) for step in moves]
+    matrices = [_step(step, name, text) for step in steps if isinstance(step.tag, str)]  # and no comment
     return _multiplied(matrices[::-1])
 
 
@@ -336,7 +333,7 @@ def _step(step: ElementTree.Element, name: str, text: Callable[[str], str]) -> "
 
 def _in_python(text: str) -> Iterator[_Sensor]:
     text = texts.without(r"#[^\n]*", text)
-    starts = [match for match in _SENSOR.finditer(text)]
+    starts = list(_SENSOR.finditer(text))
     if not starts:
         looks = list(_LOOK.finditer(text))
         if len(looks) != 1:
@@ -377,12 +374,12 @@ def _dictionary(text: str, opened: int, kind: str, name: str) -> _Sensor:
     while item := _ITEM.match(text, at):
         key = texts.plain(item[1])
         stop = _end_of_value(text, item.end(), end)
-        if key in ("toworld",):
+        if key == "toworld":
             pose = _product(text, item.end())
         elif text[item.end()] == "{":
             inside: Any
             inside, _ = reader.value(item.end())
-            if not isinstance(inside, dict) and key in ("film",):
+            if not isinstance(inside, dict) and key == "film":
                 texts.fail(text, item.end(), "give the film as a dictionary of numbers")
             if key == "film" or (isinstance(inside, dict) and str(inside.get("type", "")).endswith("film")):
                 film = {texts.plain(each): value for each, value in inside.items()}

@@ -43,7 +43,7 @@ Values = dict[str, Any]
 
 _SPELLINGS = {
     **dict.fromkeys(("eye", "from", "origin", "location", "position", "lookfrom"), "eye"),
-    **dict.fromkeys(("lookat", "at", "to", "target", "center", "focalpoint"), "look_at"),
+    **dict.fromkeys(("lookat", "at", "to", "target", "center", "centre", "focalpoint"), "look_at"),
     **dict.fromkeys(("up", "upvector", "vup", "viewup"), "up"),
     **dict.fromkeys(("distance", "dist", "d"), "distance"),
     **dict.fromkeys(("fov", "fieldofview", "angle"), "fov"),

@@ -146,10 +146,8 @@ def film(
         return Film(width, height, is_stated=True)
     notes: tuple[str, ...] = ()
     if default and not (options.size or options.view_plane or options.base):
-        taken, notes = (
-            Film(*default),
-            (f"The text says no size of the picture: it is {what}'s own, {default[0]} × {default[1]}",),
-        )
+        taken = Film(*default)
+        notes = (f"The text says no size of the picture: it is {what}'s own, {default[0]} × {default[1]}",)
     else:
         taken = Film(*options.size_or_refuse(what), options.pixel_aspect)
     if aspect is None or abs(taken.aspect / aspect - 1) * taken.width <= 1:

@@ -74,10 +74,8 @@ def in_world(source: Source, options: Options) -> Options:
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
     up = "Y" if options.axes == "y_up" else "Z"
-    blocks: list[str] = []
     taken: set[str] = set()
-    for camera in cameras:
-        blocks.append(_prim(camera, _identifier(camera.name, taken)))
+    blocks = [_prim(camera, _identifier(camera.name, taken)) for camera in cameras]
     doc = f'    doc = "{options.remembered}"\n' if options.remembered else ""
     return f'#usda 1.0\n(\n{doc}    metersPerUnit = 1\n    upAxis = "{up}"\n)\n\n' + "\n".join(blocks)
 

@@ -64,6 +64,12 @@ def _address(text: str) -> str:
     return text
 
 
+def plan_of(options: argparse.Namespace, **others: Any) -> Plan:
+    """The plan that the options of a command state, each called as its field is; and `others`, which no option says so."""
+    stated = {field.name: getattr(options, field.name) for field in dataclasses.fields(Plan) if hasattr(options, field.name)}
+    return Plan(**(stated | others))
+
+
 def carry_out(
     plan: Plan,
     jobs_of: Callable[[Any], Sequence[Job]],

@@ -20,11 +20,10 @@ from ..jobs import lists, makers
 from ..jobs import names as shot_names
 from ..jobs.folder import Outputs
 from ..jobs.job import ENGINES, LEVELS, Job
-from ..jobs.plan import Plan
 from ..labels import KINDS
 from . import Result
 from . import _options as shared
-from ._carry_out import add_machines, carry_out
+from ._carry_out import add_machines, carry_out, plan_of
 from .camera import add_reading_options, options_of
 
 _EXAMPLES = """\
@@ -112,21 +111,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
 
 def run(options: argparse.Namespace) -> Result:
     _refuse_contradictions(options)
-    plan = Plan(
-        out=options.out,
-        outputs=_outputs(options),
-        blend=options.blend,
-        trust=options.trust,
-        resume=options.resume,
-        resume_known=options.resume_known,
-        overwrite=options.overwrite,
-        shard=options.shard,
-        transforms=options.transforms,
-        test=options.test,
-        time_limit=options.time_limit,
-        workers=options.workers,
-        scheduler=options.scheduler,
-    )
+    plan = plan_of(options, outputs=_outputs(options))
     rig = _rig(options) if options.distort else None
     complete = functools.partial(_completed, options=options, rig=rig)
     shots_of = functools.partial(_shots, options, rig)

@@ -82,7 +82,6 @@ def _check_many(options: argparse.Namespace, job: Any) -> Result:
     """Checks of a range of frames or of several cameras, a shot each."""
     from ..jobs import makers
     from ..jobs.folder import Outputs
-    from ..jobs.plan import Plan
 
     _refuse_of_many(options)
     outputs = Outputs(picture=False, check=True, report=options.report is not None)
@@ -97,19 +96,7 @@ def _check_many(options: argparse.Namespace, job: Any) -> Result:
         return dataclasses.replace(job, **stated)
 
     with temporary_folder() as temporary:
-        plan = Plan(
-            out=options.report or temporary,
-            outputs=outputs,
-            blend=options.blend,
-            trust=options.trust,
-            resume=options.resume,
-            overwrite=options.overwrite,
-            shard=options.shard,
-            time_limit=options.time_limit,
-            workers=options.workers,
-            scheduler=options.scheduler,
-            command="check",
-        )
+        plan = _carry_out.plan_of(options, out=options.report or temporary, outputs=outputs)
         summary = _carry_out.carry_out(plan, jobs_of, options.events, complete)
     status = summary.exit_status or (3 if options.strict and summary.counts["not_all_modeled"] else 0)
     return status, {**summary.to_json(), "exit_status": status, "strict": options.strict}

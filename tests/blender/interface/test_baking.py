@@ -423,15 +423,14 @@ def test_all_selected_cameras_are_baked_in_one_go(over_the_target, scene, add_ca
     assert plain.animation_data is None
 
 
-def test_a_linked_camera_is_refused_and_a_library_override_is_baked_and_saved(over_the_target, scene, tmp_path, everything):
+def test_a_linked_camera_is_refused_and_a_library_override_is_baked_and_saved(
+    over_the_target, scene, tmp_path, everything, link_object
+):
     library, file = tmp_path / "library.blend", tmp_path / "shot.blend"
     bpy.data.libraries.write(str(library), {over_the_target})
     bpy.data.objects.remove(over_the_target)
     bpy.data.cameras.remove(bpy.data.cameras["Camera"])
-    with bpy.data.libraries.load(str(library), link=True) as (_, into):
-        into.objects = ["Camera"]
-    (linked,) = into.objects
-    scene.collection.objects.link(linked)
+    linked = link_object(library)
     with pytest.raises(InputError, match=r"'Camera' is linked from 'library.blend': make a local copy, or a library override"):
         baking.bake([linked], scene, 1, 21)
     override = linked.override_create(remap_local_usages=True)

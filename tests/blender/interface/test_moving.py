@@ -268,13 +268,8 @@ def test_keyed_values_can_be_moved_and_keyed_again(posed_camera, scene):
     assert cameras.read(posed_camera, scene).eye == (0, 0, 1)
 
 
-def test_a_linked_camera_is_moved_and_it_is_said_that_this_is_not_saved(posed_camera, fresh_blender, tmp_path, capfd):
-    bpy.data.libraries.write(str(tmp_path / "library.blend"), {posed_camera})
-    fresh_blender.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, target):
-        target.objects = ["Camera"]
-    linked = target.objects[0]
-    bpy.context.scene.collection.objects.link(linked)
+def test_a_linked_camera_is_moved_and_it_is_said_that_this_is_not_saved(posed_camera, link_camera, capfd):
+    linked = link_camera()
     bpy.context.scene.camera = linked
     bpy.context.view_layer.update()
     bpy.ops.viewcam.swap_camera()

@@ -489,14 +489,9 @@ def test_what_a_constraint_or_a_driver_places_is_read_only_with_a_word_why(posed
     assert words() == ["Parent", "Parent", "Driver"]
 
 
-def test_what_is_linked_can_not_be_set_by_buttons(posed_camera, tmp_path):
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(path, link=True) as (_, names):
-        names.objects = ["Camera"]
-    bpy.context.scene.collection.objects.link(bpy.data.objects["Camera"])
-    bpy.context.scene.camera = bpy.data.objects["Camera"]
+def test_what_is_linked_can_not_be_set_by_buttons(posed_camera, link_camera):
+    linked = link_camera()
+    bpy.context.scene.camera = linked
     panels = panel.VIEWCAM_PT_data_options, panel.VIEWCAM_PT_data, panel.VIEWCAM_PT_data_move
     buttons = {name: layout for each in panels for kind, name, _, layout, _ in drawn(each) if kind == "operator"}
     live = {name for name, layout in buttons.items() if layout.is_all("enabled")}
@@ -504,14 +499,8 @@ def test_what_is_linked_can_not_be_set_by_buttons(posed_camera, tmp_path):
     assert {"viewcam.apply_camera", "viewcam.adopt_camera", "viewcam.bake_camera", "viewcam.paste_camera"} < set(buttons)
 
 
-def test_of_an_override_it_is_said_why_lens_and_roll_are_gray(posed_camera, tmp_path):
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(path, link=True) as (_, names):
-        names.objects = ["Camera"]
-    bpy.context.scene.collection.objects.link(bpy.data.objects["Camera"])
-    override = bpy.data.objects["Camera"].override_create(remap_local_usages=True)
+def test_of_an_override_it_is_said_why_lens_and_roll_are_gray(posed_camera, link_camera):
+    override = link_camera().override_create(remap_local_usages=True)
     bpy.context.scene.camera = override
 
     def words():

@@ -209,15 +209,13 @@ def test_a_scaled_mesh_with_light_below_its_surface_has_the_normals_of_any_other
     )
 
 
-def test_linked_objects_are_exported_and_numbered(blend, scene, camera_object, both_sides):
+def test_linked_objects_are_exported_and_numbered(blend, camera_object, both_sides, link_object):
     material = bpy.data.materials.new("Shared")
     bpy.data.objects["Cube"].data.materials.append(material)
     library = blend("library.blend", copy=True)
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     bpy.data.materials.remove(material)
-    with bpy.data.libraries.load(str(library), link=True) as (_, target):
-        target.objects = ["Cube"]
-    scene.collection.objects.link(target.objects[0])
+    link_object(library, "Cube")
     path = blend("linking.blend")
     sides = both_sides(blend=path)
     sides.check()
@@ -225,12 +223,10 @@ def test_linked_objects_are_exported_and_numbered(blend, scene, camera_object, b
     assert not any(block.pass_index for block in bpy.data.objects)
 
 
-def test_a_missing_library_is_told(blend, scene):
+def test_a_missing_library_is_told(blend, link_object):
     library = blend("library.blend", copy=True)
     bpy.data.objects.remove(bpy.data.objects["Cube"])
-    with bpy.data.libraries.load(str(library), link=True) as (_, target):
-        target.objects = ["Cube"]
-    scene.collection.objects.link(target.objects[0])
+    link_object(library, "Cube")
     path = blend("linking.blend")
     library.unlink()
     (entry,) = [entry for entry in jobs.export(Job(blend=path)).ledger if entry.status == "skipped"]

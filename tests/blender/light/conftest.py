@@ -81,6 +81,22 @@ def pictures(stage, read_passes, tmp_path):
 
 
 @pytest.fixture
+def first_samples(read_passes, tmp_path):
+    """first_samples(level) → passes of the tracer and of Cycles: one sample of the open scene, all of it exported as it is."""
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
+
+    def make(level="direct"):
+        path = tmp_path / "first.exr"
+        exported = jobs.both_sides(Job(threads=2, level=level, samples=1), [path])
+        assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
+        (cycles_passes,) = read_passes([path])
+        return render.render(exported, level, 1, threads=2), cycles_passes
+
+    return make
+
+
+@pytest.fixture
 def link(scene):
     """link(light, receiver_collection={name: state}, …): names may be those of collections, which are then looked up."""
 

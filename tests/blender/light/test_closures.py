@@ -83,7 +83,7 @@ def seen_through():
 
 
 @pytest.fixture
-def patches(scene, strewn, painted, add_lamp, set_world, read_passes, tmp_path):
+def patches(scene, strewn, painted, add_lamp, set_world, first_samples):
     """patches(shaders, towards, energy) → relative errors of each shader's pixels, under a sun that stands there."""
 
     def show(shaders, towards=(0.6, 0.3, 0.75), energy=np.pi):
@@ -97,11 +97,7 @@ def patches(scene, strewn, painted, add_lamp, set_world, read_passes, tmp_path):
         sun.rotation_quaternion = Vector(towards).to_track_quat("Z", "Y")
         shaders = list(shaders)
         strewn([painted(*shader) for shader in shaders])
-        path = tmp_path / "patches.exr"
-        exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
-        assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-        (cycles_passes,) = read_passes([path])
-        traced = render.render(exported, "direct", 1, threads=2)
+        traced, cycles_passes = first_samples()
         result = []
         for number in range(len(shaders)):
             here = traced["Object Index"][..., 0] == number + 1

@@ -205,12 +205,8 @@ def test_nodes_of_a_lamp_that_are_a_little_wrong_are_found(shone, monkeypatch, w
 
 
 @pytest.mark.parametrize("shape", ["RECTANGLE", "ELLIPSE"])
-def test_a_panel_with_a_picture_shows_it(fresh_blender, scene, camera, add_lamp, set_world, shape, read_passes, tmp_path):
+def test_a_panel_with_a_picture_shows_it(fresh_blender, scene, camera, add_lamp, set_world, shape, first_samples):
     """The camera sees it right at every place; the way there begins at the clip's start; the panel is turned, and stretched."""
-    from viewcam_addon.blender.jobs import renderer as jobs
-    from viewcam_addon.jobs.job import Job
-    from viewcam_addon.tracer import render
-
     scene.render.resolution_x, scene.render.resolution_y = 48, 36
     set_world((0, 0, 0), 0.0)
     lamp = add_lamp("AREA", (0.1, 0.2, -3.0), (math.pi + 0.2, 0.1, 0.3), shape=shape, size=2.0, size_y=1.4)
@@ -218,11 +214,7 @@ def test_a_panel_with_a_picture_shows_it(fresh_blender, scene, camera, add_lamp,
     image(lamp)
     falloff(lamp, "Linear")
     camera.location, camera.rotation_euler, camera.data.lens = (0, 0, 0), (0, 0, 0), 40
-    path = tmp_path / "panel.exr"
-    exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
-    assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-    (cycles_passes,) = read_passes([path])
-    traced = render.render(exported, "direct", 1, threads=2)
+    traced, cycles_passes = first_samples()
     first, other = (each["Combined"][..., :3].astype(np.float64) for each in (traced, cycles_passes))
     apart = np.abs(first - other)[other > 0] / other.max()
     summary = len(apart), *np.percentile(apart, (50, 99))

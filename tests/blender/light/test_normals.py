@@ -10,7 +10,6 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.jobs.job import Job
-from viewcam_addon.tracer import render
 
 COLOR = (0.8, 0.5, 0.2, 1.0)
 # p99, calibrated: heights are looked up a tenth of a pixel beside, as Cycles does from 4.4 on (1e-4), or a whole one (1.2e-5).
@@ -126,7 +125,7 @@ def displace(material, mapped, vector=OBJECT, kind="Displacement", space="WORLD"
 
 
 @pytest.fixture
-def render_pair(scene, camera, add_lamp, set_world, read_passes, tmp_path):
+def render_pair(scene, camera, add_lamp, set_world, first_samples):
     """shown(size, level) → ours, theirs: (height, width, 3), and the number of the object that each pixel shows."""
     from mathutils import Vector
 
@@ -137,11 +136,7 @@ def render_pair(scene, camera, add_lamp, set_world, read_passes, tmp_path):
 
     def show(size, level="direct"):
         scene.render.resolution_x = scene.render.resolution_y = size
-        path = tmp_path / "normals.exr"
-        exported = jobs.both_sides(Job(threads=2, level=level, samples=1), [path])
-        assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-        (cycles_passes,) = read_passes([path])
-        traced = render.render(exported, level, 1, threads=2)
+        traced, cycles_passes = first_samples(level)
         first, other = (each["Combined"][..., :3].astype(np.float64) for each in (traced, cycles_passes))
         return first, other, traced["Object Index"][..., 0]
 

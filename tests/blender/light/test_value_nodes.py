@@ -16,7 +16,7 @@ bmesh = pytest.importorskip("bmesh")
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import cycles_attributes
 from viewcam_addon.jobs.job import Job
-from viewcam_addon.tracer import native, render
+from viewcam_addon.tracer import native
 from viewcam_addon.tracer.scene.shader_nodes import KINDS
 
 MOST, TYPICAL = 2e-5, 2e-6  # calibrated: float32 of UV up to 2, at images of 4 pixels, and 4.2 has another luminance by 1e-5
@@ -298,7 +298,7 @@ def voronoi(place):
 
 
 @pytest.fixture
-def floor(scene, strewn, make_material, set_world, read_passes, tmp_path):
+def floor(scene, strewn, make_material, set_world, first_samples):
     """floor(graphs) → name → (what the tracer shows of it, what Cycles shows), each (pixels, 3)."""
 
     def show(graphs):
@@ -332,11 +332,7 @@ def floor(scene, strewn, make_material, set_world, read_passes, tmp_path):
                 block.location, block.rotation_euler, block.scale = (0.3, -0.2, 0.1), (0.5, 0.2, -0.4), (1.2, 0.7, -0.9)
                 bpy.context.view_layer.update()
                 mesh.transform(block.matrix_world.inverted())
-        path = tmp_path / "floor.exr"
-        exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
-        assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-        (cycles_passes,) = read_passes([path])
-        traced = render.render(exported, "direct", 1, threads=2)
+        traced, cycles_passes = first_samples()
         indices = traced["Object Index"][..., 0]
         return {
             name: tuple(each["Combined"][indices == number][:, :3].astype(np.float64) for each in (traced, cycles_passes))
@@ -439,9 +435,7 @@ def test_a_node_that_is_a_little_wrong_is_found(floor, images, monkeypatch, wron
         check(floor({wrong: names[wrong]}))
 
 
-def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(
-    scene, camera, add, make_material, read_passes, tmp_path
-):
+def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(scene, camera, add, make_material, first_samples):
     """A modifier bends one grid; the other has a texture space of its own."""
     scene.render.resolution_x = scene.render.resolution_y = 48
     camera.location, camera.rotation_euler, camera.data.lens = (0.013, 0.029, 4.0), (0, 0, 0), 40.0
@@ -463,11 +457,7 @@ def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(
         else:
             bend = block.modifiers.new("Bend", "SIMPLE_DEFORM")
             bend.deform_method, bend.angle, bend.deform_axis = "TWIST", 0.7, "X"
-    path = tmp_path / "generated.exr"
-    exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
-    assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-    (cycles_passes,) = read_passes([path])
-    traced = render.render(exported, "direct", 1, threads=2)
+    traced, cycles_passes = first_samples()
     met = traced["Depth"][..., 0] < 100
     apart = np.abs(traced["Combined"] - cycles_passes["Combined"])[met]
     summary = met.sum(), *np.percentile(apart, (50, 99, 100))
@@ -476,7 +466,7 @@ def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(
 
 
 @pytest.fixture
-def thrown(scene, camera, add, mesh_from, make_material, set_world, images, read_passes, tmp_path):
+def thrown(scene, camera, add, mesh_from, make_material, set_world, images, first_samples):
     """thrown(blend) → errors where a smooth, stretched body shows an image that is thrown on it along its axes."""
 
     def show(blend):
@@ -493,11 +483,7 @@ def thrown(scene, camera, add, mesh_from, make_material, set_world, images, read
         mesh.materials.append(material)
         monkey = add(mesh, "Monkey", pass_index=1)
         monkey.scale, monkey.rotation_euler = (1.2, 0.8, 1.0), (0.2, 0.1, 0.4)
-        path = tmp_path / "thrown.exr"
-        exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
-        assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-        (cycles_passes,) = read_passes([path])
-        traced = render.render(exported, "direct", 1, threads=2)
+        traced, cycles_passes = first_samples()
         here = traced["Object Index"][..., 0] == 1
         assert here.sum() > 500
         return np.abs(traced["Combined"] - cycles_passes["Combined"])[here].max(axis=1)
@@ -530,7 +516,7 @@ def test_a_blend_between_axes_that_is_a_little_wrong_is_found(thrown, monkeypatc
 
 
 def test_each_instance_has_a_random_number_and_the_color_of_what_places_it(
-    scene, camera, add, mesh_from, make_material, set_world, read_passes, tmp_path
+    scene, camera, add, mesh_from, make_material, set_world, first_samples
 ):
     scene.render.resolution_x = scene.render.resolution_y = 48
     set_world((0, 0, 0), 0.0)
@@ -547,11 +533,7 @@ def test_each_instance_has_a_random_number_and_the_color_of_what_places_it(
         block.data.materials.clear()
         block.data.materials.append(material)
     camera.location, camera.rotation_euler, camera.data.lens = (0, 0, 5), (0, 0, 0), 36
-    path = tmp_path / "instances.exr"
-    exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
-    assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-    (cycles_passes,) = read_passes([path])
-    traced = render.render(exported, "direct", 1, threads=2)
+    traced, cycles_passes = first_samples()
     apart = np.abs(traced["Combined"] - cycles_passes["Combined"])[..., :3].max(axis=-1)
     assert apart.max() < 1e-6
     drawn = np.unique(np.round(cycles_passes["Combined"][..., 0].astype(np.float64), 6))
@@ -577,7 +559,7 @@ def test_generated_coordinates_of_a_point_cloud_are_named_since_they_do_not_come
 
 
 @pytest.fixture
-def pointed(scene, camera, add, mesh_from, make_material, set_world, read_passes, tmp_path):
+def pointed(scene, camera, add, mesh_from, make_material, set_world, first_samples):
     """pointed() → |tracer − Cycles|, (pixels, 3), of a head that shows how pointed it is, its islands and its edges.
 
     Its edges are split, so that vertices stand in one place, and one vertex has edges without a face.
@@ -611,11 +593,7 @@ def pointed(scene, camera, add, mesh_from, make_material, set_world, read_passes
         else:
             mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
             mesh.set_sharp_from_angle(angle=0.4)
-        path = tmp_path / "pointed.exr"
-        exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
-        assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
-        (cycles_passes,) = read_passes([path])
-        traced = render.render(exported, "direct", 1, threads=2)
+        traced, cycles_passes = first_samples()
         here = traced["Object Index"][..., 0] == 1
         assert here.sum() > 2000 and len(np.unique(cycles_passes["Combined"][here][:, 1])) >= 2
         return np.abs(traced["Combined"] - cycles_passes["Combined"])[here][:, :3]

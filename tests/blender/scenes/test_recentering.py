@@ -574,7 +574,7 @@ def test_a_vertex_that_did_not_follow_and_an_object_that_is_gone_are_named(look,
         jobs.export(Job(recenter=True))
 
 
-def test_objects_of_a_library_are_shown_and_stay_linked(look, add, mesh_from, scene, tmp_path, check):
+def test_objects_of_a_library_are_shown_and_stay_linked(look, add, mesh_from, tmp_path, check, link_object):
     look(UTM)
     block = add(mesh_from("monkey"), "Linked", UTM)
     block.shape_key_add(name="Basis")
@@ -582,9 +582,7 @@ def test_objects_of_a_library_are_shown_and_stay_linked(look, add, mesh_from, sc
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"), copy=True)
     for blocks, each in ((bpy.data.objects, block), (bpy.data.meshes, block.data)):
         blocks.remove(each)
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, target):
-        target.objects = ["Linked"]
-    scene.collection.objects.link(target.objects[0])
+    link_object(tmp_path / "library.blend", "Linked")
     check()
     before = file_state()
     check()

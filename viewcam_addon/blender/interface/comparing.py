@@ -25,7 +25,7 @@ import bpy
 from ... import child_process
 from ...comparison.answer import DIFFERENT, SAME_BUT, but_for, percent_of
 from ...comparison.statistics import plain
-from ...errors import InputError
+from ...errors import InputError, operator_reason
 from ...files import written_whole
 from ...jobs import plan as orders
 from ...jobs.job import Job
@@ -270,8 +270,7 @@ def save_copy(path: Path) -> None:
             "EXEC_DEFAULT", filepath=str(path), copy=True, relative_remap=True, compress=_is_compressed(), check_existing=False
         )
     except RuntimeError as error:
-        reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
-        raise InputError(f"a copy of the file can't be saved ({reason}): free some space") from error
+        raise InputError(f"a copy of the file can't be saved ({operator_reason(error)}): free some space") from error
 
 
 def camera_seen(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole | None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import png
-from ...errors import InputError
+from ...errors import InputError, operator_reason
 from ...files import written_whole
 from .. import versions
 from ..temporary_settings import Overrides, overridden
@@ -131,8 +131,7 @@ def _save(scene: bpy.types.Scene, path: Path) -> None:
         result.save_render(str(path.absolute()), scene=scene)
     except RuntimeError as error:
         _probe(path)
-        reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
-        raise InputError(f"{path} can't be written ({reason}): choose another folder") from error
+        raise InputError(f"{path} can't be written ({operator_reason(error)}): choose another folder") from error
 
 
 def _probe(path: Path) -> None:

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import bpy
 
-from ...errors import InputError
+from ...errors import InputError, operator_reason
 from ..temporary_settings import overridden, still_of_one_layer
 
 Result = TypeVar("Result")
@@ -90,5 +90,5 @@ def render_still(scene: bpy.types.Scene, to_file: bool = False) -> None:
     try:
         bpy.ops.render.render(scene=scene.name, write_still=to_file)
     except RuntimeError as error:
-        reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
+        reason = operator_reason(error)
         raise InputError(f"Blender can't render scene {scene.name!r} ({reason}): make it render with F12 first") from error

@@ -200,11 +200,11 @@ def _seen(
             overrides.afterwards(bpy.data.batch_remove, [geometries[source.key]])
 
     placed_objects = placements(depsgraph, ledger, shading, copy_of)
-    for source, *_ in placed_objects if shading is not None else ():
-        assert shading is not None
-        _note_places(source, shading, ledger)
-        if source.is_linked:
-            ledger.note(source.name, "approximated", _UNLINKED)
+    if shading is not None:
+        for source, *_ in placed_objects:
+            _note_places(source, shading, ledger)
+            if source.is_linked:
+                ledger.note(source.name, "approximated", _UNLINKED)
     for source, matrix in ((source, matrix) for source, matrices, _ in placed_objects for matrix in matrices):
         if not np.isfinite(matrix).all():
             raise InputError(f"the matrix of object {source.name!r} holds a number that is not finite: check its transform")
@@ -277,14 +277,20 @@ def _set_materials(data: Geometry, slots: list[bpy.types.Material]) -> None:
             data.materials[index] = material
 
 
+def _points_of(data: Geometry) -> tuple[bpy.types.bpy_prop_collection, NDArray[np.float32]]:
+    """The points of a geometry as Blender has them, and as an array, (n, 3)."""
+    elements = data.vertices if isinstance(data, bpy.types.Mesh) else data.points
+    points = np.empty((len(elements), 3), np.float32)
+    elements.foreach_get("co", points.ravel())
+    return elements, points
+
+
 def _moved(data: Geometry, matrix: Array) -> _Copy:
     """Take off a copied geometry the point of its bounding box that is nearest to the eye.
 
     matrix : (4, 4), of the first object that shows it, relative to the eye.
     """
-    elements = data.vertices if isinstance(data, bpy.types.Mesh) else data.points
-    points = np.empty((len(elements), 3), np.float32)
-    elements.foreach_get("co", points.ravel())
+    elements, points = _points_of(data)
     finite = points[np.isfinite(points).all(axis=1)].astype(np.float64)
     if not len(finite):
         return _Copy(data, points, np.zeros(3))
@@ -311,7 +317,7 @@ def _empty_scene(overrides: Overrides, scene: bpy.types.Scene, view_layer: bpy.t
 
 
 def _place(overrides: Overrides, temporary: bpy.types.Scene, placed: list[_Placed]) -> dict[bpy.types.Object, _Placed]:
-    """An object for each thing, all of them children of one at the origin."""
+    """An object for each of these, all of them children of one at the origin."""
     root = bpy.data.objects.new("Virtual Pinhole", None)
     objects = [root]
     overrides.afterwards(bpy.data.batch_remove, objects)
@@ -367,10 +373,7 @@ def _verify(depsgraph: bpy.types.Depsgraph, placed: dict[bpy.types.Object, _Plac
         _compare(each.name, np.array(instance.matrix_world), each.matrix)
         if each.data in copies and each.data not in verified:
             verified.add(each.data)
-            copy, data = copies[each.data], instance.object.data
-            elements = data.vertices if isinstance(data, bpy.types.Mesh) else data.points
-            points = np.empty((len(elements), 3), np.float32)
-            elements.foreach_get("co", points.ravel())
+            copy, (_, points) = copies[each.data], _points_of(instance.object.data)
             _compare(each.name, points, copy.points - copy.anchor)
     for each in missing.values():
         raise InputError(f"object {each.name!r} is missing in the scene that was moved to the eye: leave --recenter out")
