@@ -202,8 +202,8 @@ def _corner_values(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: A
 def _at_points(mesh: bpy.types.Mesh, attribute: bpy.types.Attribute) -> Array:
     """(vertices, k) float32: the mean of an attribute of the edges that each vertex has, 0 where it has none.
 
-    As Blender's bke/attribute_math.hh mixes it: of what is true or not, whether it is of any; whole numbers are rounded; bytes of
-    colors are mixed as they are encoded, and cut off.
+    As Blender's BKE_attribute_math.hh mixes it: of what is true or not, whether it is of any; whole numbers are rounded; bytes
+    of colors are mixed as they are encoded, and cut off.
     """
     kind = attribute.data_type
     field, width = ("color_srgb", 4) if kind == "BYTE_COLOR" else _ATTRIBUTES[kind]

@@ -41,8 +41,8 @@ def note_render(
     space = versions.working_space()
     if light and space != versions.WORKING_SPACE:
         raise InputError(
-            f"the file's working space is {space}, and the tracer's light is {versions.WORKING_SPACE}: change it in the scene's "
-            "color management, or check level geometry"
+            f"the file's working space is {space}, and the tracer's {versions.WORKING_SPACE}: change it in the scene's color "
+            "management, or check level geometry"
         )
     for sentence in datablocks.beyond_pinhole(camera_object, scene):
         ledger.note(camera_object.name, "approximated", f"{sentence} (off on both sides)")
