@@ -84,6 +84,8 @@ class Stage:
         """
         camera = self.camera if self.is_chosen or self.file_ledger else None
         share = max((job.samples or SAMPLES) // len(paths), 1)
+        # What particles were, Blender makes of what it has kept of them another thing.
+        kept = keep and not self.file_ledger and not persistent_data.is_simulated()
         with overridden() as lasting:
             for number, path in enumerate([*paths, *([everything] if everything is not None else [])]):
                 rendering(number + 1)
@@ -97,7 +99,6 @@ class Stage:
                 if job.engine in ("EEVEE", "WORKBENCH"):
                     rasters.render(*of, job.engine, remedies, job.threads)
                 else:
-                    kept = keep and not self.file_ledger
                     cycles.render(*of, remedies, job.threads, settings, kept, job.device, is_of_everything, lasting)
             if keep and lasting.is_shared:  # Cycles must not know it when it is gone
                 persistent_data.drop(self.scene)
