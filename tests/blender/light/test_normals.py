@@ -260,7 +260,7 @@ def test_textures_make_heights(patches):
     check(patches(cases, bump), cases, p50=2e-5, p99=5e-4)
 
 
-# Of the median pixel of the body below, relative: from 5.1 on normals are two numbers of 16 bits.
+# The most by which the median pixel of the body below differs: from 5.1 on normals are two numbers of 16 bits.
 USUAL = 1e-4 if bpy.app.version >= (5, 1) else 1e-5
 
 
