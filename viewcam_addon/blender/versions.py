@@ -32,8 +32,20 @@ CIRCLES_ARE_BLACK = bpy.app.version >= (5, 0)
 # True if an input keeps its value where a muted node or a reroute feeds it that nothing feeds; before, Cycles made it 0.
 # Measured: 4.2, 4.5, 5.0 and 5.2.
 MUTED_NODES_HAVE_NO_VALUES = bpy.app.version >= (5, 0)
+# True if a material slot of an object that is empty is that for Cycles; before, it had the mesh's material. Measured: 4.2, 4.5,
+# 5.0 and 5.2.
+EMPTY_SLOTS_OF_OBJECTS_STAY_EMPTY = bpy.app.version >= (5, 1)
 # True if Cycles samples no light of a Principled surface that a displacement bumps. Measured: in 5.2, not in 4.2, 4.5 and 5.0.
 LOSES_LIGHT_OF_BUMPED = bpy.app.version >= (5, 1)
+
+
+WORKING_SPACE = "Linear Rec.709"
+"""The space of a file's colors, unless it says otherwise."""
+
+
+def working_space() -> str:
+    """The space of the file's colors. Before 5.0 there is no choice."""
+    return bpy.data.colorspace.working_space if bpy.app.version >= (5, 0) else WORKING_SPACE
 
 
 def node_tree(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree | None:

@@ -106,6 +106,17 @@ def test_no_material_is_cycles_own_default(pictures, slots):
     assert is_gloss(sides[0].traced["Diffuse Color"]) == (bpy.app.version >= (5, 0))
 
 
+def test_an_empty_slot_of_an_object_is_as_cycles_has_it(pictures):
+    """Since 5.1 its own default; before, the mesh's material."""
+    for name in ("Monkey", "Floor"):
+        slot = bpy.data.objects[name].material_slots[0]
+        slot.link, slot.material = "OBJECT", None
+    sides = pictures(scenes=2)
+    check(sides, POINTS)
+    assert not reasons(sides)
+    assert is_gloss(sides[0].traced["Diffuse Color"]) == versions.EMPTY_SLOTS_OF_OBJECTS_STAY_EMPTY
+
+
 def test_what_geometry_nodes_make_without_a_material_is_it_too(pictures, node_group):
     tree, _, end = node_group("Cube")
     tree.links.new(tree.nodes.new("GeometryNodeMeshCube").outputs[0], end.inputs[0])

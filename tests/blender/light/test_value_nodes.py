@@ -78,6 +78,14 @@ ATTRIBUTES = (
     ("Byte", "BYTE_COLOR", "CORNER", "color", 4),
     ("Way", "FLOAT_VECTOR", "FACE", "vector", 3),
 )
+# Beside these: of edges, which Cycles asks for at vertices, and of four numbers that are no color.
+MIXED = (
+    ("Turn", "QUATERNION", "POINT", "value", 4),
+    ("Edges", "FLOAT_VECTOR", "EDGE", "vector", 3),
+    ("Rims", "BYTE_COLOR", "EDGE", "color", 4),
+    ("Whole", "INT", "EDGE", "value", 1),
+    ("Marked", "BOOLEAN", "EDGE", "value", 1),
+)
 
 
 def graphs(image, straight):
@@ -305,7 +313,7 @@ def floor(scene, strewn, make_material, set_world, first_samples):
                 inputs = {"Vector": picture} | {f"Vector_00{i}": (value,) * 3 for i, value in enumerate(by, start=1)}
                 picture = N("VectorMath", inputs, operation=operation)
             tree.links.new(picture.add(tree), tree.nodes["Shader"].inputs["Color"])
-        rng = np.random.default_rng(1)
+        rng, mixed_rng = np.random.default_rng(1), np.random.default_rng(2)
         blocks = strewn(materials, cells=30, width=3.0, backwards=lambda i: i % 2 == 0)
         for name, block in zip(graphs, blocks, strict=True):
             mesh = block.data
@@ -315,6 +323,11 @@ def floor(scene, strewn, make_material, set_world, first_samples):
             for attribute, kind, domain, field, width in ATTRIBUTES:
                 values = mesh.attributes.new(attribute, kind, domain).data
                 values.foreach_set(field, rng.uniform(0, 1, width * len(values)))
+            for attribute, kind, domain, field, width in MIXED:
+                values = mesh.attributes.new(attribute, kind, domain).data
+                numbers = mixed_rng.uniform(0, 1, width * len(values))
+                whole = {"INT": np.rint(numbers * 9).astype(int), "BOOLEAN": numbers < 0.3}
+                values.foreach_set(field, whole.get(kind, numbers))
             if name.startswith(("vector transform", "turned")):  # the others stand in the world as they are in themselves
                 block.location, block.rotation_euler, block.scale = (0.3, -0.2, 0.1), (0.5, 0.2, -0.4), (1.2, 0.7, -0.9)
                 bpy.context.view_layer.update()
@@ -358,6 +371,13 @@ def images(fresh_blender):
         image.pack()
         result.append(image)
     return result
+
+
+def test_attributes_of_edges_are_mixed_as_in_cycles(floor):
+    words = {name: N("Attribute", output="Color", attribute_name=name) for name, *_ in MIXED}
+    pairs = floor(words | {f"{name} alpha": N("Attribute", output="Alpha", attribute_name=name) for name in ("Turn", "Rims")})
+    check(pairs)
+    assert all(np.ptp(traced) > 0.01 for traced, _ in pairs.values())
 
 
 @pytest.mark.parametrize("part", range(PARTS))

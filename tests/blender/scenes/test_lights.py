@@ -14,6 +14,7 @@ from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes.ledger import Ledger
 from viewcam_addon.blender.scenes.world import world_of
 from viewcam_addon.blender.temporary_settings import overridden
+from viewcam_addon.errors import InputError
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.native import constant_value
 from viewcam_addon.tracer.scene.film import Bounces, Film
@@ -284,12 +285,14 @@ def test_strengths_that_light_can_not_have_are_left_out(add_lamp, export, energy
     assert not lamps and "strength" in reasons["Lamp"]
 
 
-def test_a_sheared_area_light_is_told(add_lamp, export, add):
+@pytest.mark.parametrize("scale", [1.0003, 3])
+def test_a_sheared_area_light_is_told_and_off_where_it_is_much(add_lamp, export, add, scale):
     parent = add(None, "Parent")
-    parent.scale = (1, 3, 1)
+    parent.scale = (1, scale, 1)
     add_lamp("AREA", rotation=(0, 0, 0.5)).parent = parent
     bpy.context.view_layer.update()
-    assert "sheared" in export()[1]["Lamp"]
+    lamps, reasons = export()
+    assert "sheared" in reasons["Lamp"] and bool(lamps) == (scale < 2)
 
 
 @pytest.fixture
@@ -501,6 +504,17 @@ def test_every_filter_of_cycles_is_modeled(scene, export_world):
 def test_what_of_film_and_bounces_is_approximated_is_told(scene, export_world):
     scene.cycles.caustics_reflective = False
     assert "caustics" in export_world()[1]["Scene"]
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 0), reason="before 5.0 colors are always Rec. 709's")
+def test_light_in_another_color_space_is_refused(set_world, export_world):
+    set_world()
+    bpy.ops.wm.set_working_color_space(working_space="ACEScg", convert_colors=False)
+    try:
+        with pytest.raises(InputError, match="ACEScg"):
+            export_world()
+    finally:
+        bpy.ops.wm.set_working_color_space(working_space="Linear Rec.709", convert_colors=False)
 
 
 def test_smaller_textures_and_open_shading_language_are_told(scene, export_world):

@@ -429,7 +429,7 @@ def _source(
         ledger.note(placed.name, "exported", "the view layer leaves out surfaces")
         return None
     override = layer.material_override
-    slots = [override or slot.material for slot in evaluated.material_slots] or [override]
+    slots = [override] * max(len(evaluated.material_slots), 1) if override else _materials(evaluated, real.original) or [None]
     used = {0}
     if is_mesh:
         with export_geometry.mesh_shown(evaluated) as mesh:
@@ -457,6 +457,19 @@ def _source(
         receivers=receivers,
         blockers=blockers,
     )
+
+
+def _materials(evaluated: bpy.types.Object, original: bpy.types.Object) -> list[bpy.types.Material | None]:
+    """The materials that Cycles finds in the slots of an evaluated object.
+
+    A slot of the object itself that is empty shows the mesh's material, where it is evaluated.
+    """
+    slots = [slot.material for slot in evaluated.material_slots]
+    if versions.EMPTY_SLOTS_OF_OBJECTS_STAY_EMPTY:
+        for number, (slot, own) in enumerate(zip(evaluated.material_slots, original.material_slots, strict=False)):
+            if slot.link == own.link == "OBJECT" and own.material is None:
+                slots[number] = None
+    return slots
 
 
 def _geometry(source: Surface, evaluated: bpy.types.Object, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:

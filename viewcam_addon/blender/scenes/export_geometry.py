@@ -35,6 +35,7 @@ _ATTRIBUTES = {
     "FLOAT_VECTOR": ("vector", 3),
     "FLOAT_COLOR": ("color", 4),
     "BYTE_COLOR": ("color", 4),
+    "QUATERNION": ("value", 4),
 }
 # Cycles' radius of points that have none.
 DEFAULT_RADIUS = 0.01
@@ -192,8 +193,35 @@ def _corner_values(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: A
     field, width = _ATTRIBUTES[attribute.data_type]
     dtype = {"BOOLEAN": np.bool_, "INT": np.int32, "INT8": np.int32}.get(attribute.data_type, np.float32)
     values = read(attribute.data, field, dtype, width).astype(np.float32).reshape(-1, width)
+    if attribute.domain == "EDGE":
+        return _at_points(mesh, attribute)[triangles]
     at = {"POINT": triangles, "CORNER": corners, "FACE": np.repeat(faces[:, np.newaxis], 3, axis=1)}.get(attribute.domain)
     return None if at is None else np.ascontiguousarray(values[at])
+
+
+def _at_points(mesh: bpy.types.Mesh, attribute: bpy.types.Attribute) -> Array:
+    """(vertices, k) float32: the mean of an attribute of the edges that each vertex has, 0 where it has none.
+
+    As Blender's BKE_attribute_math.hh mixes it: of what is true or not, whether it is of any; whole numbers are rounded; bytes
+    of colors are mixed as they are encoded, and cut off.
+    """
+    kind = attribute.data_type
+    field, width = ("color_srgb", 4) if kind == "BYTE_COLOR" else _ATTRIBUTES[kind]
+    dtype = {"BOOLEAN": np.bool_, "INT": np.int32, "INT8": np.int32}.get(kind, np.float32)
+    values = read(attribute.data, field, dtype, width).astype(np.float64).reshape(-1, width)
+    ends = read(mesh.edges, "vertices", np.int32, 2)
+    counts = np.bincount(ends.ravel(), minlength=len(mesh.vertices))[:, np.newaxis]
+    sums = np.column_stack([np.bincount(ends.ravel(), np.repeat(column, 2), len(mesh.vertices)) for column in values.T])
+    means = sums / np.maximum(counts, 1)
+    if kind == "BOOLEAN":
+        means = (sums > 0).astype(np.float64)
+    elif kind in ("INT", "INT8"):
+        means = np.copysign(np.floor(np.abs(means) + 0.5), means)
+    elif kind == "BYTE_COLOR":
+        encoded = np.floor(np.rint(sums * 255) / np.maximum(counts, 1)) / 255
+        means = np.where(encoded < 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+        means[:, 3] = encoded[:, 3]
+    return means.astype(np.float32)
 
 
 def _generated(mesh: bpy.types.Mesh) -> Array:

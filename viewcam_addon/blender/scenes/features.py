@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import bpy
 
+from ...errors import InputError
 from ...tracer.scene.lamps import RAYS
 from .. import datablocks, versions
 from . import images, materials, nodes
@@ -33,7 +34,16 @@ def note_render(
     ledger: Ledger,
     light: bool = False,
 ) -> None:
-    """Note what the camera and the render settings do beyond a pinhole. To be asked before the settings are overridden."""
+    """Note what the camera and the render settings do beyond a pinhole. To be asked before the settings are overridden.
+
+    Raises InputError of light in other colors than the tracer's.
+    """
+    space = versions.working_space()
+    if light and space != versions.WORKING_SPACE:
+        raise InputError(
+            f"the file's working space is {space}, and the tracer's {versions.WORKING_SPACE}: change it in the scene's color "
+            "management, or check level geometry"
+        )
     for sentence in datablocks.beyond_pinhole(camera_object, scene):
         ledger.note(camera_object.name, "approximated", f"{sentence} (off on both sides)")
     ledger.set_for_cycles(camera_object.data.dof, "use_dof", False)

@@ -30,6 +30,9 @@ from .shaders import RGB
 _WHITE = (1.0, 1.0, 1.0)
 # The largest cosine between two axes of an area light; beyond it Cycles' own formulas contradict each other.
 _SHEAR = 1e-5
+# From where on its pictures differ by more than chance at some samples: by two to a hundred percent at 0.1. Chosen.
+_LARGE_SHEAR = 1e-3
+_SHEARED = "is sheared, which Cycles takes for one shape here and another there"
 
 
 class _Kind:
@@ -140,8 +143,13 @@ class _Area(_Kind):
             return None
         lengths = np.linalg.norm(matrix[:3, :3], axis=0)
         axes = matrix[:3, :3] / np.where(lengths > 0, lengths, 1.0)
-        if np.abs(axes.T @ axes - np.diag(np.diag(axes.T @ axes))).max() > _SHEAR:
-            ledger.note(name, "approximated", "is sheared, which Cycles takes for one shape here and another there")
+        shear = np.abs(axes.T @ axes - np.diag(np.diag(axes.T @ axes))).max()
+        if shear > _LARGE_SHEAR:
+            ledger.note(name, "skipped", f"{_SHEARED}: off on both sides")
+            ledger.set_for_cycles(light.original, "energy", 0.0)
+            return None
+        if shear > _SHEAR:
+            ledger.note(name, "approximated", _SHEARED)
         if light.spread < LEAST_SPREAD:
             ledger.note(name, "approximated", f"has a spread of {math.degrees(light.spread):.2g}°, 180° on both sides")
             ledger.set_for_cycles(light.original, "spread", math.pi)
