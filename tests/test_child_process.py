@@ -30,7 +30,8 @@ def is_there(process):
         return False
 
 
-def wait_until(is_so, seconds=20):
+def until(is_so, seconds=20):
+    """The value of `is_so`, as soon as it is true or so many seconds have passed: far more than a busy machine needs."""
     ends = time.monotonic() + seconds
     while not (outcome := is_so()) and time.monotonic() < ends:
         time.sleep(0.02)
@@ -40,11 +41,11 @@ def wait_until(is_so, seconds=20):
 def test_grandchildren_end_with_the_child(tmp_path):
     log = tmp_path / "said.txt"
     group = child_process.ProcessGroup([sys.executable, "-c", PARENT + "time.sleep(60)"], log, os.environ)
-    assert wait_until(lambda: log.read_text().endswith("\n")), "the group has not started"
+    assert until(lambda: log.read_text().endswith("\n")), "the group has not started"
     members = [int(word) for word in log.read_text().split()]
     assert all(map(is_there, members)) and group.status() is None
     group.end()
-    assert wait_until(lambda: not any(map(is_there, members))), "a member runs on"
+    assert until(lambda: not any(map(is_there, members))), "a member runs on"
     assert group.status() == (1 if sys.platform == "win32" else -9)
     group.end()  # twice does no harm
 
@@ -55,7 +56,7 @@ def test_a_grandchild_ends_that_has_lost_its_parent(tmp_path):
     grandchild = int((tmp_path / "said.txt").read_text().split()[1])
     assert group.status() == 0 and is_there(grandchild)
     group.end()
-    assert wait_until(lambda: not is_there(grandchild))
+    assert until(lambda: not is_there(grandchild))
 
 
 def test_what_a_child_says_stands_in_its_file(tmp_path):
@@ -105,8 +106,6 @@ print(echo.ask({})["process"], flush=True)
 echo.ask({"sleep": float(sys.argv[2])})
 time.sleep(60)
 """
-ENDS_WITHIN = 20
-"""Seconds for a process to end which has nothing to do: of those that a busy machine needs, many times as many."""
 
 
 @pytest.fixture
@@ -185,28 +184,21 @@ def test_what_it_prints_stands_in_its_log(tmp_path):
 def test_a_process_ends_with_whoever_asked_even_in_the_midst_of_an_answer(tmp_path, answering):
     log = tmp_path / "said.txt"
     asker = child_process.ProcessGroup([sys.executable, "-c", ASKER, ECHO, str(answering)], log, child_process.environment())
-    assert _until(lambda: log.read_text().strip().isdecimal()), log.read_text()
+    assert until(lambda: log.read_text().strip().isdecimal()), log.read_text()
     process = psutil.Process(int(log.read_text()))
     psutil.Process(asker._first.pid).kill()
     asker.wait()
-    gone = _until(lambda: not process.is_running() or process.status() == psutil.STATUS_ZOMBIE)
+    gone = until(lambda: not process.is_running() or process.status() == psutil.STATUS_ZOMBIE)
     assert gone, "it waits for nobody"
 
 
 def test_a_process_that_nobody_asks_for_long_ends_and_that_can_be_seen():
     with ServerProcess("the echo", [sys.executable, "-c", ECHO], child_process.environment(IDLE="0.5")) as echo:
         echo.ask({})
-        assert _until(lambda: not echo.is_there()), "it waits on"
+        assert until(lambda: not echo.is_there()), "it waits on"
 
 
 def test_a_process_that_listens_is_there(echo):
     assert echo.is_there()
     echo.ask({})
     assert echo.is_there()
-
-
-def _until(is_so):
-    ends = time.monotonic() + ENDS_WITHIN
-    while not (outcome := is_so()) and time.monotonic() < ends:
-        time.sleep(0.02)
-    return outcome

@@ -25,7 +25,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import InputError
-from ..pinhole import Pinhole, Triple
+from ..pinhole import Pinhole
 from . import axes, naming, own, texts
 from .camera import Camera, Options
 from .source import Record, Source
@@ -107,28 +107,22 @@ def _of_sibr(source: Source, options: Options) -> list[Camera]:
         width, height = options.size_or_refuse(source.name)
         fov = Record({"fov": line[6]}, record.place).number("fov", None, 1e-6, 180 - 1e-6)
         d = (height if line[5] else width) / 2 / math.tan(math.radians(fov) / 2)
-        eye, target, up = (_vector(record, key) for key in ("origin", "target", "up"))
-        pinhole = Pinhole(eye, target, up, d, width, height)
-        cameras.append(Camera(name, pinhole, False))
+        eye, target, up = (record.numbers(key, 3) for key in ("origin", "target", "up"))
+        cameras.append(Camera(name, Pinhole(eye, target, up, d, width, height), False))
     return cameras
-
-
-def _vector(record: Record, key: str) -> Triple:
-    x, y, z = record.numbers(key, 3)
-    return x, y, z
 
 
 def _first_view(source: Source, options: Options) -> Camera:
     """The view that a page of GaussianSplats3D begins with."""
     width, height = options.size_or_refuse(source.name)
     text = texts.without(_COMMENT, source.text)
-    vectors = dict(_USUAL_VIEW)
+    vectors: dict[str, Sequence[float]] = {**_USUAL_VIEW}
     for key, name in _VIEWS.items():
         listed = [match[1] for match in re.finditer(rf"\b{name}\b[\"']?\s*[:=]\s*\[([^\[\]]{{0,200}})\]", text)]
         if len({*listed}) > 1 or (not listed and name in text):
             raise InputError(f"{source.name} says {name} {len(listed)} times as three numbers: give a text that says it once")
         if listed:
-            vectors[key] = _vector(Record({name: listed[0].rstrip(", \n").split(",")}, source.name), name)
+            vectors[key] = Record({name: listed[0].rstrip(", \n").split(",")}, source.name).numbers(name, 3)
     d = height / 2 / math.tan(math.radians(_FOV) / 2)
     note = f"GaussianSplats3D shows {_FOV:g}° of the picture's height"
     return Camera("view", Pinhole(vectors["eye"], vectors["look_at"], vectors["up"], d, width, height), False, (note,))

@@ -70,7 +70,9 @@ class Hand:
         self.event("LEFTMOUSE", "RELEASE", end)
 
 
-def draw_the_edges(hand, photo=PHOTO):
+def hand_with_edges(camera_object, scene, photo=PHOTO):
+    """The hand of an artist who has drawn two edges along each axis."""
+    hand = Hand(camera_object, scene)
     for axis, start, end in (
         ("X", (-2, -1, 0), (2, -1, 0)),
         ("X", (-2, 1, 0), (2, 1, 0)),
@@ -81,13 +83,13 @@ def draw_the_edges(hand, photo=PHOTO):
     ):
         hand.event(axis)
         hand.drag(*seen(start, end, photo=photo))
+    return hand
 
 
 def test_edges_dragged_over_a_picture_turn_the_camera_and_set_its_lens_and_the_eye_stays(posed_camera, scene, settings):
     before = dragging.state(posed_camera)
     units = scene.unit_settings.scale_length, scene.unit_settings.system
-    hand = Hand(posed_camera, scene)
-    draw_the_edges(hand)
+    hand = hand_with_edges(posed_camera, scene)
     assert hand.event("RET") == {"FINISHED"}
     bpy.context.view_layer.update()
     pinhole = cameras.read(posed_camera, scene)
@@ -100,8 +102,7 @@ def test_edges_dragged_over_a_picture_turn_the_camera_and_set_its_lens_and_the_e
 
 def test_the_length_of_the_first_edge_at_the_cursor_says_where_the_camera_stands(posed_camera, scene, settings):
     settings.length, scene.cursor.location = 4.0, (-2, -1, 0)
-    hand = Hand(posed_camera, scene)
-    draw_the_edges(hand)
+    hand = hand_with_edges(posed_camera, scene)
     assert hand.event("RET") == {"FINISHED"}
     bpy.context.view_layer.update()
     pinhole = cameras.read(posed_camera, scene)
@@ -112,8 +113,7 @@ def test_the_length_of_the_first_edge_at_the_cursor_says_where_the_camera_stands
 def test_a_lens_that_is_known_stays_to_the_bit_and_the_viewport_says_so(posed_camera, scene, settings):
     settings.is_lens_known = True
     posed_camera.virtual_pinhole.distance = 1800
-    hand = Hand(posed_camera, scene)
-    draw_the_edges(hand)
+    hand = hand_with_edges(posed_camera, scene)
     assert hand.event("RET") == {"FINISHED"} and posed_camera.virtual_pinhole.distance == 1800
     bpy.context.view_layer.update()
     assert np.allclose(cameras.read(posed_camera, scene).basis(), PHOTO.basis(), atol=1e-6)
@@ -123,8 +123,7 @@ def test_a_lens_that_is_known_stays_to_the_bit_and_the_viewport_says_so(posed_ca
 
 def test_large_errors_are_told_without_powers_of_ten(posed_camera, scene, settings):
     settings.precision = 5.0
-    hand = Hand(posed_camera, scene)
-    draw_the_edges(hand)
+    hand = hand_with_edges(posed_camera, scene)
     text = " ".join(photo_matching.summary_of(hand.operator.result, posed_camera.data.lens))
     assert max(float(number.replace(",", "")) for number in re.findall(r"± ([\d.,]+) px", text)) >= 100 and "e+" not in text
 
@@ -134,8 +133,7 @@ def test_a_free_principal_point_becomes_the_shift_and_escape_takes_it_back(posed
     settings.is_principal_point_free = True
     settings.length, settings.precision, scene.cursor.location = 4.0, 0.1, (-2, -1, 0)
     before = dragging.state(posed_camera)
-    hand = Hand(posed_camera, scene)
-    draw_the_edges(hand, photo)
+    hand = hand_with_edges(posed_camera, scene, photo)
     bpy.context.view_layer.update()
     pinhole = cameras.read(posed_camera, scene)
     np.testing.assert_allclose(pinhole.principal_point, photo.principal_point, atol=1e-3)
@@ -154,8 +152,7 @@ def test_escape_brings_all_back_to_the_bit(posed_camera, scene, settings, enable
     posed_camera.location.x += 0.125  # not where its values are
     bpy.context.view_layer.update()
     before = dragging.state(posed_camera)
-    hand = Hand(posed_camera, scene)
-    draw_the_edges(hand)
+    hand = hand_with_edges(posed_camera, scene)
     assert dragging.state(posed_camera) != before
     assert hand.event("ESC") == {"CANCELLED"}
     assert dragging.state(posed_camera) == before
@@ -257,8 +254,7 @@ def test_a_camera_that_follows_an_object_is_refused(posed_camera, empty, setting
 
 
 def test_turning_the_add_on_off_while_it_goes_on_brings_the_camera_back(posed_camera, scene, settings, registered_addon):
-    hand = Hand(posed_camera, scene)
-    draw_the_edges(hand)
+    hand = hand_with_edges(posed_camera, scene)
     before = hand.operator.before["location"]
     photo_matching._drawn = hand.operator
     registered_addon.unregister()

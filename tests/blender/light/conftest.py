@@ -8,6 +8,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon.comparison import radiance
+from viewcam_addon.image import Image
 from viewcam_addon.tracer import render
 from viewcam_addon.tracer.scene import Scene
 
@@ -25,6 +27,16 @@ class Sides:
     exported: Scene
     traced: dict
     cycles: list
+
+    def compared(self, samples, traced=None):
+        """The comparison of their light, each of Cycles' pictures of so many samples and the tracer's of all of them.
+
+        traced : passes to compare with in place of these.
+        """
+        attributes = {"samples": str(samples * len(self.cycles)), "albedo tables": "yes"}
+        reference = Image(self.traced if traced is None else traced, self.exported.camera, attributes)
+        tests = [Image(passes, self.exported.camera) for passes in self.cycles]
+        return radiance.compare(reference, tests, self.exported.camera, samples)
 
 
 @pytest.fixture

@@ -305,13 +305,11 @@ def test_a_lamp_without_multiple_importance_is_met_by_no_ray_and_lights_what_is_
     (sides,) = pictures(samples=64, count=4, scenes=1, level="path")
     assert [lamp.multiple_importance for lamp in sides.exported.lamps] == [False]
     assert not [entry for entry in sides.exported.ledger if entry.status != "exported"]
-    reference = Image(sides.traced, sides.exported.camera, {"samples": "256", "albedo tables": "yes"})
-    tests = [Image(passes, sides.exported.camera) for passes in sides.cycles]
-    comparison = radiance.compare(reference, tests, sides.exported.camera, 64)
+    comparison = sides.compared(64)
     assert comparison.passed, comparison.sentence
     other = replace(sides.exported, lamps=tuple(replace(lamp, multiple_importance=True) for lamp in sides.exported.lamps))
-    wrong = replace(reference, passes=render.render(other, "path", 256, threads=2))
-    assert not radiance.compare(wrong, tests, sides.exported.camera, 64).passed, "and with it, it would differ"
+    wrong = render.render(other, "path", 256, threads=2)
+    assert not sides.compared(64, wrong).passed, "and with it, it would differ"
 
 
 @pytest.mark.parametrize("backwards", [False, True])

@@ -12,8 +12,6 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import linking
-from viewcam_addon.comparison import radiance
-from viewcam_addon.image import Image
 from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.render import render
 
@@ -206,12 +204,10 @@ def test_near_by_samples_of_light_and_scattered_rays_make_the_same_as_in_cycles(
         painted("ShaderNodeBsdfTransparent", {"Color": (0.7, 0.5, 0.9, 1)})
     )
     (sides,) = pictures(samples=64, count=4, scenes=1, level="path")
-    reference = Image(sides.traced, sides.exported.camera, {"samples": "256", "albedo tables": "yes"})
-    tests = [Image(passes, sides.exported.camera) for passes in sides.cycles]
-    comparison = radiance.compare(reference, tests, sides.exported.camera, 64)
+    comparison = sides.compared(64)
     assert comparison.passed, comparison.sentence
-    wrong = replace(reference, passes=render(unlinked(sides.exported), "path", 256, threads=2))
-    assert not radiance.compare(wrong, tests, sides.exported.camera, 64).passed, "and without links, it would differ"
+    wrong = render(unlinked(sides.exported), "path", 256, threads=2)
+    assert not sides.compared(64, wrong).passed, "and without links, it would differ"
 
 
 @pytest.mark.slow
@@ -223,13 +219,10 @@ def test_scattered_rays_find_a_lamp_past_what_is_no_blocker_as_in_cycles(picture
         bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": roughness})
     link(lamp, blocker_collection={"Monkey": "EXCLUDE"})
     (sides,) = pictures(samples=64, count=4, scenes=1, level="path")
-    reference = Image(sides.traced, sides.exported.camera, {"samples": "256", "albedo tables": "yes"})
-    tests = [Image(passes, sides.exported.camera) for passes in sides.cycles]
-    comparison = radiance.compare(reference, tests, sides.exported.camera, 64)
+    comparison = sides.compared(64)
     assert comparison.passed and not reasons(sides.exported), comparison.sentence
     other = replace(sides.exported, lamps=tuple(replace(each, blockers=None) for each in sides.exported.lamps))
-    wrong = replace(reference, passes=render(other, "path", 256, threads=2))
-    assert not radiance.compare(wrong, tests, sides.exported.camera, 64).passed
+    assert not sides.compared(64, render(other, "path", 256, threads=2)).passed
 
 
 def test_only_surfaces_that_shine_are_linked(stage, panel, link):
