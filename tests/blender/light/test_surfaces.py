@@ -353,7 +353,7 @@ def test_a_surface_that_shines_beside_a_displacement_lights_a_floor_as_in_cycles
 
 
 def test_what_is_simulated_is_built_anew_for_each_picture(pictures, monkeypatch):
-    """Of what is kept of a file's particles Blender makes other ones: a check had 4 % more of their color."""
+    """Particles that are kept turn into others: a check had 4 % more of their color."""
     kept, render = [], stages.cycles.render
     monkeypatch.setattr(stages.cycles, "render", lambda *arguments: (kept.append(arguments[7]), render(*arguments)))
     pictures(scenes=1, samples=2, count=2)

@@ -84,7 +84,7 @@ class Stage:
         """
         camera = self.camera if self.is_chosen or self.file_ledger else None
         share = max((job.samples or SAMPLES) // len(paths), 1)
-        # What particles were, Blender makes of what it has kept of them another thing.
+        # Particles are others in the evaluated scene that Blender keeps.
         kept = keep and not self.file_ledger and not persistent_data.is_simulated()
         with overridden() as lasting:
             for number, path in enumerate([*paths, *([everything] if everything is not None else [])]):
