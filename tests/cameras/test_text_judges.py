@@ -577,6 +577,12 @@ def test_code_that_says_no_eye_or_target_is_not_completed_by_another_camera(text
         cameras.read(text, options=Options(base=CAMERAS["plain"]))
 
 
+def test_code_may_spell_its_target_as_british_people_do():
+    text = "camera.position = (7, -6, 4); camera.{} = (0, 0, 1); camera.up = (0, 0, 1); camera.vfov = 40;"
+    american, british = (cameras.read(text.format(name), options=GL)[0] for name in ("center", "centre"))
+    assert american.pinhole.look_at == british.pinhole.look_at == (0, 0, 1)
+
+
 def test_what_of_code_is_another_cameras_is_said():
     text = "gluLookAt(7, -6, 4, 0, 0, 1, 0, 0, 1);"
     (camera,) = cameras.read(text, options=Options(base=CAMERAS["pixels_not_square"]))
