@@ -339,10 +339,12 @@ def test_a_muted_node_or_reroute_that_nothing_feeds_is_what_it_is_in_cycles(pict
     assert differs == (what != "reroute")
 
 
-def test_a_surface_that_shines_beside_a_displacement_lights_a_floor_as_in_cycles(pictures, floor, make_material):
+@pytest.mark.parametrize("gloss", [0.0, 0.5])
+def test_a_surface_that_shines_beside_a_displacement_lights_a_floor_as_in_cycles(pictures, floor, make_material, gloss):
     """In 5.2 Cycles would light it by a third of that: there it is shown without the displacement, and the ledger tells."""
     bpy.data.objects.remove(next(block for block in bpy.data.objects if block.type == "LIGHT"))
     glow = make_material("Glow", "ShaderNodeBsdfPrincipled", Emission_Color=(1, 1, 1, 1), Emission_Strength=2.0)
+    glow.node_tree.nodes["Shader"].inputs["Specular IOR Level"].default_value = gloss
     raised = glow.node_tree.nodes.new("ShaderNodeDisplacement")
     glow.node_tree.links.new(raised.outputs[0], glow.node_tree.get_output_node("CYCLES").inputs["Displacement"])
     bpy.data.objects["Monkey"].data.materials[0] = glow

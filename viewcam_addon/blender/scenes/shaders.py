@@ -126,7 +126,7 @@ def read(material: bpy.types.Material) -> Reading:
 
 def _displaced(reading: Reading, material: bpy.types.Material, output: bpy.types.Node, shines: bool) -> Reading:
     """A reading with what its displacement does to the normals, where that is all that it does."""
-    if shines and _loses_light(reading.material) and isinstance(nodes.source(Input(output.inputs["Displacement"])), Output):
+    if shines and versions.LOSES_LIGHT_OF_BUMPED and _loses_light(output):
         reading.reasons.append("gives off light beside a displacement, where Cycles loses most of it")
     elif is_only_bumped(material):
         reader = Tree(PLAIN_COLOR, shines)
@@ -135,9 +135,11 @@ def _displaced(reading: Reading, material: bpy.types.Material, output: bpy.types
     return reading
 
 
-def _loses_light(material: Material) -> bool:
-    """True if Cycles samples no light of a material where a displacement bumps it."""
-    return versions.LOSES_LIGHT_OF_BUMPED and any(each.node.type == "principled" for each in material.closures)
+def _loses_light(output: bpy.types.Node) -> bool:
+    """True if a Principled BSDF and a displacement feed a material's output."""
+    surface, displacement = (Input(output.inputs[name]) for name in ("Surface", "Displacement"))
+    has_principled = any(each.node.type == "BSDF_PRINCIPLED" for each in nodes.feeding(surface))
+    return has_principled and isinstance(nodes.source(displacement), Output)
 
 
 def is_only_bumped(material: bpy.types.Material) -> bool:
