@@ -30,11 +30,15 @@ _KINDS = {"ORTHO": "orthographic", "PANO": "panoramic", "CUSTOM": "a custom came
 
 def check_perspective(camera_object: bpy.types.Object) -> None:
     """Raise InputError, by name, if the object is no perspective camera."""
+    if camera_object.type != "CAMERA" or camera_object.data.type != "PERSP":
+        raise _no_perspective(camera_object)
+
+
+def _no_perspective(camera_object: bpy.types.Object) -> InputError:
     if camera_object.type != "CAMERA":
-        raise InputError(f"object {camera_object.name!r} is no camera: choose a camera")
-    if (kind := camera_object.data.type) != "PERSP":
-        kind = _KINDS.get(kind, kind)
-        raise InputError(f"camera {camera_object.name!r} is {kind}, no pinhole: set its lens type to Perspective")
+        return InputError(f"object {camera_object.name!r} is no camera: choose a camera")
+    kind = _KINDS.get(camera_object.data.type, camera_object.data.type)
+    return InputError(f"camera {camera_object.name!r} is {kind}, no pinhole: set its lens type to Perspective")
 
 
 _VALUES, _OWN = "virtual_pinhole", "virtual_pinhole."
@@ -120,7 +124,8 @@ def camera_data_of(camera_object: bpy.types.Object) -> intrinsics.CameraData:
 
     Raises InputError if the object is no perspective camera, or if a script has stored what is no number of a camera.
     """
-    check_perspective(camera_object)
+    if camera_object.type != "CAMERA" or camera_object.data.type != "PERSP":
+        raise _no_perspective(camera_object)
     camera = camera_object.data
     try:
         return _known_camera(
