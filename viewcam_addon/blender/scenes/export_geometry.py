@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...tracer.scene import Mesh, Spheres
 from ...tracer.scene.value_nodes import VERTEX_COLOR
 from .. import versions
-from . import cycles_attributes
+from . import cycles_attributes, images
 
 # Type of an attribute → the field that has its values, and how many they are.
 _ATTRIBUTES = {
@@ -190,13 +190,18 @@ def _corner_values(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: A
     attribute = mesh.attributes.get(name)
     if attribute is None or attribute.data_type not in _ATTRIBUTES:
         return None
-    field, width = _ATTRIBUTES[attribute.data_type]
-    dtype = {"BOOLEAN": np.bool_, "INT": np.int32, "INT8": np.int32}.get(attribute.data_type, np.float32)
-    values = read(attribute.data, field, dtype, width).astype(np.float32).reshape(-1, width)
     if attribute.domain == "EDGE":
         return _at_points(mesh, attribute)[triangles]
     at = {"POINT": triangles, "CORNER": corners, "FACE": np.repeat(faces[:, np.newaxis], 3, axis=1)}.get(attribute.domain)
-    return None if at is None else np.ascontiguousarray(values[at])
+    if at is None:
+        return None
+    return np.ascontiguousarray(_stored(attribute, *_ATTRIBUTES[attribute.data_type]).astype(np.float32)[at])
+
+
+def _stored(attribute: bpy.types.Attribute, field: str, width: int) -> Array:
+    """(n, width): the numbers of a field of an attribute's elements."""
+    dtype = {"BOOLEAN": np.bool_, "INT": np.int32, "INT8": np.int32}.get(attribute.data_type, np.float32)
+    return read(attribute.data, field, dtype, width).reshape(-1, width)
 
 
 def _at_points(mesh: bpy.types.Mesh, attribute: bpy.types.Attribute) -> Array:
@@ -207,8 +212,7 @@ def _at_points(mesh: bpy.types.Mesh, attribute: bpy.types.Attribute) -> Array:
     """
     kind = attribute.data_type
     field, width = ("color_srgb", 4) if kind == "BYTE_COLOR" else _ATTRIBUTES[kind]
-    dtype = {"BOOLEAN": np.bool_, "INT": np.int32, "INT8": np.int32}.get(kind, np.float32)
-    values = read(attribute.data, field, dtype, width).astype(np.float64).reshape(-1, width)
+    values = _stored(attribute, field, width).astype(np.float64)
     ends = read(mesh.edges, "vertices", np.int32, 2)
     counts = np.bincount(ends.ravel(), minlength=len(mesh.vertices))[:, np.newaxis]
     sums = np.column_stack([np.bincount(ends.ravel(), np.repeat(column, 2), len(mesh.vertices)) for column in values.T])
@@ -219,8 +223,7 @@ def _at_points(mesh: bpy.types.Mesh, attribute: bpy.types.Attribute) -> Array:
         means = np.copysign(np.floor(np.abs(means) + 0.5), means)
     elif kind == "BYTE_COLOR":
         encoded = np.floor(np.rint(sums * 255) / np.maximum(counts, 1)) / 255
-        means = np.where(encoded < 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-        means[:, 3] = encoded[:, 3]
+        means = np.column_stack([images.linear(encoded[:, :3]), encoded[:, 3]])
     return means.astype(np.float32)
 
 

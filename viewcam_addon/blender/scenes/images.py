@@ -4,6 +4,7 @@ ImageMetaData::detect_colorspace): bytes and sRGB files stay encoded, and are de
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...tracer.scene.materials import Picture
 from .. import versions
@@ -133,12 +134,17 @@ def _new_image(overrides: Overrides, picture: Picture, name: str, packed: bool) 
     return image
 
 
+def linear(encoded: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The linear values of what sRGB encodes."""
+    return np.where(encoded < 0.04045, encoded / 12.92, ((np.maximum(encoded, 0) + 0.055) / 1.055) ** 2.4)
+
+
 def mean(image: bpy.types.Image) -> tuple[float, float, float]:
     """The mean color, linear, of an image without an obstacle that is wrapped around the world (equirectangular)."""
     picture = picture_of(image)
     pixels = picture.values.astype(np.float64)
     if picture.srgb:
-        pixels = np.where(pixels < 0.04045, pixels / 12.92, ((np.maximum(pixels, 0) + 0.055) / 1.055) ** 2.4)
+        pixels = linear(pixels)
     height = len(pixels)
     weights = np.sin((np.arange(height) + 0.5) * np.pi / height)
     return tuple(np.average(pixels.mean(axis=1), axis=0, weights=weights).tolist())
