@@ -264,6 +264,7 @@ def attach(block, kind, output, to="Strength"):
 APPROXIMATED = {
     "nodes": (lambda block: attach(block, "ObjectInfo", "Random"), "'Object Info' that says the Random of a light"),
     "spread": (lambda block: setattr(block.data, "spread", 0.0), "spread"),
+    "beam": (lambda block: setattr(block.data, "spread", math.radians(0.5)), "spread of 0.5°, 180° on both sides"),
     "bounces": (lambda block: setattr(block.data.cycles, "max_bounces", 1), "bounces are limited"),
     "shadows": (lambda block: setattr(block.data, "use_shadow", False), "casts no shadow"),
 }
