@@ -118,7 +118,7 @@ def test_a_difference_in_one_byte_would_be_seen(stand_in, machines, blend, tmp_p
 def test_what_is_killed_in_the_midst_of_a_shot_loses_nothing(stand_in, machines, blend, tmp_path, processes, victim):
     listed = shots("a", "slow_one", "b", "c", "d", "e")
     ear, outcome = Ear(), []
-    batch = threading.Thread(target=lambda: outcome.append(run_on(machines, blend, tmp_path / "out", listed, ear)))
+    batch = threading.Thread(target=lambda: outcome.append(run_on(machines, blend, tmp_path / "out", listed, ear)), daemon=True)
     batch.start()
     assert processes.until(lambda: stand_in.diary("waits")), "the shot was never begun"
     blender = int(stand_in.diary("waits")[0][-1])
@@ -141,7 +141,9 @@ def test_a_worker_that_is_stopped_holds_no_batch_up_with_a_time_limit_or_without
     listed, folder, ear, outcome = shots("a", "slow_one", "b", "c"), Folder(tmp_path / "out"), Ear(), []
     with cluster.opened(None, 2) as machines:
         work = machines.work(blend, folder, settings_of(listed), MADE_FROM, time_limit=40.0)
-        batch = threading.Thread(target=lambda: outcome.append(run.run(listed, folder, settings_of(listed), work, ear)))
+        batch = threading.Thread(
+            target=lambda: outcome.append(run.run(listed, folder, settings_of(listed), work, ear)), daemon=True
+        )
         batch.start()
         assert processes.until(lambda: stand_in.diary("waits")), "the shot was never begun"
         blender = int(stand_in.diary("waits")[0][-1])
@@ -357,7 +359,7 @@ def test_a_scheduler_that_dies_ends_the_batch_with_what_is_left(farm, stand_in, 
         kill_scheduler()
 
     monkeypatch.setattr(cluster._Flight, "_outcome", outcome_of)
-    killer = threading.Thread(target=kill)
+    killer = threading.Thread(target=kill, daemon=True)
     with cluster.opened(address, None) as machines:
         killer.start()
         summary = run_on(machines, blend, tmp_path / "out", shots("a", "slow_one", "b", "c", "d", "e"), ear)
