@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 
+dask = pytest.importorskip("dask")
 pytest.importorskip("distributed")
 
 from viewcam_addon import child_process, cli
@@ -154,6 +155,21 @@ def test_a_worker_that_is_stopped_holds_no_batch_up_with_a_time_limit_or_without
             os.kill(worker, signal.SIGKILL)
     assert outcome and outcome[0].counts["done"] == 4 and not ear.all("shot_failed"), ear.events
     assert len({words[-1] for words in stand_in.diary("render") if words[1] == "slow_one"}) == 2
+
+
+@pytest.mark.exhaustive
+def test_a_worker_that_takes_long_to_start_again_is_not_given_up(stand_in):
+    """Dask takes a worker away for good that is not there again in time, 15 s by default, which a busy machine may need."""
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "1 ms"}), cluster.opened(None, 1) as machines:
+        machines._client.wait_for_workers(1, timeout=60)
+        (worker,) = machines._client.run(os.getpid).values()
+        time.sleep(0.5)  # Dask starts none anew that ends while it begins
+        os.kill(worker, signal.SIGKILL)
+        ends, others = time.monotonic() + 60, {worker}
+        while others <= {worker} and time.monotonic() < ends:
+            time.sleep(0.1)
+            others = set(machines._client.run(os.getpid, on_error="ignore").values())
+    assert others - {worker}, "no other worker came in its place"
 
 
 def test_a_shot_that_always_crashes_blender_fails_and_the_rest_go_on(stand_in, machines, blend, tmp_path):
