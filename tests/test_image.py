@@ -94,6 +94,26 @@ def test_of_two_view_layers_the_first_is_read(tmp_path):
     assert image.read(tmp_path / "a.exr")["Depth"] == 1
 
 
+def test_channels_of_one_name_in_several_parts_are_told_apart_by_the_parts(tmp_path):
+    """The last part of a picture for each eye was read, whatever was asked for."""
+    for names in (("Z",), ("ViewLayer.Depth.Z",)):
+        parts = [
+            OpenEXR.Part({}, {name: np.full((1, 1), depth, np.float32) for name in names}, eye)
+            for eye, depth in (("left", 1), ("right", 2))
+        ]
+        OpenEXR.File(parts).write(str(tmp_path / f"{names[0]}.exr"))
+    with pytest.raises(InputError, match=r"several channels 'Z': name one of left\.Z, right\.Z"):
+        image.read_channels(tmp_path / "Z.exr", {"Depth": ["Z"]})
+    assert image.read_channels(tmp_path / "Z.exr", {"Depth": ["left.Z"]})["Depth"] == 1
+    assert image.read(tmp_path / "ViewLayer.Depth.Z.exr")["Depth"] == 1
+
+
+def test_what_a_file_holds_in_place_of_known_passes_is_said(tmp_path):
+    OpenEXR.File({}, {name: np.zeros((1, 1), np.float32) for name in "RGB"}).write(str(tmp_path / "a.exr"))
+    with pytest.raises(InputError, match="but the channels B, G, R: render a multilayer EXR"):
+        image.read(tmp_path / "a.exr")
+
+
 def test_only_the_passes_asked_for_are_kept(tmp_path):
     image.write(tmp_path / "a.exr", Image(numbered()))
     assert set(image.read(tmp_path / "a.exr", only=["Depth", "UV"]).passes) == {"Depth", "UV"}

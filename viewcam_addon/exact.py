@@ -102,10 +102,10 @@ def cross(a: Vector, b_high: Vector, b_low: Vector) -> tuple[Vector, Vector, boo
     zeros = [not x if isinstance(x, float) else not x.any() for x in a]
     if zeros.count(True) == 2:
         i = zeros.index(False)
-        if (
-            abs(a[i]) == 0.5 if isinstance(a[i], float) else (np.abs(a[i]) == 0.5).all()
-        ):  # as of an up that is an axis: no product rounds
-            return _along_axis(i, a[i], b_high), _along_axis(i, a[i], b_low), True
+        size = a[i]
+        # As of an up that is an axis: no product rounds.
+        if abs(size) == 0.5 if isinstance(size, float) else (np.abs(size) == 0.5).all():
+            return _along_axis(i, size, b_high), _along_axis(i, size, b_low), True
     if not isinstance(a[0], float):
         high, low, settled = sum_terms(_cross_terms(a, b_high, b_low, _NEXT, _AFTER_NEXT))
         return high, low, settled.all(0)

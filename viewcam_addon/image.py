@@ -22,7 +22,7 @@ import dataclasses
 import json
 import math
 import os
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import machine
-from .errors import InputError
+from .errors import InputError, several
 from .files import written_whole
 from .pinhole import Pinhole, ViewPlane
 from .terminal import silent_libraries
@@ -123,12 +123,14 @@ class Image:
     passes : name → (height, width, channels) float32, rows from the bottom.
     camera : the camera of the picture, or None where the file does not tell.
     attributes : further text attributes of the file.
+    halves : the passes that the file holds in half floats, of 11 bits.
     """
 
     passes: dict[str, NDArray[np.float32]]
     camera: Pinhole | None = None
     attributes: dict[str, str] = field(default_factory=dict)
     source: str = "the image"
+    halves: frozenset[str] = frozenset()
 
     @property
     def size(self) -> tuple[int, int]:
@@ -154,11 +156,14 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
     a part of a picture only, another size than its camera's, or more than there is memory for.
     """
     pixels, camera, attributes = _pixels(Path(path))
-    passes = {name: _stacked(channels) for name, channels in _passes(pixels).items() if only is None or name in only}
-    if not passes:
-        wanted = ", ".join(only or CHANNELS)
-        raise InputError(f"{path} holds none of the passes {wanted}: render a multilayer EXR with them")
-    return Image(passes, camera, attributes, str(path))
+    channels = {name: each for name, each in _passes(pixels).items() if only is None or name in only}
+    if not channels:
+        wanted = ", ".join(only or (*LIGHT_PASSES, *GEOMETRY_PASSES))
+        raise InputError(
+            f"{path} holds none of the passes {wanted} but the channels {several(list(pixels))}: render a multilayer EXR "
+            "with them"
+        )
+    return _image(channels, camera, attributes, path)
 
 
 def read_channels(path: str | os.PathLike[str], named: Mapping[str, Sequence[str]]) -> Image:
@@ -178,14 +183,25 @@ def read_channels(path: str | os.PathLike[str], named: Mapping[str, Sequence[str
             raise InputError(f"{path} has several channels {wanted!r}: name one of {', '.join(names)}")
         raise InputError(f"{path} has no channel {wanted!r}: name some of {', '.join(pixels)}")
 
-    passes = {name: _stacked([channel(wanted) for wanted in channels]) for name, channels in named.items()}
-    return Image(passes, camera, attributes, str(path))
+    channels = {name: [channel(wanted) for wanted in channels] for name, channels in named.items()}
+    return _image(channels, camera, attributes, path)
 
 
 def text_attribute(path: str | os.PathLike[str], name: str) -> str:
     """A text attribute of a file, "" where it has none; without a pixel being read. Raises as `read` does of a header."""
     value = _headers(Path(path))[0].get(name)
     return value if isinstance(value, str) else ""
+
+
+def _image(
+    channels: Mapping[str, Sequence[NDArray[Any]]],
+    camera: Pinhole | None,
+    attributes: dict[str, str],
+    path: str | os.PathLike[str],
+) -> Image:
+    passes = {name: _stacked(each) for name, each in channels.items()}
+    halves = frozenset(name for name, each in channels.items() if any(channel.dtype == np.float16 for channel in each))
+    return Image(passes, camera, attributes, str(path), halves)
 
 
 def _stacked(channels: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
@@ -214,7 +230,13 @@ def _pixels(path: Path) -> tuple[dict[str, NDArray[Any]], Pinhole | None, dict[s
         raise _unreadable(path, error) from error
     if len(parts) < len(headers):  # a part whose pixels fail is left out
         raise InputError(f"{path} is cut short or damaged, its pixels can't be read: render it again")
-    channels = {name: channel.pixels for part in parts for name, channel in part.channels.items()}
+    named = Counter(name for part in parts for name in part.channels)
+    # The names of channels that several parts have, as one for each eye, begin with the part's.
+    channels = {
+        name if named[name] == 1 else f"{part.name()}.{name}": channel.pixels
+        for part in parts
+        for name, channel in part.channels.items()
+    }
     attributes = {
         key: value for key, value in headers[0].items() if isinstance(value, str) and key not in (_CAMERA_ATTRIBUTE, "name")
     }

@@ -848,3 +848,150 @@ def test_cameras_that_their_file_does_not_name_are_called_so_that_colmap_can_nam
         read_cameras = cameras.read(source, options=dataclasses.replace(VGA, without_distortion=True))
         cameras.save(read_cameras, tmp_path / "model", "colmap")
         assert [camera.name for camera in cameras.read(tmp_path / "model")] == [camera.name for camera in read_cameras]
+
+
+def refusal(text):
+    """The sentence of what is refused."""
+    with pytest.raises(InputError) as error:
+        cameras.read(text, options=GIVEN)
+    assert error.value.__cause__ is None, error.value.__cause__
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    "pose", [{"rotation": [0.3, -0.7, 1.1, "ZYX"]}, {"quaternion": [0.2, -0.4, 0.4, 0.8]}, {"rotation": [0.3, -0.7, 1.1]}]
+)
+def test_three_js_objects_without_a_matrix_stand_by_their_position_and_rotation(pose):
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    lens = {"type": "PerspectiveCamera", "fov": 50, "aspect": 640 / 360}
+    group = {"type": "Group", "position": [4, 5, 6], "scale": [2, 2, 2]}
+    (camera,) = cameras.read(
+        json.dumps({"object": group | {"children": [lens | pose | {"position": [1, 2, 3]}]}}), options=GIVEN
+    )
+    if "quaternion" in pose:
+        turn = rotation.from_quat(pose["quaternion"])
+    else:  # three.js' orders turn about the axes of what turns
+        *angles, order = [*pose["rotation"], "XYZ"][:4]
+        turn = rotation.from_euler(order, [angles["XYZ".index(axis)] for axis in order])
+    assert camera.pinhole.eye == pytest.approx((6, 9, 12))
+    assert np.column_stack(camera.pinhole.basis()) == pytest.approx(turn.as_matrix(), abs=1e-14)
+    assert "rotation of" in refusal(json.dumps({"object": lens | {"rotation": [0, 1, 0, "XXX"]}}))
+
+
+@pytest.mark.parametrize("suffix", ["gltf", "json"])
+def test_json_that_is_damaged_is_no_code_of_mitsubas(tmp_path, suffix):
+    """A glTF with a comma in a number was read as a camera at the origin."""
+    path = tmp_path / f"a.{suffix}"
+    path.write_text(cameras.write([Camera("a", CAMERAS["plain"])], "gltf").replace('"yfov": 0.', '"yfov": 0,'))
+    assert "is none (line" in refusal(path)
+
+
+def chain(*kinds):
+    """Kalibr's, each camera 0.1 to the right of the one before; the names sorted as its writer of YAML does."""
+    k = {"pinhole": [500, 500, 320, 240], "omni": [1.5, 500, 500, 320, 240], "eucm": [0.5, 1, 500, 500, 320, 240]}
+    beside = "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
+    blocks = {
+        f"cam{i}": (beside if i else "")
+        + f"  camera_model: {kind}\n  intrinsics: {k[kind]}\n  distortion_coeffs: [0, 0, 0, 0]\n"
+        "  distortion_model: radtan\n  resolution: [640, 480]\n"
+        for i, kind in enumerate(kinds)
+    }
+    return "".join(f"{name}:\n{blocks[name]}" for name in sorted(blocks))
+
+
+def test_kalibrs_cameras_stand_behind_one_of_another_model_and_in_the_order_of_their_numbers():
+    """The place of a camera with five intrinsics was left out of the chain, and cam2 stood behind cam10."""
+    read = cameras.read(chain("pinhole", "omni", "pinhole", "eucm", *["pinhole"] * 8))
+    places = {camera.name: camera.pinhole.eye[0] for camera in read}
+    assert places == pytest.approx({f"cam{i}": 0.1 * i for i in range(12) if i not in (1, 3)})
+    first, second = (note for note in read[0].notes if note.startswith("Left out"))
+    assert "'cam1'" in first and "omni" in first and "'cam3'" in second and "eucm" in second
+
+
+@pytest.mark.parametrize("rows", [1, 2, 4])
+@pytest.mark.parametrize("suffix", ["yml", "xml", "json"])
+def test_opencvs_table_of_extrinsic_parameters_is_a_camera_a_row(tmp_path, suffix, rows):
+    """The program that OpenCV's documentation calibrates with writes it; projectPoints is the judge."""
+    cv2 = pytest.importorskip("cv2")
+    path, chance = tmp_path / f"a.{suffix}", np.random.default_rng(rows)
+    k, table = np.array([[500.0, 0, 310], [0, 510, 170], [0, 0, 1]]), chance.normal(size=(rows, 6))
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    storage.write("image_width", 640)
+    storage.write("image_height", 360)
+    storage.write("camera_matrix", k)
+    storage.write("extrinsic_parameters", table)
+    storage.release()
+    read = cameras.read(path)
+    assert len(read) == rows
+    for camera, row in zip(read, table, strict=True):
+        points = (chance.normal((0, 0, 6), size=(5, 3)) - row[3:]) @ cv2.Rodrigues(row[:3])[0]
+        theirs = cv2.projectPoints(points, row[:3], row[3:], k, None)[0][:, 0] + 0.5
+        column, from_bottom, _ = camera.pinhole.project(points)
+        assert np.abs(np.column_stack([column, 360 - from_bottom]) - theirs).max() < 1e-10
+
+
+def test_a_distortion_of_an_unknown_model_is_named_and_not_taken_for_opencvs():
+    k = {"K": [[500, 0, 320], [0, 500, 180], [0, 0, 1]], "image_size": [640, 360], "distortion_coeffs": [0.1, 0, 0, 0]}
+    assert "unknown distortion model 'scaramuzza'" in refusal(json.dumps(k | {"distortion_model": "scaramuzza"}))
+    ros = files.ros("calibration", (640, 360), (1, 1), (0, 0, 0, 0)).replace("plumb_bob", "scaramuzza")
+    assert "unknown distortion model 'scaramuzza'" in refusal(ros)
+    fisheye = (
+        ros.replace("scaramuzza", "equidistant") + "distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0.1]}\n"
+    )
+    assert "a fisheye has four" in refusal(fisheye)
+
+
+def test_terms_of_a_lens_that_are_not_read_are_not_passed_over():
+    assert "p3 and p4" in refusal(files.metashape(KNOWN, "<p1>0.001</p1><p4>0.5</p4>"))
+    assert "k1 of sensor" in refusal(files.metashape(KNOWN, "<k1>0,1</k1>"))
+    (camera,) = cameras.read(files.metashape(KNOWN, "<p4>0.5</p4>"))
+    assert camera.lens is None, "it is a factor of p1 and p2, which are 0"
+    sfm = files.meshroom(KNOWN)
+    sfm["intrinsics"][0] |= {"undistortionType": "3deradial4", "undistortionParams": ["0.1", "0"]}
+    assert "unknown model '3deradial4'" in refusal(json.dumps(sfm))
+    sfm["intrinsics"][0]["undistortionParams"] = ""
+    files.the_same(cameras.read(json.dumps(sfm)), KNOWN)
+
+
+def test_a_lens_of_realitycapture_is_one_that_it_has(tmp_path):
+    for model in ("perspective", "brown4t2", "division", "equirectangular"):
+        (tmp_path / f"{model}.xmp").write_text(
+            f'<x xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#" xcr:FocalLength35mm="30"'
+            f' xcr:DistortionModel="{model}">'
+            "<xcr:Rotation>1 0 0 0 1 0 0 0 1</xcr:Rotation><xcr:Position>1 2 3</xcr:Position></x>"
+        )
+    read = cameras.read(tmp_path, options=GIVEN)
+    assert {camera.name for camera in read} == {"perspective", "brown4t2", "division"}
+    assert any("'equirectangular'" in note for note in read[0].notes)
+
+
+def test_intrinsics_in_widths_are_refused_in_a_transforms_json_too():
+    lens = {"fl_x": 0.9, "fl_y": 1.2, "cx": 0.5, "cy": 0.5, "w": 640, "h": 480}
+    frames = [{"file_path": "a.png", "transform_matrix": np.eye(4).tolist()}]
+    assert "widths of the picture" in refusal(json.dumps(lens | {"frames": frames}))
+
+
+def test_a_principal_point_outside_of_a_picture_whose_size_is_said_is_told():
+    """A calibration of another size than the pictures'."""
+    k = {"K": [[500, 0, 960], [0, 500, 540], [0, 0, 1]], "image_size": [640, 360]}
+    (camera,) = cameras.read(json.dumps(k))
+    assert any("lies outside of a picture of 640 × 360 pixels" in note for note in camera.notes)
+
+
+def test_a_colmap_model_whose_lines_are_one_short_or_one_too_many_is_refused(tmp_path):
+    camera, pose = "1 PINHOLE 640 360 500 500 320 180\n", " 1 0 0 0 1 2 3 1 "
+    for cameras_of_model, images, sentence in (
+        (camera, f"1{pose}a 1 b.jpg\n2{pose}a 2 b.jpg\n3{pose}a 3 b.jpg\n", "no list of image points"),
+        (camera + camera, f"1{pose}a.jpg\n\n", "another camera 1"),
+    ):
+        (tmp_path / "cameras.txt").write_text(cameras_of_model)
+        (tmp_path / "images.txt").write_text(images)
+        assert sentence in refusal(tmp_path)
+
+
+def test_a_table_is_read_with_blanks_at_its_end_and_middleburys_without_a_line_end():
+    row = "a.jpg,1,2,3,0,0,0,36,0,0\n"
+    (camera,) = cameras.read(f"#name,x,y,alt,heading,pitch,roll,f,px,py\n{row}   \n", options=GIVEN)
+    assert camera.pinhole.eye == (1, 2, 3)
+    (camera,) = cameras.read("1\na.png 500 0 320 0 500 180 0 0 1 1 0 0 0 1 0 0 0 1 0 0 0", options=GIVEN)
+    assert camera.pinhole.distance == (500, 500)

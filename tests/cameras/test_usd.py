@@ -250,3 +250,17 @@ def test_where_openusd_is_not_here_a_sentence_says_what_to_do(monkeypatch):
     monkeypatch.setattr(usd_stage.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(InputError, match="pip install usd-core"):
         read(stage())
+
+
+@pytest.mark.usefixtures("openusd_in_this_process")
+def test_cameras_of_one_name_in_different_places_are_told_apart():
+    camera = 'def Camera "Cam" {}\n'
+    first, second = read(f'#usda 1.0\ndef "A"\n{{\n{camera}}}\ndef "B"\n{{\n{camera}}}\n')
+    assert first.name != second.name
+
+
+def test_a_mark_of_the_byte_order_before_a_stage_is_said_by_openusd(tmp_path):
+    path = tmp_path / "a.usda"
+    path.write_text("\ufeff#usda 1.0\n", encoding="utf-8")
+    with pytest.raises(InputError, match="no stage that USD can open"):
+        cameras.read(path)

@@ -12,6 +12,7 @@ from viewcam_addon.image import Image
 pytestmark = pytest.mark.slow
 
 SUN = np.array([0.4, -0.5, 0.75]) / np.linalg.norm([0.4, -0.5, 0.75])
+LIGHT = ("Combined", "Diffuse Direct", "Diffuse Color")
 COLORS = np.array([(0.0, 0.0, 0.0), (0.6, 0.6, 0.5), (0.8, 0.3, 0.2), (0.2, 0.6, 0.7), (0.5, 0.4, 0.8)])
 
 
@@ -185,3 +186,27 @@ def test_surfaces_that_shine_may_lose_a_thousandth_of_their_light_and_no_color(p
     assert not compare(reference, [test], paper_scene.pinhole).passed, "without such a surface"
     reference = replace(reference, attributes={**reference.attributes, "shining surfaces": "yes"})
     assert compare(reference, [test], paper_scene.pinhole).passed == passed
+
+
+def test_light_in_half_floats_is_the_same_and_a_thousandth_brighter_is_not(paper_scene):
+    """Blender writes light of a multilayer EXR so unless it is asked for 32 bits; it was called different."""
+
+    def stored(brighter=1.0):
+        passes = rendered(paper_scene).passes
+        halves = {name: (brighter * passes[name]).astype(np.float16).astype(np.float32) for name in LIGHT}
+        return Image(passes | halves, paper_scene.pinhole, {"cycles.ViewLayer.samples": "1"}, "half.exr", frozenset(LIGHT))
+
+    comparison = compare(picture(paper_scene), [stored()], paper_scene.pinhole)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert not compare(picture(paper_scene), [stored(1.003)], paper_scene.pinhole).passed
+
+
+@pytest.mark.parametrize(
+    ("turn", "words"),
+    [(np.s_[::-1], "upside down"), (np.s_[:, ::-1], "mirrored left"), (np.s_[::-1, ::-1], "turned by half a turn")],
+)
+def test_light_of_a_picture_that_is_turned_over_is_told(turn, words, paper_scene):
+    test = rendered(paper_scene)
+    turned = replace(test, passes={name: values[turn] for name, values in test.passes.items()})
+    comparison = compare(picture(paper_scene), [turned], paper_scene.pinhole)
+    assert f"Different here: the picture looks {words}" in comparison.sentence, comparison.sentence

@@ -62,6 +62,44 @@ def test_a_depth_that_is_off_otherwise_is_no_distance(paper_scene):
     assert not comparison.passed and "give it as" not in comparison.sentence, comparison.sentence
 
 
+@pytest.mark.parametrize("name", ["Depth", "Distance"])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda depth: -depth, "below 0, as counted against the view"),
+        (lambda depth: depth * 1000, "is 1,000 times the reference's, as in another unit"),
+        (lambda depth: depth * 0.3048, "is 0.3048 times the reference's"),
+        (lambda depth: np.where(depth == 0, 200, depth), "is 200 where nothing is: write 0"),
+        (lambda depth: depth[::-1], "the picture looks upside down"),
+        (lambda depth: depth[:, ::-1], "the picture looks mirrored left to right"),
+        (lambda depth: depth[::-1, ::-1], "the picture looks turned by half a turn"),
+    ],
+)
+def test_a_depth_that_is_written_otherwise_is_told_how(change, words, name, paper_scene):
+    test = only(paper_scene.rendered(), name)
+    depth = np.where(test[name] >= BACKGROUND_DEPTH, 0, test[name])
+    comparison = judged(paper_scene, replace(test, passes={name: change(depth).astype(np.float32)}))
+    assert not comparison.passed and words in comparison.sentence, comparison.sentence
+
+
+def test_positions_turned_by_half_a_turn_are_told(paper_scene):
+    test = only(paper_scene.rendered(), "Position")
+    comparison = judged(paper_scene, replace(test, passes={"Position": test["Position"][::-1, ::-1]}))
+    assert "turned by half a turn" in comparison.sentence, comparison.sentence
+
+
+@pytest.mark.parametrize("name", ["Depth", "Position"])
+def test_a_pass_in_half_floats_is_told(name, paper_scene, tmp_path):
+    """A depth of 11 bits was said to see another surface."""
+    openexr = pytest.importorskip("OpenEXR")
+    test = only(paper_scene.rendered(), name)
+    channels = {f"{name}.{i}": np.ascontiguousarray(test[name][::-1, :, i]) for i in range(test[name].shape[2])}
+    halves = {key: np.minimum(values, 65504).astype(np.float16) for key, values in channels.items()}
+    openexr.File({}, halves).write(str(tmp_path / "half.exr"))
+    comparison = judged(paper_scene, image.read_channels(tmp_path / "half.exr", {name: list(channels)}))
+    assert f"{name} is in half floats, of 11 bits: write 32 bits" in comparison.sentence, comparison.sentence
+
+
 def test_with_a_position_alone_a_moved_ball_is_found(paper_scene):
     other = replace(paper_scene, spheres=((0.001, 0.0, 1.0, 1.0), *paper_scene.spheres[1:]))
     assert not judged(paper_scene, only(other.picture(), "Position")).passed
@@ -72,7 +110,7 @@ def test_all_passes_are_asked_of_cycles(paper_scene):
         compare(paper_scene.picture(), only(paper_scene.rendered(), "Depth", "Position"), paper_scene.pinhole)
 
 
-@pytest.mark.parametrize("nothing", [0.0, np.inf, 1e10, 3e38])
+@pytest.mark.parametrize("nothing", [0.0, np.inf, 1e10, 3e38, -1.0, 65504.0, -np.inf])
 def test_nothing_is_nothing_however_a_renderer_writes_it(nothing, paper_scene):
     reference = paper_scene.picture()
     missed = reference["Depth"] >= BACKGROUND_DEPTH

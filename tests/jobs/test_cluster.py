@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 
+dask = pytest.importorskip("dask")
 pytest.importorskip("distributed")
 
 from viewcam_addon import child_process, cli
@@ -118,7 +119,7 @@ def test_a_difference_in_one_byte_would_be_seen(stand_in, machines, blend, tmp_p
 def test_what_is_killed_in_the_midst_of_a_shot_loses_nothing(stand_in, machines, blend, tmp_path, processes, victim):
     listed = shots("a", "slow_one", "b", "c", "d", "e")
     ear, outcome = Ear(), []
-    batch = threading.Thread(target=lambda: outcome.append(run_on(machines, blend, tmp_path / "out", listed, ear)))
+    batch = threading.Thread(target=lambda: outcome.append(run_on(machines, blend, tmp_path / "out", listed, ear)), daemon=True)
     batch.start()
     assert processes.until(lambda: stand_in.diary("waits")), "the shot was never begun"
     blender = int(stand_in.diary("waits")[0][-1])
@@ -141,7 +142,9 @@ def test_a_worker_that_is_stopped_holds_no_batch_up_with_a_time_limit_or_without
     listed, folder, ear, outcome = shots("a", "slow_one", "b", "c"), Folder(tmp_path / "out"), Ear(), []
     with cluster.opened(None, 2) as machines:
         work = machines.work(blend, folder, settings_of(listed), MADE_FROM, time_limit=40.0)
-        batch = threading.Thread(target=lambda: outcome.append(run.run(listed, folder, settings_of(listed), work, ear)))
+        batch = threading.Thread(
+            target=lambda: outcome.append(run.run(listed, folder, settings_of(listed), work, ear)), daemon=True
+        )
         batch.start()
         assert processes.until(lambda: stand_in.diary("waits")), "the shot was never begun"
         blender = int(stand_in.diary("waits")[0][-1])
@@ -152,6 +155,21 @@ def test_a_worker_that_is_stopped_holds_no_batch_up_with_a_time_limit_or_without
             os.kill(worker, signal.SIGKILL)
     assert outcome and outcome[0].counts["done"] == 4 and not ear.all("shot_failed"), ear.events
     assert len({words[-1] for words in stand_in.diary("render") if words[1] == "slow_one"}) == 2
+
+
+@pytest.mark.exhaustive
+def test_a_worker_that_takes_long_to_start_again_is_not_given_up(stand_in):
+    """Dask takes a worker away for good that is not there again in time, 15 s by default, which a busy machine may need."""
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "1 ms"}), cluster.opened(None, 1) as machines:
+        machines._client.wait_for_workers(1, timeout=60)
+        (worker,) = machines._client.run(os.getpid).values()
+        time.sleep(0.5)  # Dask starts none anew that ends while it begins
+        os.kill(worker, signal.SIGKILL)
+        ends, others = time.monotonic() + 60, {worker}
+        while others <= {worker} and time.monotonic() < ends:
+            time.sleep(0.1)
+            others = set(machines._client.run(os.getpid, on_error="ignore").values())
+    assert others - {worker}, "no other worker came in its place"
 
 
 def test_a_shot_that_always_crashes_blender_fails_and_the_rest_go_on(stand_in, machines, blend, tmp_path):
@@ -357,7 +375,7 @@ def test_a_scheduler_that_dies_ends_the_batch_with_what_is_left(farm, stand_in, 
         kill_scheduler()
 
     monkeypatch.setattr(cluster._Flight, "_outcome", outcome_of)
-    killer = threading.Thread(target=kill)
+    killer = threading.Thread(target=kill, daemon=True)
     with cluster.opened(address, None) as machines:
         killer.start()
         summary = run_on(machines, blend, tmp_path / "out", shots("a", "slow_one", "b", "c", "d", "e"), ear)

@@ -93,7 +93,7 @@ def test_signals_of_others_do_not_count():
 
 def test_outside_the_main_thread_a_batch_runs_without_listening(tmp_path, painting):
     statuses = []
-    thread = threading.Thread(target=lambda: statuses.append(painting.paint(tmp_path, 1).exit_status))
+    thread = threading.Thread(target=lambda: statuses.append(painting.paint(tmp_path, 1).exit_status), daemon=True)
     thread.start()
     thread.join()
     assert statuses == [0]

@@ -139,7 +139,7 @@ def test_where_there_is_no_blender_at_all_a_sentence_says_how_to_have_one(monkey
 
 def test_a_blender_that_is_stopped_in_a_shot_is_ended_and_the_shot_rendered_by_another(stand_in, blend, tmp_path, monkeypatch):
     monkeypatch.setattr(child_process, "HEARTBEAT_TIMEOUT", 3.0)
-    stopping = threading.Thread(target=lambda: os.kill(int(waits(stand_in)), signal.SIGSTOP))
+    stopping = threading.Thread(target=lambda: os.kill(int(waits(stand_in)), signal.SIGSTOP), daemon=True)
     stopping.start()
     with ServedRenderer(blend) as renderer:
         renderer.render(shot("slow_one"), tmp_path / "a.exr", tmp_path / "a.png")
@@ -156,7 +156,9 @@ def waits(stand_in):
 
 def test_a_shot_that_takes_long_is_left_alone_while_its_blender_gives_signs_of_life(stand_in, blend, tmp_path, monkeypatch):
     monkeypatch.setattr(child_process, "HEARTBEAT_TIMEOUT", 5.0)
-    stopping = threading.Thread(target=lambda: (waits(stand_in), time.sleep(8), os.kill(int(waits(stand_in)), signal.SIGKILL)))
+    stopping = threading.Thread(
+        target=lambda: (waits(stand_in), time.sleep(8), os.kill(int(waits(stand_in)), signal.SIGKILL)), daemon=True
+    )
     stopping.start()
     with ServedRenderer(blend) as renderer:
         renderer.render(shot("slow_one"), tmp_path / "a.exr", tmp_path / "a.png")

@@ -183,6 +183,10 @@ FORMATS: dict[str, ModuleType] = {
 
 _LONGEST = 1000  # characters of a name or a sentence
 _YAML = (".yaml", ".yml")
+_JSON = (".json", ".gltf", ".sfm")
+_CODE = ("vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
+"""The formats that a damaged JSON file may look like."""
+_NO_JSON = "{} looks like JSON and is none ({}): correct it"
 _REMEMBERED = re.compile(rf"{own.KEY}: (axes=\w+ scale=[\d.e+-]+)")
 
 
@@ -300,16 +304,19 @@ def recognized(source: str | Path | Source) -> str:
     source = source if isinstance(source, Source) else Source(source)
     if source.path is None and not source.text.strip():
         raise InputError("there is no text: copy a camera first")
+    is_json = source.path is not None and source.path.suffix.lower() in _JSON
     for name in readable():
         with _told_of_damage(source, FORMATS[name].TITLE):
             if _recognizes(FORMATS[name], source):
+                if is_json and name in _CODE and source.json_problem:
+                    break
                 return name
     if source.data.startswith(b"version https://git-lfs"):
         raise InputError(f"{source.name} is Git LFS's pointer to the file, and not the file: get it by git lfs pull")
     if source.data.startswith(_READ_BY_BLENDER):
         raise InputError(f"{source.name} is read by Blender itself: import it there, save, and give the .blend")
     if source.json_problem:
-        raise InputError(f"{source.name} looks like JSON and is none ({source.json_problem}): correct it")
+        raise InputError(_NO_JSON.format(source.name, source.json_problem))
     if source.path is None:
         place = checks.quoted(source.text.strip()[:40])
         raise InputError(
@@ -410,9 +417,9 @@ def _told_of_world(notes: Iterable[str], options: Options) -> tuple[str, ...]:
 
 
 def _doubted(camera: Camera) -> Camera:
-    """The camera, with a note where the size that was given can't well be that of its picture."""
+    """The camera, with a note where its size can't well be that of the picture that its principal point is in."""
     (c_x, c_y), pinhole = camera.pinhole.principal_point, camera.pinhole
-    if camera.size_stated or (0 <= c_x <= pinhole.width and 0 <= c_y <= pinhole.height):
+    if 0 <= c_x <= pinhole.width and 0 <= c_y <= pinhole.height:
         return camera
     size = f"{pinhole.width} × {pinhole.height}"
     return camera.noted(f"The principal point of {camera.name} lies outside of a picture of {size} pixels: is that its size?")

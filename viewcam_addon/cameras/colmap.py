@@ -255,7 +255,9 @@ def _text_cameras(source: Source) -> dict[int, _Intrinsics]:
         if words[1] not in MODELS:
             raise InputError(f"{place}: the camera model {checks.quoted(words[1])} is unknown: convert it to PINHOLE")
         width, height = (pixels(f"{what} of {place}", word) for what, word in zip(("width", "height"), words[2:4], strict=True))
-        result[_id(words[0], place)] = _Intrinsics(words[1], width, height, flat(f"parameters of {place}", words[4:]))
+        if (camera := _id(words[0], place)) in result:
+            raise InputError(f"{place} is another camera {camera}: give each a number of its own")
+        result[camera] = _Intrinsics(words[1], width, height, flat(f"parameters of {place}", words[4:]))
     return result
 
 
@@ -273,7 +275,8 @@ def _text_images(source: Source) -> Iterator[_Image]:
             _id(words[0], place), re.split(r"\s+", line.strip(), maxsplit=9)[9], pose[:4], pose[4:], _id(words[8], place)
         )
         for number, points in itertools.islice(lines, 1):
-            if len(points.split()) % 3 and not points.lstrip().startswith("#"):
+            parts = points.split()
+            if (len(parts) % 3 or (parts and not parts[-1].removeprefix("-").isdecimal())) and parts[0][0] != "#":
                 raise InputError(
                     f"line {number} of {source.name} is no list of image points, X Y POINT3D_ID: each image has two lines, "
                     "the second of which may be empty"
@@ -394,6 +397,8 @@ def _binary_cameras(source: Source) -> dict[int, _Intrinsics]:
             raise InputError(f"camera {number} of {source.name} is of the unknown model {model}: convert it to PINHOLE")
         width, height = (pixels(f"{side} of camera {number}", value) for side, value in (("width", width), ("height", height)))
         name = names[model]
+        if number in result:
+            raise InputError(f"{source.name} has two cameras {number}: give each a number of its own")
         result[number] = _Intrinsics(name, width, height, reader.numbers(f"{len(MODELS[name][1])}d"))
     return result
 

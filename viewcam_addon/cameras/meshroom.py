@@ -120,15 +120,22 @@ def _plane(
 def _of_lens(
     intrinsic: Record, kind: str, plane: ViewPlane, options: Options
 ) -> tuple[distortion.Lens | None, tuple[str, ...]]:
+    undone = intrinsic.values.get("undistortionParams") or []
+    if isinstance(undone, list) and undone and any(intrinsic.numbers("undistortionParams", len(undone))):
+        return _of_unknown_model(intrinsic, str(intrinsic.get("undistortionType") or "none"), options)
     parameters = intrinsic.values.get("distortionParams") or []
     numbers = intrinsic.numbers("distortionParams", len(parameters)) if isinstance(parameters, list) and parameters else ()
     if not any(numbers):
         return None, ()
     model = str(intrinsic.get("distortionType") or kind)
     if model not in _LENSES:
-        reason = f"{intrinsic.place} has lens distortion of the unknown model {checks.quoted(model)}"
-        if options.without_distortion:
-            return None, (f"{reason}, which was left out",)
-        raise NoPinholeError(f"{reason}, which no pinhole has: undistort the pictures, or choose to take it without distortion")
+        return _of_unknown_model(intrinsic, model, options)
     values = dict(zip(_LENSES[model], numbers, strict=False))
     return distortion.settle(distortion.opencv(values), plane, intrinsic.place, options.without_distortion)
+
+
+def _of_unknown_model(intrinsic: Record, model: str, options: Options) -> tuple[None, tuple[str, ...]]:
+    reason = f"{intrinsic.place} has lens distortion of the unknown model {checks.quoted(model)}"
+    if options.without_distortion:
+        return None, (f"{reason}, which was left out",)
+    raise NoPinholeError(f"{reason}, which no pinhole has: undistort the pictures, or choose to take it without distortion")

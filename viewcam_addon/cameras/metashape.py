@@ -12,7 +12,6 @@ Source: the Metashape manual's camera model, and its exported files; of rigs the
 (slave-sensor transform). nerfstudio's reader leaves out the chunk's transform and rigs.
 """
 
-import contextlib
 import dataclasses
 from xml.etree import ElementTree
 
@@ -22,12 +21,13 @@ from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming
-from .camera import Camera, LeftOut, Options, not_a_pinhole
+from .camera import Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
 from .source import Source, flat, number, pixels
 
 TITLE = "Agisoft Metashape XML"
 
-_LENS = ("k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
+_LENS = ("k1", "k2", "k3", "k4", "p1", "p2")
+_NUMBERS = ("f", "cx", "cy", "b1", "b2", "p3", "p4", *_LENS)
 
 
 def recognizes(source: Source) -> bool:
@@ -160,8 +160,8 @@ def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, di
     width, height = (pixels(f"the {side} of {what}", resolution.get(side)) for side in ("width", "height"))
     values: dict[str, float] = {}
     for child in calibration:
-        with contextlib.suppress(InputError):
-            values[child.tag] = number(f"{child.tag} of {what}", child.text or "")
+        if child.tag in _NUMBERS:
+            values[child.tag] = number(f"{child.tag} of {what}", (child.text or "").strip())
     focal = values.get("f", 0.0)
     if not (focal > 0 and focal + values.get("b1", 0.0) > 0):
         raise InputError(f"{what} has the focal length {focal:g}: give one above 0")
@@ -169,6 +169,8 @@ def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, di
     plane = axes.view_plane(
         across, focal, width / 2 + values.get("cx", 0.0), height / 2 + values.get("cy", 0.0), (width, height)
     )
+    if any(map(values.get, ("p1", "p2"))) and any(map(values.get, ("p3", "p4"))) and not options.without_distortion:
+        raise NoPinholeError(f"{what} has the tangential distortion p3 and p4, which is not read: align it again without these")
     bent = {name: values[name] for name in (*_LENS, "b2") if name in values}
     lens = distortion.opencv(
         {

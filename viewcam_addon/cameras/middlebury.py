@@ -31,7 +31,7 @@ def recognizes(source: Source) -> bool:
         return False
     if _PAIR.match(source.text[:200]):
         return True
-    lines = source.text[:2000].split("\n")[:-1] or [source.text]
+    lines = source.text[:2000].lstrip().split("\n")
     return len(lines) > 1 and lines[0].strip().isdecimal() and len(lines[1].split()) == _WORDS
 
 

@@ -61,6 +61,11 @@ _DISTORTION = (
 )  # fmt: skip
 _OTHER_DISTORTION = re.compile(r"dist(?!ance)|radial|tangential|^kc$|^[kp][1-6]$")
 _FISHEYE = re.compile(r"^(?:opencv_?)?fisheye|equidistant|kannala|^kb4?$")
+_KNOWN_LENS = re.compile(
+    r"^\s*$|^(?:none|null|no|opencv|perspective|pinhole|standard|ideal|rectified|kb4?)$|plumb|rad|brown|conrady|poly|rational"
+    r"|distort|equi|fisheye|kannala"
+)
+"""The names of distortion models with OpenCV's coefficients, or with none."""
 _OTHER_LENS = re.compile(r"fisheye|omni|mei|u?cm$|kb\d|spherical|ortho|fov|division|double|^ds$|theta|equirect|panoram|cylind")
 # Parts of names that may mean a pose in words that nobody knows; Kalibr's T_cam_imu is none.
 _MAY_BE_POSE = re.compile(r"pose|extrin|rotation|rot$|transf|transl|2cam|2world|toworld|tocam|w2|c2|rvec|tvec|position|quat")
@@ -90,7 +95,10 @@ def read(source: Source, options: Options) -> list[Camera]:
             f"{source.name} has R and T and no K: give the file that has it, as intrinsics.yml with this one beside it"
         )
     left_out, cameras, before = LeftOut(), [], np.eye(4)
-    for name, values in _cameras_in(source):
+    named = [*_cameras_in(source)]
+    if any("tcncnm1" in values for _, values in named):  # writers of YAML sort cam10 before cam2
+        named.sort(key=lambda camera: [int(digits) for digits in re.findall(r"[0-9]{1,9}", camera[0])])
+    for name, values in named:
         if "tcncnm1" in values:  # Kalibr's: from the camera before to this one
             before = _four_rows(values["tcncnm1"], f"T_cn_cnm1 of camera {checks.quoted(name)}") @ before
             values |= {"r": before[:3, :3].tolist(), "t": before[:3, 3].tolist()}
@@ -227,7 +235,8 @@ def _cameras_in(source: Source) -> Iterator[tuple[str, dict[str, Any]]]:
         return
     shared = {name: value for name, value in by_name.items() if not isinstance(value, dict)}
     for name, value in document.items():
-        if isinstance(value, dict) and _is_camera(inner := _with_k(_by_name(value))):
+        inner = _with_k(_by_name(value)) if isinstance(value, dict) else {}
+        if _is_camera(inner) or {"cameramodel", "intrinsics", "resolution"} <= inner.keys():  # Kalibr's, of any model
             yield str(name), {**shared, **inner}
         for i, each in enumerate(value if isinstance(value, list) and name in _LISTS else ()):
             if isinstance(each, dict) and _is_camera(inner := _with_k(_by_name(each))):
@@ -237,6 +246,14 @@ def _cameras_in(source: Source) -> Iterator[tuple[str, dict[str, Any]]]:
 def _of_pictures(name: str, values: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """The camera, or one for each picture where there is an rvec and a tvec of each, as `calibrateCamera` finds them."""
     turns, places = (_first(values, names) for names in (_RVEC, _T))
+    table = values.get("extrinsicparameters")  # rvec and tvec a row, of the program that OpenCV's manual calibrates with
+    if turns is None and isinstance(table, dict) and table.get("cols") in (6, "6"):
+        rows = np.array(_numbers("extrinsic_parameters", table)).reshape(-1, 6).tolist()
+        turns, places = ([row[part] for row in rows] for part in (slice(3), slice(3, 6)))
+        values = {key: value for key, value in values.items() if key != "extrinsicparameters"}
+        if len(rows) == 1:
+            yield name, {**values, "rvec": turns[0], "t": places[0]}
+            return
     if isinstance(turns, list) and isinstance(places, list):
         with contextlib.suppress(InputError):
             numbers = [np.array(flat("a vector", value)) for value in (turns, places)]
@@ -542,6 +559,9 @@ def says_fisheye(values: Mapping[str, Any], what: str) -> bool:
         if plain(key) in ("cameramodel", "distortionmodel", "model", "modeltype", "type", "distortiontype")
         and isinstance(value, str)
     ]
+    named = values.get("distortionmodel", values.get("distortion_model"))
+    if isinstance(named, str) and not _KNOWN_LENS.search(named.lower()) and not _OTHER_LENS.search(named.lower()):
+        not_a_pinhole(what, f"of the unknown distortion model {checks.quoted(named)}")
     is_fisheye = [bool(_FISHEYE.search(model.lower())) for model in models]
     for model, known in zip(models, is_fisheye, strict=True):
         if not known and _OTHER_LENS.search(model.lower()):

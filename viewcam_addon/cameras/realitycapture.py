@@ -24,15 +24,17 @@ import math
 
 import numpy as np
 
+from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming, texts
-from .camera import Camera, LeftOut, NoPinholeError, Options
+from .camera import Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
 from .source import Source, flat, image_size, number
 
 TITLE = "RealityCapture XMP and tables of cameras (CSV)"
 
 _PICTURES = ("jpg", "jpeg", "png", "tif", "JPG", "JPEG", "PNG", "TIF")
+_MODELS = ("perspective", "division", "brown")
 _LENS = ("k1", "k2", "k3", "k4", "t1", "t2")
 _NAMES = {"yaw": "heading", "z": "alt", "f_35mm": "f", "px_norm": "px", "py_norm": "py"}
 _TURN = tuple(f"r{row}{column}" for row in range(3) for column in range(3))
@@ -89,7 +91,10 @@ def _camera(source: Source, options: Options) -> Camera:
         notes += (f"{what} is of an upright picture: its focal length was taken for that of the longer side",)
     bent = flat(f"the distortion of {what}", values.get("DistortionCoeficients") or values.get("DistortionCoefficients") or "0")
     numbers = dict(zip(_LENS, bent, strict=False))
-    lens, note = distortion.settle(_lens(values.get("DistortionModel", ""), numbers), plane, what, options.without_distortion)
+    model = values.get("DistortionModel") or "perspective"
+    if not model.lower().startswith(_MODELS):
+        not_a_pinhole(what, f"of the unknown DistortionModel {checks.quoted(model)}")
+    lens, note = distortion.settle(_lens(model.lower(), numbers), plane, what, options.without_distortion)
     turn, eye = flat(f"Rotation of {what}", values["Rotation"]), flat(f"Position of {what}", values["Position"])
     if len(turn) != 9 or len(eye) != 3:
         raise InputError(f"{what} has {len(turn)} numbers of a rotation and {len(eye)} of a position: it should have 9 and 3")
@@ -138,7 +143,7 @@ def _of_table(source: Source, columns: list[str], head: int, options: Options) -
     rows = [
         (index, row)
         for index, row in enumerate(csv.reader(lines[head + 1 :]), start=head + 2)
-        if row and row != [""] and not row[0].startswith("#")
+        if "".join(row).strip() and not row[0].startswith("#")
     ]
     names = naming.distinct([row[0] for _, row in rows])
     cameras = []

@@ -46,6 +46,8 @@ def read(source: Source, options: Options) -> list[Camera]:
         inner = document.record("distortion_coefficients")
         numbers = inner.get("data") if "data" in inner else []
         numbers = Record({"data": numbers}, what).numbers("data", len(numbers))
+        if is_fisheye and any(numbers[4:]):
+            raise InputError(f"{what} has {len(numbers)} distortion coefficients: a fisheye has four")
         lens, note = opencv.settled(numbers[:4] if is_fisheye else numbers, is_fisheye, plane, what, options)
         notes += note
     else:

@@ -1,6 +1,7 @@
 """three.js' JSON of a PerspectiveCamera, alone or in a scene.
 
-`matrix` is camera to parent, column by column, x right, y up, z back; `fov` the degrees of the height, `aspect` width over
+`matrix` is camera to parent, column by column, x right, y up, z back, or stands as `position`, `rotation` (radians and their
+order) or `quaternion`, and `scale`; `fov` the degrees of the height, `aspect` width over
 height as looked at, `zoom` divides both tangents, and `view` cuts a window of width × height pixels, which here says the
 principal point and the size. `filmOffset` moves the picture by filmOffset / film's width · d pixels, not by a part of it.
 
@@ -17,12 +18,13 @@ from .. import checks
 from ..errors import InputError
 from . import axes, own, texts
 from .camera import Camera, LeftOut, Options, not_a_pinhole
-from .source import Record, Source
+from .source import Record, Source, number
 
 TITLE = "three.js JSON"
 SUFFIX = ".json"
 
 _DEEPEST = 50
+_ORDERS = ("XYZ", "YZX", "ZXY", "XZY", "YXZ", "ZYX")
 
 
 def recognizes(source: Source) -> bool:
@@ -41,8 +43,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     if not result:
         raise InputError(f"{source.name} has no PerspectiveCamera: give a file with one")
     left_out, cameras = LeftOut(), []
-    for number, (item, matrix) in enumerate(result):
-        name = str(item.get("name") or f"camera {number + 1}")
+    for position, (item, matrix) in enumerate(result, start=1):
+        name = str(item.get("name") or f"camera {position}")
         with left_out.unless_pinhole(name):
             if item.get("type") != "PerspectiveCamera":
                 not_a_pinhole(f"the camera {checks.quoted(name)}", f"an {checks.quoted(item.get('type'))}")
@@ -56,12 +58,33 @@ def _cameras(item: object, parent: np.ndarray, depth: int) -> Iterator[tuple[dic
     if depth > _DEEPEST:
         raise InputError(f"the scene is nested more than {_DEEPEST} objects deep: give the camera alone")
     record = Record(item, f"the object {checks.quoted(item.get('name'))}")
-    matrix = parent @ np.array(record.numbers("matrix", 16)).reshape(4, 4).T if "matrix" in record else parent
+    matrix = parent @ _local(record)
     if str(item.get("type", "")).endswith("Camera"):
         yield item, matrix
     children = item.get("children")
     for child in children if isinstance(children, list) else ():
         yield from _cameras(child, matrix, depth + 1)
+
+
+def _local(record: Record) -> np.ndarray:
+    """4 × 4, the object in its parent: its matrix, or else of its position, rotation or quaternion, and scale."""
+    if "matrix" in record:
+        return np.array(record.numbers("matrix", 16)).reshape(4, 4).T
+    matrix = np.eye(4)
+    if "quaternion" in record:
+        x, y, z, w = record.numbers("quaternion", 4)
+        matrix[:3, :3] = axes.rotation_of((w, x, y, z), record.place)
+    elif "rotation" in record:
+        turns = record.values["rotation"]
+        if not isinstance(turns, list) or len(turns) < 3 or [*turns, "XYZ"][3] not in _ORDERS:
+            raise InputError(f"{record.called('rotation')} is {checks.quoted(turns)}: give x, y, z in radians and their order")
+        for axis in [*turns, "XYZ"][3]:
+            index = "XYZ".index(axis)
+            radians = number(record.called("rotation"), turns[index])
+            matrix[:3, :3] = matrix[:3, :3] @ texts.turn(math.degrees(radians), np.eye(3)[index])
+    matrix[:3, :3] *= record.numbers("scale", 3) if "scale" in record else 1.0
+    matrix[:3, 3] = record.numbers("position", 3) if "position" in record else 0.0
+    return matrix
 
 
 def _camera(record: Record, matrix: np.ndarray, name: str, options: Options) -> Camera:

@@ -36,7 +36,7 @@ import numpy as np
 from .. import checks
 from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
-from . import axes, distortion, naming, own
+from . import axes, distortion, naming, opencv, own
 from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Record, Source, image_size
 
@@ -272,7 +272,9 @@ def _plane(
     f_x, f_y = focal["x"] or focal["y"], focal["y"] or focal["x"]
     if not f_x or not f_y:
         return options.plane_or_refuse(both.place), False, None, ()
-    plane = axes.view_plane(f_x, f_y, both.number("cx", size[0] / 2), both.number("cy", size[1] / 2), size)
+    c_x, c_y = both.number("cx", size[0] / 2), both.number("cy", size[1] / 2)
+    opencv.refuse_widths(f_x, f_y, c_x, c_y, size, both.place)
+    plane = axes.view_plane(f_x, f_y, c_x, c_y, size)
     numbers = {key: both.number(key, 0.0) for key in _LENS}
     if "distortion_params" in both:
         numbers = dict(zip(_LENS, both.numbers("distortion_params", 6), strict=True))

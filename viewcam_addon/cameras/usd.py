@@ -23,7 +23,7 @@ import numpy as np
 from .. import checks, usd_stage
 from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
-from . import axes, own
+from . import axes, naming, own
 from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Record, Source, pixels
 
@@ -38,7 +38,8 @@ _MOST_NAMED = 3
 def recognizes(source: Source) -> bool:
     data = source.data
     zipped = source.path is not None and source.path.suffix.lower() == ".usdz"
-    return data.startswith((b"#usda ", b"PXR-USDC")) or (zipped and data.startswith(b"PK"))
+    text = data[:100].removeprefix(b"\xef\xbb\xbf").lstrip()  # which OpenUSD refuses with the place
+    return text.startswith(b"#usda ") or data.startswith(b"PXR-USDC") or (zipped and data.startswith(b"PK"))
 
 
 def read(source: Source, options: Options) -> list[Camera]:
@@ -50,7 +51,10 @@ def read(source: Source, options: Options) -> list[Camera]:
             if "error" in camera:
                 raise InputError(f"camera {checks.quoted(camera['name'])} can't be read ({camera['error']}): export it again")
             result += [_camera(camera["name"], sample, options).noted(*notes) for sample in camera["samples"]]
-    return left_out.with_notes(result)
+    names = [camera.name for camera in result]
+    if len({*names}) < len(names):
+        names = naming.distinct(names)
+    return left_out.with_notes([dataclasses.replace(camera, name=name) for camera, name in zip(result, names, strict=True)])
 
 
 def _notes(stage: dict[str, Any]) -> tuple[str, ...]:

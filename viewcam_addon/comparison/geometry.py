@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..image import Image
+from ..errors import InputError, listed
+from ..image import BACKGROUND_DEPTH, Image
 from ..pinhole import Pinhole
 from . import tolerances
 from .cameras import conversion_error, systematic_error
@@ -32,7 +32,7 @@ from .mismatches import (
     settle,
 )
 from .renderers import CYCLES, Renderer, completed
-from .statistics import PassErrors, measure
+from .statistics import PassErrors, looks_turned, measure, plain
 from .tolerances import Array, Seen, in_float32
 from .verdict import GeometryComparison, allowed_unexplained, far_from_origin
 
@@ -42,6 +42,10 @@ _NEEDED = ("Depth", "Position", "Object Index")
 _ASKED_OF_THE_REFERENCE = 1000
 # Pixels whose depths are read as distances from the eye, and the other way round.
 _READ_ANEW = 1000
+# The share of a picture's error that reading it otherwise leaves, at most, where it is to be read so.
+_OF_THE_ERROR = 0.1
+# That share where the unit is another: depths that hardly vary are near a multiple of any others.
+_OF_A_UNIT = 1e-3
 # Passes that only the reference has: what tolerances are evaluated with.
 _FOR_TOLERANCES = ("Magnitude", "Facing")
 
@@ -137,12 +141,46 @@ def compare(
         lacking,
         in_one_place,
         renderer.name,
-        mistaken_depth=_mistaken_depth(pinhole, expected, seen, "Distance" if "Distance" in test.passes else "Depth"),
+        mistaken=_mistaken(pinhole, expected, seen, test, measured),
     )
 
 
+def _mistaken(pinhole: Pinhole, expected: Seen, seen: Seen, test: Image, measured: set[str]) -> str:
+    """The sentence that the test's passes are not what they are taken for; empty where they are.
+
+    measured : the passes that the test has.
+    """
+    if "Position" not in measured:  # which tells by itself
+        depths = [passes["Depth"].reshape(pinhole.height, pinhole.width).astype(np.float64) for passes in (expected, seen)]
+        if turned := looks_turned(depths[0], depths[1], _unlike, _OF_THE_ERROR):
+            return f"the picture looks {turned}"
+    name = "Depth" if "Depth" in test.passes else "Distance"
+    if name in test.passes:
+        sentence = _mistaken_depth(pinhole, expected, seen, name) or _mistaken_background(expected, seen, test[name], name)
+        if sentence:
+            return sentence
+    halves = sorted(test.halves & {"Depth", "Distance", "Position"})
+    return f"{listed(halves)} {'is' if len(halves) == 1 else 'are'} in half floats, of 11 bits: write 32 bits" if halves else ""
+
+
+def _unlike(reference: Array, test: Array) -> Array:
+    """The difference of depths, from 0 to 1, where one alone is of a surface."""
+    hit, test_hit = reference < BACKGROUND_DEPTH, test < BACKGROUND_DEPTH
+    return np.where(hit & test_hit, np.minimum(np.abs(test / reference - 1), 1), hit ^ test_hit)
+
+
+def _mistaken_background(expected: Seen, seen: Seen, depth: NDArray, name: str) -> str:
+    """The sentence that the test has one depth, behind all others, wherever nothing is."""
+    hit = tolerances.is_hit(expected)
+    alone, others = depth.ravel()[~hit], depth.ravel()[hit]
+    if not len(alone) or not tolerances.is_hit(seen).all() or not (alone == alone[0]).all() or not (others < alone[0]).all():
+        return ""
+    return f"{name} is {plain(float(alone[0]))} where nothing is: write 0, 1e10, inf or -1 there"
+
+
 def _mistaken_depth(pinhole: Pinhole, expected: Seen, seen: Seen, name: str) -> str:
-    """The sentence that the test's Depth is the distance from the eye, or its Distance the depth; empty where neither is.
+    """The sentence that the test's Depth is the distance from the eye, or its Distance the depth, that it counts the other way,
+    or in another unit; empty where it does not.
 
     name : the pass that the test's depths come from. It is the other one where reading it so leaves a tenth of the error.
     """
@@ -151,12 +189,21 @@ def _mistaken_depth(pinhole: Pinhole, expected: Seen, seen: Seen, name: str) -> 
     rows, columns = np.divmod(hits, pinhole.width)
     cosine = -pinhole.ray_directions(columns, rows) @ pinhole.basis()[2]
     ratio = seen["Depth"][hits, 0].astype(np.float64) / expected["Depth"][hits, 0]
-    read_anew = ratio * cosine if name == "Depth" else ratio / cosine
-    if not len(hits) or not np.median(np.abs(read_anew - 1)) < 0.1 * np.median(np.abs(ratio - 1)):
+    if not len(hits):
         return ""
-    if name == "Depth":
-        return "Depth is the distance from the eye and not that along the view's axis: give it as distance"
-    return "Distance is the depth along the view's axis and not that from the eye: give it as depth"
+
+    def explains(read_anew: Array, share: float = _OF_THE_ERROR) -> bool:
+        return bool(np.median(np.abs(read_anew - 1)) < share * np.median(np.abs(ratio - 1)))
+
+    if explains(ratio * cosine if name == "Depth" else ratio / cosine):
+        if name == "Depth":
+            return "Depth is the distance from the eye and not that along the view's axis: give it as distance"
+        return "Distance is the depth along the view's axis and not that from the eye: give it as depth"
+    if explains(-ratio):
+        return f"{name} is below 0, as counted against the view: give it with the other sign"
+    if (factor := float(np.median(ratio))) > 0 and explains(ratio / factor, _OF_A_UNIT):
+        return f"{name} is {plain(factor, 6)} times the reference's, as in another unit: give it in the scene's"
+    return ""
 
 
 def _passes(reference: Image, test: Image, pinhole: Pinhole, partial: bool) -> tuple[Seen, Seen]:

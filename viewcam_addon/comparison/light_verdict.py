@@ -143,6 +143,7 @@ class RadianceComparison:
     taken_out : the pixels of which the verdict says nothing.
     stated : the camera that was asked for, or None.
     search : the state of the search, of a comparison in rounds.
+    turned : the way in which the test looks turned over, one of TURNS; empty if it does not.
     """
 
     pinhole: Pinhole
@@ -158,6 +159,7 @@ class RadianceComparison:
     taken_out: TakenOut = field(default_factory=TakenOut)
     stated: Pinhole | None = None
     search: Search | None = None
+    turned: str = ""
     renderer = "Cycles"
     """The renderer of the test: light is compared with Cycles' alone."""
 
@@ -178,8 +180,12 @@ class RadianceComparison:
         worst = [row for row in self.rows if not row.ok]
         if worst:
             others = f"; {listed([row.name for row in worst[1:]])} too" if len(worst) > 1 else ""
+            turned = f"the picture looks {self.turned}; " if self.turned else ""
             return answered(
-                False, "Different here", f"{_difference(worst[0])}{_hint(worst[0])}{others}{_without(self)}.", self.not_modeled
+                False,
+                "Different here",
+                f"{turned}{_difference(worst[0])}{_hint(worst[0])}{others}{_without(self)}.",
+                self.not_modeled,
             )
         if self.is_empty:
             return answered(False, NOTHING, _nothing_left(self.taken_out), self.not_modeled)

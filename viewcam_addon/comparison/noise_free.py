@@ -37,6 +37,8 @@ _BEYOND_COUNTING = 1e6
 _SHORT_NORMALS = (5, 2)
 _SHADED = ("Combined", "Diffuse Direct")
 _NOT_SCATTERED = ("Alpha", "Emission", "Environment")
+# The passes of a quantity that is no pass alone.
+_MADE_OF = {"Alpha": ("Combined",)} | {name: (name, "Diffuse Color") for name in ("Diffuse Direct", "Diffuse Indirect")}
 _UNLIT = (*_NOT_SCATTERED, "Diffuse Color", "Glossy Color", "Transmission Color")
 # Light of this share of the picture's brightest is nothing, whatever noise there is: 48 stops darker, where float32 rounds away
 # what float32 rounds away of the brightest. A renderer's powers of small numbers end there, or go on to 10⁻³⁸.
@@ -109,6 +111,7 @@ class Rounding:
         self._brightest: Array | float = 0.0
         self._tables = tolerances.ALBEDO_TABLES if "albedo tables" in reference.attributes else 0.0
         self._triangles = tolerances.SHINING_TRIANGLES if "shining surfaces" in reference.attributes else 0.0
+        self._halves = test.halves
         self._storage = tolerances.NORMAL_STORAGE if _blender_of(test) >= _SHORT_NORMALS else 0.0
         if "Diffuse Direct" in reference.passes and "Diffuse Color" in reference.passes:
             lit = float(np.nan_to_num(reference["Diffuse Direct"]).max())
@@ -125,14 +128,16 @@ class Rounding:
         return Allowance(self._shift * slope, error, floor, self._shift)
 
     def _floor(self, name: str, value: Array) -> Array:
-        """The amount that albedos from tables and triangles that shine may add, and the storage of smooth normals: the light
-        from straight above times the cosine's change."""
+        """The amount that albedos from tables and triangles that shine may add, half floats, and the storage of smooth normals:
+        the light from straight above times the cosine's change."""
         share = 0.0 if name in _NOT_SCATTERED else self._tables
         if name not in _UNLIT:
             share += self._triangles
+        halves = tolerances.HALF * len({*_MADE_OF.get(name, (name,))} & self._halves)
+        floor = share * value + halves * np.maximum(value, tolerances.LEAST_HALF)
         if not self._storage or name not in _SHADED:
-            return share * value
-        return share * value + self._storage * np.sqrt(np.maximum(self._brightest**2 - value**2, 0.0))
+            return floor
+        return floor + self._storage * np.sqrt(np.maximum(self._brightest**2 - value**2, 0.0))
 
 
 def compare(sides: Sides, allowed: Allowance, belongs: NDArray) -> tuple[PassErrors, Edges, Array]:

@@ -25,6 +25,7 @@ from . import hypothesis_tests, noise_free, perception
 from .coincident import MakeCoincidentLight, Rest, TakenOut
 from .light_verdict import FALSE_ALARMS, LightRow, RadianceComparison
 from .sides import Sides, all_sides, quiet, samples_of
+from .statistics import looks_turned
 from .tolerances import FLOAT32, Array, in_float32
 
 SEEDS = 8
@@ -33,6 +34,8 @@ SEEDS = 8
 # Times what chance allows, from which on a difference is beyond doubt. Chosen: a file with rare light came to 2.2 times, and to
 # trace a picture anew that plainly differs takes nine times as long and tells nothing.
 _BEYOND_DOUBT = 4.0
+# The share of its difference that a picture that is turned over has once it is turned back, at most: both have the noise.
+_TURNED = 0.5
 
 VARIANCE_BATCHES = 16
 """The number of means, or of one for each sample, the reference's Variance is estimated at least (tracer/core/film/film.h)."""
@@ -94,7 +97,13 @@ def compare(
         combined.test,
         maps,
         taken_out=taken_out,
+        turned=looks_turned(combined.reference, combined.test, _unlike, _TURNED),
     )
+
+
+def _unlike(reference: Array, test: Array) -> Array:
+    """The difference of light, from 0 to 1."""
+    return np.nan_to_num(np.abs(test - reference) / (np.abs(test) + np.abs(reference)))
 
 
 @dataclass(frozen=True, eq=False)

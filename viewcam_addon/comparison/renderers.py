@@ -26,6 +26,8 @@ PARTS = {"Position": (2.0**5, 2.0**-6, 2.0**-17), "Normal": (2.0**-10,), "Object
 # Workbench's colors: an index as three digits, in steps that half floats hold exactly.
 DIGITS = 32
 
+_LARGEST_HALF = float(np.finfo(np.float16).max)
+
 NOTE = "Note"
 """The text attribute of such a picture, of Blender's own, that says who rendered it."""
 MARK = "viewcam"
@@ -116,12 +118,17 @@ def completed(picture: Image, pinhole: Pinhole) -> Image:
     """The picture with Depth and Position, each made from what there is where it lacks one: from Depth, Distance or Position.
 
     A Position that is made lies on the ray through its pixel's center. Nothing was hit where the first of these that is there
-    has 0 (a Position in all of its coordinates), BACKGROUND_DEPTH and more, or what is infinite; all passes hold there what the
-    tracer's do.
+    has 0 (a Position in all of its coordinates), BACKGROUND_DEPTH and more, what is infinite, or as a depth the largest half
+    float, or less than 0 beside others that are more; all passes hold there what the tracer's do.
     """
     passes = dict(picture.passes)
-    measure = next(passes[name].astype(np.float64) for name in ("Depth", "Distance", "Position") if name in passes)
+    name = next(name for name in ("Depth", "Distance", "Position") if name in passes)
+    measure = passes[name].astype(np.float64)
     missed = (measure == 0.0).all(axis=-1, keepdims=True) | (np.abs(measure) >= BACKGROUND_DEPTH).any(axis=-1, keepdims=True)
+    if name != "Position":
+        missed |= measure == _LARGEST_HALF
+        if (measure[~missed] > 0.0).any():
+            missed |= measure < 0.0
     w = pinhole.basis()[2]
     rows, columns = np.mgrid[: pinhole.height, : pinhole.width]
     directions = pinhole.ray_directions(columns.ravel(), rows.ravel()).reshape(*rows.shape, 3)

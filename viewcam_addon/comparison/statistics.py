@@ -6,6 +6,7 @@ errors could then gather where little is allowed.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,3 +82,22 @@ def plain(value: float | None, digits: int = 2) -> str:
 def percentile_name(percentile: float) -> str:
     """p50, p90, p99, p99.9, max."""
     return "max" if percentile == 100 else f"p{percentile:g}"
+
+
+TURNS = {"upside down": (-1, 1), "mirrored left to right": (1, -1), "turned by half a turn": (-1, -1)}
+_LOOKED_AT = 256  # pixels along a side
+
+
+def looks_turned(reference: Array, test: Array, unlike: Callable[[Array, Array], Array], share: float) -> str:
+    """The way in which a picture is turned over, one of TURNS, where it is that and little else; else empty.
+
+    reference, test : (height, width, ...).
+    unlike : the difference of pixels.
+    share : the share of their difference that is left, at most, once the test is turned back.
+    """
+    steps = tuple(slice(None, None, max(side // _LOOKED_AT, 1)) for side in reference.shape[:2])
+    errors = {
+        name: float(unlike(reference[steps], test[::down, ::right][steps]).mean()) for name, (down, right) in TURNS.items()
+    }
+    best = min(errors, key=errors.__getitem__)
+    return best if errors[best] < share * float(unlike(reference[steps], test[steps]).mean()) else ""

@@ -48,6 +48,9 @@ ROUNDINGS = (0.7, 1.4, 3.0, 5.0, 20.0)
 MEAN_ROUNDINGS = float(np.diff((0.0, *PERCENTILES)) @ ROUNDINGS) / 100.0
 
 FLOAT32 = 2.0**-24
+HALF = 2.0**-11
+"""The rounding of a number that is stored as half a float, relative; below LEAST_HALF as much as there."""
+LEAST_HALF = 2.0**-14
 
 # A radiance is the product and quotient of some fourteen rounded figures (strength, color, 1/π, the square of a distance, a
 # normal's length, a cosine, the exposure, the division by the number of samples): as many roundings at most, and about half of

@@ -104,7 +104,7 @@ class GeometryComparison:
     in_one_place : pixels that show another of several surfaces in one place, which is as right as the reference's.
     renderer : the name of the renderer that made the test picture.
     not_modeled : the part of the picture that neither side models as it is.
-    mistaken_depth : the sentence that the test's depths are distances, or the other way round; empty where they are neither.
+    mistaken : the sentence that the test's passes are not what they are taken for; empty where they are.
     """
 
     pinhole: Pinhole
@@ -122,7 +122,7 @@ class GeometryComparison:
     in_one_place: InOnePlace = NOWHERE
     renderer: str = "Cycles"
     not_modeled: NotModeled = field(default_factory=NotModeled)
-    mistaken_depth: str = ""
+    mistaken: str = ""
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -271,7 +271,7 @@ def _agreement(comparison: GeometryComparison) -> str:
 
 def _faults(comparison: GeometryComparison) -> list[str]:
     """The faults, the gravest first."""
-    faults = [comparison.mistaken_depth] if comparison.mistaken_depth else []
+    faults = [comparison.mistaken] if comparison.mistaken else []
     position, rest = comparison.rows[0], comparison.rows[1:]
     if position.name != "Position":
         rest = comparison.rows
@@ -307,6 +307,8 @@ def _cause(comparison: GeometryComparison) -> str:
     s = comparison.systematic
     assert s is not None  # as positions are off
     radius = max(comparison.pinhole.width, comparison.pinhole.height) / 2
+    if s.zoom_x < -1 and s.zoom_y < -1:
+        return "the picture looks turned by half a turn"
     if s.zoom_x < -1:
         return "the picture looks mirrored left to right"
     if s.zoom_y < -1:

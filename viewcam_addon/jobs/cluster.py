@@ -61,6 +61,7 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
 
     ways = {
         "distributed.comm.timeouts.connect": f"{_ANSWER_WITHIN if scheduler else _WORKERS_WITHIN} s",
+        "distributed.deploy.lost-worker-timeout": "1 day",  # a busy machine takes longer than 15 s to start one anew
         "distributed.nanny.pre-spawn-environ": {},  # it would be this process's, too, and for good
         "distributed.scheduler.allowed-failures": 1,  # a shot's workers, until it is tried alone
         "distributed.scheduler.worker-ttl": f"{_WORKERS_WITHIN} s",  # a worker that is stopped says nothing

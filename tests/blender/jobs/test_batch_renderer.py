@@ -450,7 +450,7 @@ def test_blender_lets_other_threads_run_while_it_opens_a_file(fresh_blender, sce
         while not opened.wait(0.01):
             turns.append(time.monotonic())
 
-    thread = threading.Thread(target=take_turns)
+    thread = threading.Thread(target=take_turns, daemon=True)
     thread.start()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "many.blend"))
     opened.set()
