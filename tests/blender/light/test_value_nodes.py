@@ -394,6 +394,10 @@ def test_bricks_without_a_width_have_the_mortar_that_they_have_in_cycles(floor):
     check(floor(graphs))
 
 
+def test_the_strength_of_light_that_falls_off_is_a_number_even_of_a_color(floor):
+    check(floor({"as it is": N("LightFalloff", {"Strength": N("TexCoord", output="Object")}, "Quadratic")}))
+
+
 def test_numbers_beyond_what_nodes_are_made_for_make_what_cycles_makes_of_them(floor):
     place = N("TexCoord", output="Object")
     graphs = {"to the power of 0": N("Gamma", {"Color": place, "Gamma": 0.0})}
