@@ -995,3 +995,10 @@ def test_a_table_is_read_with_blanks_at_its_end_and_middleburys_without_a_line_e
     assert camera.pinhole.eye == (1, 2, 3)
     (camera,) = cameras.read("1\na.png 500 0 320 0 500 180 0 0 1 1 0 0 0 1 0 0 0 1 0 0 0", options=GIVEN)
     assert camera.pinhole.distance == (500, 500)
+
+
+@pytest.mark.parametrize("form", ["opencv", "sidecar"])
+def test_cameras_called_by_a_drive_of_windows_are_no_files_there(form):
+    called = [Camera(f"C:/{name}", CAMERAS["plain"]) for name in ("a", "b")]
+    with pytest.raises(InputError, match="inside the folder"):
+        cameras.write(called, form)
