@@ -71,7 +71,7 @@ ROOMS = {
 }
 BLENDER_ROOMS = {
     "versions": "",
-    "temporary_settings": "",
+    "temporary_settings": "versions",
     "another_blender": "",
     "opening": "temporary_settings",
     "picture": "temporary_settings",

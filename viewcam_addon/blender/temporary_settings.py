@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 
 import bpy
 
+from . import versions
+
 Result = TypeVar("Result")
 
 LARGEST_INDEX = 32767
@@ -31,7 +33,10 @@ class Overrides:
         self.lasting = lasting or self
 
     def set(self, owner: bpy.types.bpy_struct, name: str, value: Any) -> None:
-        """Set a property until the overrides end."""
+        """Set a property until the overrides end, whatever animates or drives it."""
+        for curve in _curves_of(owner, name):
+            self.afterwards(setattr, curve, "mute", False)
+            curve.mute = True
         before = getattr(owner, name)
         if isinstance(before, bpy.types.bpy_prop_array):  # which would be the new value by then
             before = tuple(before)
@@ -58,6 +63,18 @@ class Overrides:
     def afterwards(self, undo: Callable[..., Any], *arguments: Any, **options: Any) -> None:
         """Call `undo` when the overrides end; what was set last is restored first."""
         self._stack.callback(undo, *arguments, **options)
+
+
+def _curves_of(owner: bpy.types.bpy_struct, name: str) -> list[bpy.types.FCurve]:
+    """The curves and drivers that set a property each time a scene is evaluated, and would set it anew."""
+    block = getattr(owner, "id_data", None)
+    if not isinstance(block, bpy.types.ID) or not getattr(block, "animation_data", None):
+        return []
+    try:
+        path = owner.path_from_id(name)
+    except ValueError:  # no path, and so no animation
+        return []
+    return [curve for curve in versions.all_curves(block) if curve.data_path == path and not curve.mute]
 
 
 @contextlib.contextmanager

@@ -37,6 +37,8 @@ MUTED_NODES_HAVE_NO_VALUES = bpy.app.version >= (5, 0)
 EMPTY_SLOTS_OF_OBJECTS_STAY_EMPTY = bpy.app.version >= (5, 1)
 # True if Cycles samples no light of a Principled surface that a displacement bumps. Measured: in 5.2, not in 4.2, 4.5 and 5.0.
 LOSES_LIGHT_OF_BUMPED = bpy.app.version >= (5, 1)
+# True if Brick Texture makes NaN of rows without a height. Measured: in 5.2, not in 4.2 and 5.0.
+ROWS_NEED_HEIGHTS = bpy.app.version >= (5, 1)
 
 
 WORKING_SPACE = "Linear Rec.709"

@@ -70,6 +70,16 @@ def of_tables():
     yield PRINCIPLED, {"Base Color": COLOR, "Diffuse Roughness": 0.6}, {}
 
 
+def seen_through_unbent():
+    for kind, r in itertools.product((GLASS, "ShaderNodeBsdfRefraction"), ROUGHNESSES):
+        yield kind, {"Color": COLOR, "Roughness": r, "IOR": 1.0}, {"distribution": "GGX"}
+
+
+def of_more_than_all():
+    for kind, r in itertools.product((GLOSSY, GLASS), (0.3, 0.7)):
+        yield kind, {"Color": (2.0, 1.3, 0.6, 1), "Roughness": r}, {"distribution": "MULTI_GGX"}
+
+
 def of_beckmann():
     for r in ROUGHNESSES:
         yield GLOSSY, {"Color": COLOR, "Roughness": r}, {"distribution": "BECKMANN"}
@@ -205,12 +215,20 @@ def test_facets_as_rough_as_can_be_are_cycles_to_their_table(patches):
     check(patches(roughest), roughest, ROUGHEST)
 
 
+def test_facets_that_scatter_more_light_than_there_is_do_so_each_time_as_in_cycles(patches):
+    check(patches(of_more_than_all()), of_more_than_all(), ROUGHEST)
+
+
 def test_beckmanns_lobes_are_cycles_to_its_exponential(patches):
     check(patches(of_beckmann()), of_beckmann(), BECKMANN)
 
 
 def test_what_is_lit_from_behind_is_cycles(patches):
     check(patches(seen_through(), (0.3, 0.2, -0.7)), seen_through(), REFRACTED)
+
+
+def test_rough_facets_that_bend_no_light_are_lit_from_behind_as_in_cycles(patches):
+    check(patches(seen_through_unbent(), (0.3, 0.2, -0.7)), seen_through_unbent(), REFRACTED)
 
 
 def test_what_shines_below_a_coat_is_cycles(patches, monkeypatch):

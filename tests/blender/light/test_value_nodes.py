@@ -385,6 +385,25 @@ def test_every_node_makes_what_cycles_makes(floor, images, part):
     check(floor(dict(list(graphs(*images).items())[part::PARTS])))
 
 
+def test_bricks_without_a_width_have_the_mortar_that_they_have_in_cycles(floor):
+    bricks = {"Vector": N("TexCoord", output="Object"), "Scale": 3.0, "Mortar Size": 0.05}
+    graphs = {}
+    for word in ("Color", "Fac"):
+        graphs[f"narrow {word}"] = N("TexBrick", bricks | {"Brick Width": 0.0}, word)
+        graphs[f"squashed {word}"] = N("TexBrick", bricks, word, squash=0.0)
+    check(floor(graphs))
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 2), reason="before, rows without a height are all mortar")
+def test_bricks_without_a_height_are_told(camera, add, mesh_from, make_material):
+    material = make_material("Wall", "ShaderNodeBsdfDiffuse")
+    tree = material.node_tree
+    tree.links.new(N("TexBrick", {"Row Height": 0.0}, "Color").add(tree), tree.nodes["Shader"].inputs["Color"])
+    add(mesh_from("plane"), "Wall").data.materials.append(material)
+    (entry,) = jobs.export(Job(level="direct")).ledger
+    assert entry.status == "approximated" and "rows without a height" in entry.reason
+
+
 def test_a_color_whose_alpha_is_used_is_divided_by_it(floor, images):
     material = N("TexImage", {}, "Color", image=images[1])
     node = material.add

@@ -292,6 +292,19 @@ def test_holdouts_and_shadow_catchers_are_plain_objects_on_both_sides(add, scene
     assert bpy.context.view_layer.layer_collection.children["Held out"].holdout and bpy.data.objects["Holdout"].is_holdout
 
 
+def test_objects_of_a_background_set_are_shown_and_its_holdouts_are_plain_on_both_sides(add, scene, both_sides, mesh_from):
+    cube = mesh_from("cube", size=0.8)
+    add(cube, "Own", location=(-1, 0, 0))
+    scene.background_set = bpy.data.scenes.new("Set")
+    for name, x in (("Plain", 0), ("Holdout", 1)):
+        add(cube, name, location=(x, 0, 0), collection=scene.background_set.collection)
+    bpy.data.objects["Holdout"].is_holdout = True
+    sides = both_sides()
+    sides.check()
+    assert {placed.name for placed in sides.exported.objects} == {"Own", "Plain", "Holdout"}
+    assert [each.object for each in sides.exported.ledger if each.status == "approximated"] == ["Holdout"]
+
+
 @pytest.fixture
 def two_layers(add, scene, mesh_from):
     """View layers ViewLayer and Other, each with a cube of its own, First and Second."""

@@ -10,6 +10,7 @@ bpy = pytest.importorskip("bpy")
 
 from mathutils import Matrix
 
+from viewcam_addon.blender import versions
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import materials
 from viewcam_addon.comparison import geometry
@@ -235,6 +236,21 @@ def test_depth_of_field_stereo_and_motion_blur_are_off_on_both_sides(monkey, sce
     sides.check()
     (entry,) = [entry for entry in sides.exported.ledger if entry.status == "approximated"]
     assert entry.object == "Camera" and all(word in entry.reason for word in ("Depth of field", "Stereoscopy", "Motion blur"))
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_what_is_off_on_both_sides_is_off_where_it_is_keyed_or_driven(monkey, scene, camera_object, both_sides, driven):
+    dof = camera_object.data.dof
+    dof.use_dof, dof.focus_distance, dof.aperture_fstop = True, 1, 0.1
+    scene.cycles.film_exposure, monkey.is_shadow_catcher = 3, True
+    settings = (camera_object.data, "dof.use_dof"), (scene, "cycles.film_exposure"), (monkey, "is_shadow_catcher")
+    for owner, path in settings:
+        if driven:
+            owner.driver_add(path).driver.expression = "1"
+        else:
+            owner.keyframe_insert(path, frame=1)
+    both_sides().check()
+    assert not any(curve.mute for owner, _ in settings for curve in versions.all_curves(owner))
 
 
 def test_a_world_full_of_fog_is_left_out(monkey, scene, both_sides):

@@ -16,6 +16,7 @@ from viewcam_addon.blender.scenes.world import world_of
 from viewcam_addon.blender.temporary_settings import overridden
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs.job import Job
+from viewcam_addon.tracer import render
 from viewcam_addon.tracer.native import constant_value
 from viewcam_addon.tracer.scene.film import Bounces, Film
 from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun, World
@@ -263,6 +264,7 @@ def attach(block, kind, output, to="Strength"):
 APPROXIMATED = {
     "nodes": (lambda block: attach(block, "ObjectInfo", "Random"), "'Object Info' that says the Random of a light"),
     "spread": (lambda block: setattr(block.data, "spread", 0.0), "spread"),
+    "beam": (lambda block: setattr(block.data, "spread", math.radians(0.5)), "spread of 0.5°, 180° on both sides"),
     "bounces": (lambda block: setattr(block.data.cycles, "max_bounces", 1), "bounces are limited"),
     "shadows": (lambda block: setattr(block.data, "use_shadow", False), "casts no shadow"),
 }
@@ -293,6 +295,28 @@ def test_a_sheared_area_light_is_told_and_off_where_it_is_much(add_lamp, export,
     bpy.context.view_layer.update()
     lamps, reasons = export()
     assert "sheared" in reasons["Lamp"] and bool(lamps) == (scale < 2)
+
+
+@pytest.mark.parametrize("instanced", [False, True])
+def test_who_shares_the_data_of_a_sheared_area_light_shines_on_both_sides(
+    add_lamp, add, mesh_from, read_passes, tmp_path, instanced
+):
+    lamp = add_lamp("AREA", rotation=(0, 0, 0.5), energy=100)
+    if instanced:  # itself unsheared, and sheared in another place: off in both
+        collection = bpy.data.collections.new("Lamps")
+        collection.objects.link(lamp)
+        add(None, "Sheared", instance_type="COLLECTION", instance_collection=collection, scale=(1, 3, 1))
+    else:
+        lamp.parent = add(None, "Parent", scale=(1, 3, 1))
+    other = add(lamp.data, "Other", (2, 0, 5))
+    other.visible_camera = False
+    add(mesh_from("plane", size=20), "Floor")
+    job = Job(threads=2, level="direct", samples=16, width=48, height=32)
+    exported = jobs.both_sides(job, [tmp_path / "cycles.exr"])
+    traced, (cycles,) = render.render(exported, "direct", 16, threads=2), read_passes([tmp_path / "cycles.exr"])
+    assert [lamp.name for lamp in exported.lamps] == ["Other"]
+    ours, theirs = (passes["Combined"][..., :3].mean() for passes in (traced, cycles))
+    assert ours == pytest.approx(theirs, rel=0.02)  # calibrated: 0.002
 
 
 @pytest.fixture

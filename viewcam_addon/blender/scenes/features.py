@@ -88,9 +88,15 @@ def hidden_from(placed: Placed, layer: bpy.types.ViewLayer) -> frozenset[str]:
     """The kinds of rays (lights.RAYS) that don't see an object, be it by its own flags or by those of what places it."""
     evaluated, _, parent = placed
     hidden = {ray for ray in RAYS if not all(getattr(each, f"visible_{ray}") for each in (evaluated, parent))}
-    if parent.indirect_only_get(view_layer=layer) and not parent.holdout_get(view_layer=layer):
+    if parent.indirect_only_get(view_layer=layer) and not _is_holdout(parent, layer):
         hidden.add("camera")
     return frozenset(hidden)
+
+
+def _is_holdout(parent: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
+    """True if a hole takes the place of what this object places. The layer knows of none in a background set, where 5.2 has
+    one."""
+    return parent.is_holdout or parent.holdout_get(view_layer=layer)
 
 
 def is_surface(placed: Placed, ledger: Ledger, shading: Shading | None) -> bool:
@@ -128,7 +134,7 @@ def note_object(
     """
     evaluated, real, parent = placed
     name = placed.name
-    if parent.holdout_get(view_layer=depsgraph.view_layer_eval):
+    if _is_holdout(parent, depsgraph.view_layer_eval):
         ledger.note(name, "approximated", "a holdout, a plain object on both sides")
         ledger.set_for_cycles(parent.original, "is_holdout", False)
         for collection in _layer_collections(depsgraph.view_layer.layer_collection):

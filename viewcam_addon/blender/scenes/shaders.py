@@ -513,6 +513,8 @@ class Tree:
             return "has a mapping of its own"
         if ours == "texture_coordinate" and node.from_instancer and output.socket.name in ("UV", "Generated"):
             return "has its instancer's coordinates"
+        if ours == "brick" and versions.ROWS_NEED_HEIGHTS and constant_number(output, "Row Height") == 0:
+            return "has rows without a height, of which Cycles makes no number"
         if ours == "bump" and output.node.inputs.get("Filter Width") and constant_number(output, "Filter Width") is None:
             return "has a Filter Width that varies"
         if ours == "light_path" and self._shines and output.socket.identifier not in _SURE_OF_PATHS:

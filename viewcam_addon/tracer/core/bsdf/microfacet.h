@@ -141,6 +141,8 @@ struct MicrofacetTransmission : MicrofacetLobeOf<double> {
         return dot(wi, h) > 0 && dot(wo, h) < 0;
     }
     LobeSample sample(Vec2 u) const {
+        constexpr double UNBENT = 1e-4;  // as in Cycles, where light from a lamp comes in by all facets even so
+        if (std::fabs(ratio - 1) < UNBENT) return {frame.to_world(-wi), color * (gray(1) - reflectance(fresnel, wi.z)), INFINITE};
         Vec3 h = facets.sample_visible(wi, u);
         double cosine = dot(wi, h), squared = 1 - (1 - cosine * cosine) / (ratio * ratio);
         if (!(squared > 0)) return {frame.to_world(-wi), {}, 0};

@@ -112,7 +112,7 @@ struct GlossyClosure {
         FacetsOf<T> facets = anisotropy.of_glossy(at, normal, distribution.facets(at.number(roughness)));
         weight = weight * rgb;
         if (distribution.multiple) {
-            MultipleScatteringOf<T> more = multiple_reflection(at, normal, facets, unit_range(rgb));
+            MultipleScatteringOf<T> more = multiple_reflection(at, normal, facets, rgb);
             weight = weight * more.albedo * more.lobe;
         }
         add_reflection(bsdf, at, weight, normal, facets, NoFresnel{});

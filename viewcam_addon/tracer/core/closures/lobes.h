@@ -87,8 +87,7 @@ inline void add_reflection(BSDFOf<T>& bsdf, const At& at, Vec3Of<T> color, Vec3O
 // Adds the refraction of what `fresnel` lets through. ratio: see `refracted`.
 inline void add_refraction(BSDF& bsdf, const ShadingPoint& at, Vec3 color, Vec3 normal, const Facets& facets, const Fresnel& fresnel,
                            double ratio) {
-    constexpr double UNBENT = 1e-4;
-    if (at.is_smooth(facets) || std::fabs(ratio - 1) < UNBENT) {
+    if (at.is_smooth(facets)) {
         Vec3 let_through = gray(1) - reflectance<double>(fresnel, -dot(normal, at.incoming));
         bsdf.add(SpecularTransmission{color * let_through, normal, at.incoming, ratio});
         return;
@@ -109,7 +108,7 @@ inline void add_glass(BSDF& bsdf, const ShadingPoint& at, Vec3 weight, Vec3 norm
                       Vec3 reflected, Vec3 transmitted, bool multiple) {
     if (multiple && !at.is_smooth(facets)) {
         AlbedoOf<double> single = glass_albedo(roughness_of(facets), -dot(normal, at.incoming), ratio);
-        MultipleScattering more = MultipleScattering::of(single, unit_range(transmitted));
+        MultipleScattering more = MultipleScattering::of(single, transmitted);
         weight = weight * more.albedo * more.lobe;
     }
     add_reflection(bsdf, at, weight * reflected, normal, facets, fresnel);

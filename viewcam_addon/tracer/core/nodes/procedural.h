@@ -200,7 +200,9 @@ struct BrickNode {
         }
         int32_t brick = whole_number(safe::divide(p.x + moved, wide));
         double x = p.x + moved - wide * brick, y = p.y - high * row;
-        double size = at.number(mortar_size), nearest = min(min(x, y), min(wide - x, high - y)), share = 0;
+        double size = at.number(mortar_size), nearest = min(y, high - y), share = 0;
+        // In 5.2 bricks without a width have no mortar beside them.
+        if (wide != 0 || high == 0 || at.version < CYCLES_5_2) nearest = min(nearest, min(x, wide - x));
         if (nearest < size) {
             double smooth = at.number(mortar_smooth), t = smooth == 0 ? 1 : unit_range((1 - nearest / size) / smooth);
             share = t * t * (3 - 2 * t);
