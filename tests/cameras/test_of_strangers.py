@@ -307,10 +307,15 @@ def mitsuba():
     return 'type="thinlens"'.join(text.rsplit('type="perspective"', 1))
 
 
+def bop():
+    k = [600, 0, 320, 0, 600, 180, 0, 0, 1]
+    return json.dumps({"good": {"cam_K": k}, "bad": {"cam_K": [600, 5, *k[2:]]}})
+
+
 NAMED = [*enumerate(("good", "bad"))]
 MIXED = (
     *(transforms, colmap, colmap_binary, kalibr, opencv, skewed, metashape, meshroom, openmvg, realitycapture),
-    *(gltf, usd, three_js, mitsuba),
+    *(gltf, usd, three_js, mitsuba, bop),
 )
 
 
@@ -1002,3 +1007,29 @@ def test_cameras_called_by_a_drive_of_windows_are_no_files_there(form):
     called = [Camera(f"C:/{name}", CAMERAS["plain"]) for name in ("a", "b")]
     with pytest.raises(InputError, match="inside the folder"):
         cameras.write(called, form)
+
+
+def test_a_matrix_that_is_transposed_is_refused_by_its_last_row():
+    """Open3D's extrinsic row after row stood at the origin; MVSNet's and trajectories' last rows were not looked at."""
+    transposed = np.eye(4)
+    transposed[3, :3] = EYE
+    intrinsic = {"width": 640, "height": 360, "intrinsic_matrix": [600, 0, 0, 0, 600, 0, 319.5, 179.5, 1]}
+    one = {"class_name": "PinholeCameraParameters", "intrinsic": intrinsic, "extrinsic": transposed.T.ravel().tolist()}
+    numbers = files.text_of(transposed)
+    for text in (
+        json.dumps(one),
+        f"extrinsic\n{numbers}\n\nintrinsic\n600 0 320 0 600 180 0 0 1\n\n1 2\n",
+        f"{files.text_of(np.eye(4))}\n" * 30 + f"{numbers}\n",
+    ):
+        with pytest.raises(InputError, match=r"the last row of the matrix of .* transpose it"):
+            cameras.read(text, options=Options(view_plane=CAMERAS["plain"].plane))
+
+
+def test_of_open3ds_cameras_one_with_skew_keeps_none_of_the_others_back():
+    k = [600, 0, 0, 0, 600, 0, 319.5, 179.5, 1]
+    parameters = [
+        {"intrinsic": {"width": 640, "height": 360, "intrinsic_matrix": matrix}, "extrinsic": np.eye(4).ravel().tolist()}
+        for matrix in (k, [*k[:3], 5, *k[4:]])
+    ]
+    (camera,) = cameras.read(json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": parameters}))
+    assert camera.name == "00000" and any("'00001'" in note and "skew" in note for note in camera.notes)
