@@ -1014,10 +1014,10 @@ def test_a_matrix_that_is_transposed_is_refused_by_its_last_row():
     transposed = np.eye(4)
     transposed[3, :3] = EYE
     intrinsic = {"width": 640, "height": 360, "intrinsic_matrix": [600, 0, 0, 0, 600, 0, 319.5, 179.5, 1]}
-    one = {"class_name": "PinholeCameraParameters", "intrinsic": intrinsic, "extrinsic": transposed.T.ravel().tolist()}
+    alone = {"class_name": "PinholeCameraParameters", "intrinsic": intrinsic, "extrinsic": transposed.T.ravel().tolist()}
     numbers = files.text_of(transposed)
     for text in (
-        json.dumps(one),
+        json.dumps(alone),
         f"extrinsic\n{numbers}\n\nintrinsic\n600 0 320 0 600 180 0 0 1\n\n1 2\n",
         f"{files.text_of(np.eye(4))}\n" * 30 + f"{numbers}\n",
     ):
