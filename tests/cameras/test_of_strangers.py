@@ -1033,3 +1033,29 @@ def test_of_open3ds_cameras_one_with_skew_keeps_none_of_the_others_back():
     ]
     (camera,) = cameras.read(json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": parameters}))
     assert camera.name == "00000" and any("'00001'" in note and "skew" in note for note in camera.notes)
+
+
+@pytest.mark.parametrize("form", ["calibration", "message"])
+def test_of_two_cameras_in_one_yaml_none_is_made(form):
+    """The second document's numbers were read into the first one's; a message that was printed twice is one."""
+    text = files.ros(form, (1280, 800), (1, 1), (0, 0, 0, 0))
+    stamped = [f"header: {{seq: {seq}}}\n{text}---\n" for seq in (1, 2)]
+    (camera,) = cameras.read("".join(stamped))
+    assert camera.pinhole.distance == (410.5, 410.5)
+    assert "twice, with other values" in refusal(stamped[0] + stamped[1].replace("410.5", "500"))
+    assert "the key" in refusal(f"{text}{'width' if form == 'message' else 'image_width'}: 640\n")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"), [("633.25", ".nan", "'.nan'"), ("rows: 3", "rows: 2", "2 × 3"), ("410.5", "4_10", "'4_10'")]
+)
+def test_a_damaged_k_is_named(before, after, words):
+    text = files.ros("calibration", (1280, 800), (1, 1), (0, 0, 0, 0)).replace("distortion_model: plumb_bob", "")
+    assert "K of camera" in refusal(text.replace(before, after, 1)) and words in refusal(text.replace(before, after, 1))
+
+
+def test_a_pose_that_is_not_read_is_not_asked_for_again():
+    k = {"K": [[500, 0, 320], [0, 500, 180], [0, 0, 1]], "image_size": [640, 360], "position": [1, 2, 3]}
+    assert "give --pose" in refusal(json.dumps(k))
+    with pytest.raises(InputError, match="has position, of which no pose is read: write R and t"):
+        cameras.read(json.dumps(k), options=Options(pose="c2w_opencv"))
