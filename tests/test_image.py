@@ -114,6 +114,13 @@ def test_what_a_file_holds_in_place_of_known_passes_is_said(tmp_path):
         image.read(tmp_path / "a.exr")
 
 
+@pytest.mark.parametrize(("data", "kind"), [(b"\x89PNG\r\n", "a PNG"), (b"\xff\xd8\xff\xe0", "a JPEG"), (b"MM\0*", "a TIFF")])
+def test_a_picture_of_another_kind_is_named(tmp_path, data, kind):
+    (tmp_path / "a.exr").write_bytes(data)
+    with pytest.raises(InputError, match=f"is {kind}, which has no passes: render an EXR"):
+        image.read(tmp_path / "a.exr")
+
+
 def test_only_the_passes_asked_for_are_kept(tmp_path):
     image.write(tmp_path / "a.exr", Image(numbered()))
     assert set(image.read(tmp_path / "a.exr", only=["Depth", "UV"]).passes) == {"Depth", "UV"}

@@ -18,6 +18,7 @@ OpenEXR learned last (HTJ2K, ZSTD), which Blender can't read. It is imported whe
 must not have a second copy of that library.
 """
 
+import contextlib
 import dataclasses
 import json
 import math
@@ -295,7 +296,15 @@ def _headers(path: Path) -> list[dict[str, Any]]:
         raise _unreadable(path, error) from error
 
 
+_OTHERS = {b"\x89PNG": "a PNG", b"\xff\xd8\xff": "a JPEG", b"II*\0": "a TIFF", b"MM\0*": "a TIFF", b"#?RA": "Radiance's HDR"}
+"""The beginnings of pictures that have no passes, and what they are."""
+
+
 def _unreadable(path: Path, error: Exception) -> InputError:
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        head = file.read(4)
+        if kind := next((kind for begin, kind in _OTHERS.items() if head.startswith(begin)), None):
+            return InputError(f"{path} is {kind}, which has no passes: render an EXR")
     return InputError(f"{path} can't be read as an EXR file ({_first_line(error)}): render it again")
 
 

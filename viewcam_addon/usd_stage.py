@@ -139,7 +139,7 @@ def _read(request: dict[str, Any]) -> dict[str, Any]:
         "left_out": layers.left_out,
     }
     samples = 0
-    for prim in stage.Traverse():
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if value := _text(partial(prim.GetCustomDataByKey, request["values"])):
             result["values"].append(value)
         if not prim.IsA(UsdGeom.Camera):

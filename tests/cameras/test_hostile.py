@@ -224,6 +224,13 @@ LARGE = {
             ],
         }
     ),
+    "nested cameras": json.dumps(
+        {
+            "asset": {"version": "2.0"},
+            "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}],
+            "nodes": [*({"camera": 0, "children": [i + 1]} for i in range(6_000)), {}],
+        }
+    ),
     "numbers": "1 2 3 4 5 6 7 8\n" * 15_000,
     "words": "eye " * 62_500,
     "yaml": "camera_matrix: a\n" * 15_000,

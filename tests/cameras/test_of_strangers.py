@@ -307,10 +307,15 @@ def mitsuba():
     return 'type="thinlens"'.join(text.rsplit('type="perspective"', 1))
 
 
+def bop():
+    k = [600, 0, 320, 0, 600, 180, 0, 0, 1]
+    return json.dumps({"good": {"cam_K": k}, "bad": {"cam_K": [600, 5, *k[2:]]}})
+
+
 NAMED = [*enumerate(("good", "bad"))]
 MIXED = (
     *(transforms, colmap, colmap_binary, kalibr, opencv, skewed, metashape, meshroom, openmvg, realitycapture),
-    *(gltf, usd, three_js, mitsuba),
+    *(gltf, usd, three_js, mitsuba, bop),
 )
 
 
@@ -995,3 +1000,62 @@ def test_a_table_is_read_with_blanks_at_its_end_and_middleburys_without_a_line_e
     assert camera.pinhole.eye == (1, 2, 3)
     (camera,) = cameras.read("1\na.png 500 0 320 0 500 180 0 0 1 1 0 0 0 1 0 0 0 1 0 0 0", options=GIVEN)
     assert camera.pinhole.distance == (500, 500)
+
+
+@pytest.mark.parametrize("form", ["opencv", "sidecar"])
+def test_cameras_called_by_a_drive_of_windows_are_no_files_there(form):
+    called = [Camera(f"C:/{name}", CAMERAS["plain"]) for name in ("a", "b")]
+    with pytest.raises(InputError, match="inside the folder"):
+        cameras.write(called, form)
+
+
+def test_a_matrix_that_is_transposed_is_refused_by_its_last_row():
+    """Open3D's extrinsic row after row stood at the origin; MVSNet's and trajectories' last rows were not looked at."""
+    transposed = np.eye(4)
+    transposed[3, :3] = EYE
+    intrinsic = {"width": 640, "height": 360, "intrinsic_matrix": [600, 0, 0, 0, 600, 0, 319.5, 179.5, 1]}
+    alone = {"class_name": "PinholeCameraParameters", "intrinsic": intrinsic, "extrinsic": transposed.T.ravel().tolist()}
+    numbers = files.text_of(transposed)
+    for text in (
+        json.dumps(alone),
+        f"extrinsic\n{numbers}\n\nintrinsic\n600 0 320 0 600 180 0 0 1\n\n1 2\n",
+        f"{files.text_of(np.eye(4))}\n" * 30 + f"{numbers}\n",
+    ):
+        with pytest.raises(InputError, match=r"the last row of the matrix of .* transpose it"):
+            cameras.read(text, options=Options(view_plane=CAMERAS["plain"].plane))
+
+
+def test_of_open3ds_cameras_one_with_skew_keeps_none_of_the_others_back():
+    k = [600, 0, 0, 0, 600, 0, 319.5, 179.5, 1]
+    parameters = [
+        {"intrinsic": {"width": 640, "height": 360, "intrinsic_matrix": matrix}, "extrinsic": np.eye(4).ravel().tolist()}
+        for matrix in (k, [*k[:3], 5, *k[4:]])
+    ]
+    (camera,) = cameras.read(json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": parameters}))
+    assert camera.name == "00000" and any("'00001'" in note and "skew" in note for note in camera.notes)
+
+
+@pytest.mark.parametrize("form", ["calibration", "message"])
+def test_of_two_cameras_in_one_yaml_none_is_made(form):
+    """The second document's numbers were read into the first one's; a message that was printed twice is one."""
+    text = files.ros(form, (1280, 800), (1, 1), (0, 0, 0, 0))
+    stamped = [f"header: {{seq: {seq}}}\n{text}---\n" for seq in (1, 2)]
+    (camera,) = cameras.read("".join(stamped))
+    assert camera.pinhole.distance == (410.5, 410.5)
+    assert "twice, with other values" in refusal(stamped[0] + stamped[1].replace("410.5", "500"))
+    assert "the key" in refusal(f"{text}{'width' if form == 'message' else 'image_width'}: 640\n")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"), [("633.25", ".nan", "'.nan'"), ("rows: 3", "rows: 2", "2 × 3"), ("410.5", "4_10", "'4_10'")]
+)
+def test_a_damaged_k_is_named(before, after, words):
+    text = files.ros("calibration", (1280, 800), (1, 1), (0, 0, 0, 0)).replace("distortion_model: plumb_bob", "")
+    assert "K of camera" in refusal(text.replace(before, after, 1)) and words in refusal(text.replace(before, after, 1))
+
+
+def test_a_pose_that_is_not_read_is_not_asked_for_again():
+    k = {"K": [[500, 0, 320], [0, 500, 180], [0, 0, 1]], "image_size": [640, 360], "position": [1, 2, 3]}
+    assert "give --pose" in refusal(json.dumps(k))
+    with pytest.raises(InputError, match="has position, of which no pose is read: write R and t"):
+        cameras.read(json.dumps(k), options=Options(pose="c2w_opencv"))

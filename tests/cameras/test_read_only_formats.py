@@ -802,6 +802,7 @@ K = {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "image_size": [640, 480]}
         ({"model": "fisheye", "dist": [0.1, 0, 0, 0, 0]}, "fisheye has four"),
         ({"distortion_model": "fov"}, "fov"),
         ({"cam_to_robot_transform": np.eye(4).tolist()}, "whose axes"),
+        ({"qw": 1, "qx": 0, "qy": 0, "qz": 0, "tx": 1, "ty": 2, "tz": 3}, "has qw, qx, qy, qz, of which no pose is read"),
         ({"binning_x": 1.5}, "whole number of pixels"),
         ({"K": [[1.2, 0, 0.5], [0, 1.6, 0.5], [0, 0, 1]]}, "widths of the picture"),
     ],
@@ -916,9 +917,9 @@ def test_yaml_in_brackets_is_read_as_pyyaml_reads_it():
 
     yaml = pytest.importorskip("yaml")
     text = "a: {rows: 3, 'b c': [1.5, 2, [x y, 4]], d: {e: http://f/g, h: {}}}\nk: [[1, 2], [3, -4.0e-3]]\n"
-    assert ours.read(text) == yaml.safe_load(text)
+    assert ours.read(text) == (yaml.safe_load(text), [])
     for broken in ("[1, 2", "[1 2]]", "{a: 1", "{a: 1]", "[" * 50 + "]" * 50, "{[1]: 2}"):
-        assert ours.read(f"k: {broken}\nl: 1\n").get("k") in (broken, f"{broken} l: 1", None)
+        assert ours.read(f"k: {broken}\nl: 1\n")[0].get("k") in (broken, f"{broken} l: 1", None)
 
 
 def test_infinigens_t_is_the_camera_in_the_world_and_its_k_counts_from_the_corner(tmp_path):

@@ -264,3 +264,15 @@ def test_a_mark_of_the_byte_order_before_a_stage_is_said_by_openusd(tmp_path):
     path.write_text("\ufeff#usda 1.0\n", encoding="utf-8")
     with pytest.raises(InputError, match="no stage that USD can open"):
         cameras.read(path)
+
+
+@pytest.mark.usefixtures("openusd_in_this_process")
+def test_a_camera_of_an_asset_stands_wherever_that_is_an_instance():
+    place = 'double3 xformOp:translate = ({}, 0, 0)\n uniform token[] xformOpOrder = ["xformOp:translate"]'
+    asset = 'class "Asset"\n{\n def Camera "Cam" {}\n}\n'
+    instances = (
+        f'def Xform "{name}" (\n inherits = </Asset>\n instanceable = true\n)\n{{\n {place.format(x)}\n}}\n'
+        for name, x in (("A", 1), ("B", 2))
+    )
+    read_cameras = read(f'#usda 1.0\n(\n metersPerUnit = 1\n upAxis = "Z"\n)\n{asset}{"".join(instances)}')
+    assert [camera.pinhole.eye for camera in read_cameras] == [(1, 0, 0), (2, 0, 0)]

@@ -110,7 +110,7 @@ def test_all_passes_are_asked_of_cycles(paper_scene):
         compare(paper_scene.picture(), only(paper_scene.rendered(), "Depth", "Position"), paper_scene.pinhole)
 
 
-@pytest.mark.parametrize("nothing", [0.0, np.inf, 1e10, 3e38, -1.0, 65504.0, -np.inf])
+@pytest.mark.parametrize("nothing", [0.0, np.inf, 1e10, 3e38, -1.0, 65504.0, -np.inf, np.nan])
 def test_nothing_is_nothing_however_a_renderer_writes_it(nothing, paper_scene):
     reference = paper_scene.picture()
     missed = reference["Depth"] >= BACKGROUND_DEPTH
@@ -120,7 +120,7 @@ def test_nothing_is_nothing_however_a_renderer_writes_it(nothing, paper_scene):
     assert (actual["Depth"] == reference["Depth"]).all() and (actual["Position"][missed[..., 0]] == 0).all()
 
 
-@pytest.mark.parametrize("nothing", [0.0, np.inf, 1e10])
+@pytest.mark.parametrize("nothing", [0.0, np.inf, 1e10, np.nan])
 @pytest.mark.parametrize("names", [("Depth",), ("Distance",), ("Position",), ("Depth", "Distance", "Position", "Normal")])
 def test_pictures_are_the_same_whatever_their_passes_hold_where_nothing_is(names, nothing, paper_scene):
     """Depth and Position together were taken as they are, and a distance of 1e10 for a surface at that depth."""
@@ -134,6 +134,13 @@ def test_pictures_are_the_same_whatever_their_passes_hold_where_nothing_is(names
     }
     wrong = judged(paper_scene, replace(picture, passes={name: values.astype(np.float32) for name, values in passes.items()}))
     assert not wrong.passed and "of coverage" in wrong.sentence, "a column of it is said to be a surface"
+
+
+def test_what_is_no_number_beside_what_is_nothing_is_not_the_same(paper_scene):
+    test = only(paper_scene.rendered(), "Depth")
+    sky = np.argwhere(test["Depth"][..., 0] >= BACKGROUND_DEPTH)[0]
+    test["Depth"][*sky] = np.nan
+    assert "not a number" in judged(paper_scene, test).sentence
 
 
 def test_the_scene_is_not_asked_for_where_it_is_given(paper_scene):

@@ -98,10 +98,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
     matrix = checks.array(f"the matrix of {what}", matrix)
     if matrix.shape not in ((3, 4), (4, 4)):
         raise InputError(f"the matrix of {what} is {' × '.join(map(str, matrix.shape))}: give 3 × 4 or 4 × 4 numbers")
-    rows = matrix.tolist()
-    if len(rows) == 4 and max(map(abs, map(float.__sub__, rows.pop(), (0.0, 0.0, 0.0, 1.0)))) > _NOTED:
-        hint = "transpose it" if not any(row[3] for row in rows) else "it should be 0 0 0 1"
-        raise InputError(f"the last row of the matrix of {what} is {checks.quoted(matrix[3].tolist())}: {hint}")
+    rows = upper_rows(matrix, what)
     eye = checks.vector(f"the eye of {what}", [row[3] for row in rows], 3)
     away = math.hypot(*eye)
     if not away < _FARTHEST:
@@ -115,6 +112,15 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
         eye=eye, look_at=tuple(a - reach * b for a, b in zip(eye, z, strict=True)), up=y, **vars(plane), mirrored=mirrored
     )
     return camera, notes
+
+
+def upper_rows(matrix: np.ndarray, what: str) -> list[list[float]]:
+    """The upper three rows. Raises InputError if there is a fourth and it is not 0 0 0 1."""
+    *rows, last = [*matrix.tolist(), [0.0, 0.0, 0.0, 1.0]][:4]
+    if max(map(abs, map(float.__sub__, last, (0.0, 0.0, 0.0, 1.0)))) > _NOTED:
+        hint = "transpose it" if not any(row[3] for row in rows) else "it should be 0 0 0 1"
+        raise InputError(f"the last row of the matrix of {what} is {checks.quoted(last)}: {hint}")
+    return rows
 
 
 def pinholes(matrices: np.ndarray, planes: Sequence[ViewPlane], whats: Sequence[str]) -> list[tuple[Pinhole, tuple[str, ...]]]:

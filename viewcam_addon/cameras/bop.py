@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from . import axes, naming, opencv, own
-from .camera import Camera, Options
+from .camera import Camera, LeftOut, Options
 from .source import Record, Source, image_size, pixels
 
 TITLE = "BOP scene_camera.json and camera.json"
@@ -36,22 +36,26 @@ def read(source: Source, options: Options) -> list[Camera]:
         return [_of_sensor(source, options)]
     if (source_of_all := _document(source)) is None:
         return []
-    source, cameras = source_of_all, []
+    source, left_out, cameras = source_of_all, LeftOut(), []
     for number, values in source.document.items():
-        image = Record(values, f"image {number}")
-        name, size, stated = _picture(source, number, image, options)
-        plane = opencv.plane_of_k(image.numbers("cam_K", 9), size, opencv.half_pixel(options), image.place)
-        notes = (*opencv.told_of_half_pixel(options, "BOP"), *(() if options.scale != 1 else (_UNITS,)))
-        turn, translation = np.eye(3), (0.0, 0.0, 0.0)
-        if "cam_R_w2c" in image or "cam_t_w2c" in image:
-            turn = np.array(image.numbers("cam_R_w2c", 9)).reshape(3, 3)
-            x, y, z = image.numbers("cam_t_w2c", 3)
-            translation = x, y, z
-        else:
-            notes += (_NO_WORLD,)
-        pinhole, more = axes.pinhole(axes.from_world_to_camera(turn, translation, image.place), plane, image.place)
-        cameras.append(Camera(str(number), pinhole, stated, (*notes, *more), name))
-    return cameras
+        with left_out.unless_pinhole(str(number)):
+            cameras.append(_of_image(source, number, Record(values, f"image {number}"), options))
+    return left_out.with_notes(cameras)
+
+
+def _of_image(source: Source, number: str, image: Record, options: Options) -> Camera:
+    name, size, stated = _picture(source, number, image, options)
+    plane = opencv.plane_of_k(image.numbers("cam_K", 9), size, opencv.half_pixel(options), image.place)
+    notes = (*opencv.told_of_half_pixel(options, "BOP"), *(() if options.scale != 1 else (_UNITS,)))
+    turn, translation = np.eye(3), (0.0, 0.0, 0.0)
+    if "cam_R_w2c" in image or "cam_t_w2c" in image:
+        turn = np.array(image.numbers("cam_R_w2c", 9)).reshape(3, 3)
+        x, y, z = image.numbers("cam_t_w2c", 3)
+        translation = x, y, z
+    else:
+        notes += (_NO_WORLD,)
+    pinhole, more = axes.pinhole(axes.from_world_to_camera(turn, translation, image.place), plane, image.place)
+    return Camera(str(number), pinhole, stated, (*notes, *more), name)
 
 
 def notes_in(source: Source) -> list[str]:

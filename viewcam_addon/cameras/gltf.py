@@ -14,7 +14,6 @@ import math
 import re
 import struct
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -40,8 +39,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     document = Record(_document(source), source.name)
     cameras = document.records("cameras", "camera") if "cameras" in document else []
     nodes = document.records("nodes", "node") if "nodes" in document else []
-    worlds = _Worlds(nodes)
-    moving = _moving(document)
+    worlds = _Worlds(nodes, _moving(document))
     left_out, result = LeftOut(InputError), []
     for index, node in enumerate(nodes):
         if "camera" not in node:
@@ -52,7 +50,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         )
         with left_out.unless_pinhole(name):
             result.append(_camera(name, camera, worlds.of(index), options))
-            if moving & {index, *worlds.above(index)}:
+            if worlds.moves(index):
                 result[-1] = result[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
     names = naming.distinct([camera.name for camera in result])
     return left_out.with_notes([dataclasses.replace(camera, name=name) for camera, name in zip(result, names, strict=True)])
@@ -99,10 +97,10 @@ def _json(source: Source) -> Source:
 class _Worlds:
     """The nodes' matrices in the world."""
 
-    def __init__(self, nodes: list[Record]) -> None:
-        self._nodes = nodes
+    def __init__(self, nodes: list[Record], moving: set[int]) -> None:
+        self._nodes, self._moving = nodes, moving
         self._parents: dict[int, int] = {}
-        self._known: dict[int, Any] = {}
+        self._known: dict[int, tuple[np.ndarray, bool]] = {}
         for index, node in enumerate(nodes):
             for child in _list(node.get("children")):
                 if not isinstance(child, int) or not 0 <= child < len(nodes) or child in self._parents:
@@ -111,24 +109,23 @@ class _Worlds:
                     )
                 self._parents[child] = index
 
-    def above(self, index: int) -> list[int]:
-        """The node's parents, nearest first."""
-        result: list[int] = []
-        parent = self._parents.get(index)
-        while parent is not None:
-            if len(result) > len(self._nodes):
-                raise InputError(f"node {parent} is its own parent: correct its children")
-            result.append(parent)
-            parent = self._parents.get(parent)
-        return result
-
     def of(self, index: int) -> np.ndarray:
-        matrix = np.eye(4)
-        for node in reversed([index, *self.above(index)]):
-            if node not in self._known:
-                self._known[node] = _local(self._nodes[node])
-            matrix = matrix @ self._known[node]
+        node: int | None = index
+        unknown: list[int] = []
+        while node is not None and node not in self._known:
+            if len(unknown) > len(self._nodes):
+                raise InputError(f"node {node} is its own parent: correct its children")
+            unknown.append(node)
+            node = self._parents.get(node)
+        matrix, moves = (np.eye(4), False) if node is None else self._known[node]
+        for node in reversed(unknown):
+            matrix, moves = matrix @ _local(self._nodes[node]), moves or node in self._moving
+            self._known[node] = matrix, moves
         return matrix
+
+    def moves(self, index: int) -> bool:
+        """True if the node or one above it is animated, whose matrix was asked for."""
+        return self._known[index][1]
 
 
 def _local(node: Record) -> np.ndarray:

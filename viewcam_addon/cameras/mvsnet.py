@@ -65,7 +65,7 @@ def _camera(file: Source, name: str, options: Options) -> Camera:
     size = image_size(picture) if picture else None
     half = opencv.half_pixel(options, "corner")
     plane = opencv.plane_of_k(intrinsic[:9], size or options.size_or_refuse(what), half, what)
-    rows = np.array(extrinsic[:12]).reshape(3, 4)
+    rows = np.array(axes.upper_rows(np.array(extrinsic).reshape(-1, 4), what))
     pinhole, notes = axes.pinhole(axes.from_world_to_camera(rows[:, :3], rows[:, 3].tolist(), what), plane, what)
     return Camera(name, pinhole, size is not None, notes, f"{name}.jpg" if picture is None else picture.name)
 

@@ -8,7 +8,7 @@ import contextlib
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from .. import checks
 from ..errors import InputError, several
@@ -100,7 +100,8 @@ def check_image(file: object) -> None:
 
     Raises InputError if it leaves its folder, or is no line of text.
     """
-    if not isinstance(file, str) or any(map(_is_unseen, file)) or "\\" in file or {"", ".", ".."} & set(file.split("/")):
+    is_line = isinstance(file, str) and not any(map(_is_unseen, file)) and "\\" not in file
+    if not is_line or PureWindowsPath(str(file)).drive or {"", ".", ".."} & set(str(file).split("/")):
         raise InputError(
             f"file is {checks.quoted(file)}: give the picture's path inside the folder of the batch, as in images/left.png"
         )

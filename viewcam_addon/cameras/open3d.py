@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import InputError
 from ..pinhole import Pinhole
 from . import axes, opencv
-from .camera import Camera, Options
+from .camera import Camera, LeftOut, Options
 from .source import Record, Source
 
 TITLE = "camera parameters, trajectories and views of Open3D (JSON)"
@@ -45,18 +45,23 @@ def read(source: Source, options: Options) -> list[Camera]:
     if _is_intrinsic(source):
         top = Record({"intrinsic": dict(source.document), "extrinsic": np.eye(4).ravel().tolist()}, source.name)
     records = top.records("parameters", "camera") if top.get("class_name") == _SEVERAL else [top]
-    cameras = []
+    left_out, cameras = LeftOut(), []
     for number, record in enumerate(records):
-        intrinsic = record.record("intrinsic")
-        size = intrinsic.size("width"), intrinsic.size("height")
-        k = np.array(intrinsic.numbers("intrinsic_matrix", 9)).reshape(3, 3).T
-        plane = opencv.plane_of_k(k.ravel().tolist(), size, opencv.half_pixel(options), intrinsic.place)
-        extrinsic = np.array(record.numbers("extrinsic", 16)).reshape(4, 4).T
-        matrix = axes.from_world_to_camera(extrinsic[:3, :3], extrinsic[:3, 3].tolist(), record.place)
-        pinhole, notes = axes.pinhole(matrix, plane, record.place)
-        notes = (*opencv.told_of_half_pixel(options, "Open3D"), *notes)
-        cameras.append(Camera(f"{number:05d}", pinhole, True, notes))
-    return cameras
+        with left_out.unless_pinhole(f"{number:05d}"):
+            cameras.append(_camera(record, f"{number:05d}", options))
+    return left_out.with_notes(cameras)
+
+
+def _camera(record: Record, name: str, options: Options) -> Camera:
+    intrinsic = record.record("intrinsic")
+    size = intrinsic.size("width"), intrinsic.size("height")
+    k = np.array(intrinsic.numbers("intrinsic_matrix", 9)).reshape(3, 3).T
+    plane = opencv.plane_of_k(k.ravel().tolist(), size, opencv.half_pixel(options), intrinsic.place)
+    extrinsic = np.array(axes.upper_rows(np.array(record.numbers("extrinsic", 16)).reshape(4, 4).T, record.place))
+    matrix = axes.from_world_to_camera(extrinsic[:3, :3], extrinsic[:3, 3].tolist(), record.place)
+    pinhole, notes = axes.pinhole(matrix, plane, record.place)
+    notes = (*opencv.told_of_half_pixel(options, "Open3D"), *notes)
+    return Camera(name, pinhole, True, notes)
 
 
 def _view(view: Record, number: int, options: Options) -> Camera:

@@ -82,6 +82,8 @@ NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4",
 """The names of the distortion's coefficients, in OpenCV's order."""
 _WIDEST = 50  # widths of the picture to a focal length, which are 177.7°
 _UNSAID = f"whose axes it means and which way it goes is not said: give --pose, one of {', '.join(POSES)}"
+_UNREAD = "of which no pose is read: write R and t, world to camera, or a matrix of 4 × 4"
+_POSE_BY_NUMBER: tuple[tuple[str, ...], ...] = (("qw", "qx", "qy", "qz"), ("tx", "ty", "tz"), ("roll", "pitch", "yaw"))
 _WAY = "R and t were taken as from world to camera, x right, y down, z into the view"
 
 
@@ -94,6 +96,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         raise InputError(
             f"{source.name} has R and T and no K: give the file that has it, as intrinsics.yml with this one beside it"
         )
+    refuse_twice(source)
     left_out, cameras, before = LeftOut(), [], np.eye(4)
     named = [*_cameras_in(source)]
     if any("tcncnm1" in values for _, values in named):  # writers of YAML sort cam10 before cam2
@@ -105,6 +108,14 @@ def read(source: Source, options: Options) -> list[Camera]:
         with left_out.unless_pinhole(name):
             cameras.append(camera(name, values, options))
     return left_out.with_notes(cameras)
+
+
+def refuse_twice(source: Source) -> None:
+    """Raise InputError if YAML has something of a camera twice, with other values."""
+    if source.is_folder or source.npz or source.document or source.text.lstrip().startswith(("<", "[", "{")):
+        return
+    if twice := [key for key in source.yaml_twice if is_known(plain(key))]:
+        raise InputError(f"{source.name} has the key {checks.quoted(twice[0])} twice, with other values: leave one out")
 
 
 def _four_rows(value: Any, name: str) -> np.ndarray:
@@ -220,7 +231,7 @@ def _is_camera(values: Mapping[str, Any]) -> bool:
     try:
         return len(_numbers("K", k)) in (4, 9, 12)
     except InputError:
-        return False
+        return isinstance(k, dict) and {"rows", "cols", "data"} <= k.keys()  # a matrix, and what is wrong is said
 
 
 def _cameras_in(source: Source) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -521,7 +532,7 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
         pinhole, more_of_pose = axes.pinhole(matrix, options.plane_or_refuse(what), what)
         return Camera(name, pinhole, False, (*more, *more_of_pose))
     size, stated = _size(values, what, options)
-    plane = plane_of_k(_numbers("K", k), size, half_pixel(options), what)
+    plane = plane_of_k(_numbers(f"K of {what}", k), size, half_pixel(options), what)
     plane, windowed = of_window(plane, values, what)
     bent = _coefficients(values, what, is_fisheye)
     if "inverse" in str(values.get("model", "")).lower() and any(
@@ -627,7 +638,12 @@ def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.nd
     if turn is None and vector is None and translation is None:
         for name, value in values.items():
             if name not in _NO_POSE and isinstance(value, list | dict) and _MAY_BE_POSE.search(name):
-                raise InputError(f"{what} has {name}, and {_UNSAID}")
+                raise InputError(
+                    f"{what} has {name}, and {_UNSAID}" if options.pose is None else f"{what} has {name}, {_UNREAD}"
+                )
+        for names in _POSE_BY_NUMBER:
+            if {*names} <= values.keys():
+                raise InputError(f"{what} has {', '.join(names)}, {_UNREAD}")
         return axes.of_opencv(np.eye(4)), (f"{what} has no pose: it stands at the origin and looks along z, y down",)
     if (turn is None and vector is None) or translation is None:
         raise InputError(f"{what} has only a part of its pose: give R or rvec, and t")

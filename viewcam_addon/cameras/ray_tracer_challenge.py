@@ -42,7 +42,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         if line.strip() and len(line) - len(line.lstrip()) <= len(matches[0][1]):
             break
         lines.append(line)
-    values = Record(yaml.read("\n".join(lines)), "the camera")
+    values = Record(yaml.read("\n".join(lines))[0], "the camera")
     size = values.size("width"), values.size("height")
     eye, look_at, up = (_vector(values, key) for key in ("from", "to", "up"))
     angle = values.number("field-of-view")

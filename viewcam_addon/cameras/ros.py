@@ -31,6 +31,7 @@ def recognizes(source: Source) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
+    opencv.refuse_twice(source)
     document = Record(source.yaml, source.name)
     name = str(document.values.get("camera_name") or "camera")
     what = f"camera {checks.quoted(name)}"

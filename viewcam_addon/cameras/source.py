@@ -175,6 +175,15 @@ class Source:
     @cached_property
     def yaml(self) -> dict[str, Any]:
         """The keys of the part of YAML in which cameras are written."""
+        return self._yaml[0]
+
+    @property
+    def yaml_twice(self) -> list[str]:
+        """The keys of that which are there twice, with other values."""
+        return self._yaml[1]
+
+    @cached_property
+    def _yaml(self) -> tuple[dict[str, Any], list[str]]:
         return yaml.read(self.text)
 
     @cached_property

@@ -62,6 +62,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     matrices = np.tile(np.eye(4), (len(rows), 1, 1))
     if kind in _STEPS:
         times = np.arange(len(rows)) * _STEPS[kind]
+        for index in np.flatnonzero((rows[:, 12:] != _PINNED[: rows.shape[1] - 12]).any(axis=1)).tolist():
+            axes.upper_rows(rows[index].reshape(4, 4), whats[index])
         matrices[:, :3] = rows[:, :12].reshape(-1, 3, 4)
     else:
         times = rows[:, 0] * (1 if kind == "TUM" else 1e-9)
@@ -121,8 +123,10 @@ def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | N
     own = Record(beside.yaml, str(beside.path)) if beside else None
     is_fisheye = opencv.says_fisheye(values.values, "cam0")
     mounted = np.array(values.record("T_BS").numbers("data", 16)).reshape(4, 4)
+    axes.upper_rows(mounted, str(file.path))
     if own and "T_BS" in own:  # where what was tracked, as a Vicon marker, stands on the body
-        turn, at = np.hsplit(np.array(own.record("T_BS").numbers("data", 16)).reshape(4, 4)[:3], [3])
+        tracked = np.array(own.record("T_BS").numbers("data", 16)).reshape(4, 4)
+        turn, at = np.hsplit(np.array(axes.upper_rows(tracked, own.place)), [3])
         back = np.eye(4)
         back[:3] = np.hstack([turn.T, -turn.T @ at])
         mounted = back @ mounted

@@ -26,6 +26,7 @@ from .. import npy
 from ..errors import InputError, several
 from ..files import read_bytes, written_whole
 from ..pinhole import ViewPlane
+from ..terminal import silent_libraries
 from . import colmap, naming, transforms
 from .camera import Camera
 from .distortion import Lens
@@ -337,8 +338,11 @@ def _decoded(data: bytes, file: Path) -> np.ndarray:
             raise InputError(f"{file} is no array of numbers ({error}): write it again") from None
     else:
         cv2 = importlib.import_module("cv2")
+        if data.startswith(b"\xff\xd8") and data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda"):  # which is gray from there on
+            raise InputError(f"{file} is a JPEG that ends in the middle: copy it again")
         try:
-            pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+            with silent_libraries():
+                pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
         except cv2.error:
             pixels = None
     if pixels is None or pixels.ndim not in (2, 3) or min(pixels.shape[:2]) < 2:

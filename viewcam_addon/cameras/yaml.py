@@ -15,9 +15,13 @@ _FLOW = re.compile(r"""[\[\]{},]|:(?=[\s\[\]{},"']|$)|"[^"]*"|'[^']*'|[^\s\[\]{}
 _DEEPEST = 8
 
 
-def read(text: str) -> dict[str, Any]:
-    """The keys of a text and what stands there; none of what is not of this part of YAML."""
+def read(text: str) -> tuple[dict[str, Any], list[str]]:
+    """The keys of a text and what stands there; none of what is not of this part of YAML.
+
+    Returns the keys, of several documents all of them, and the names of those that are there twice with other values.
+    """
     root: dict[str, Any] = {}
+    twice: list[tuple[str, Any, Any]] = []
     stack: list[tuple[int, dict[str, Any]]] = [(-1, root)]
     block: list[tuple[int, list]] = []
     for line in _joined(text):
@@ -30,6 +34,7 @@ def read(text: str) -> dict[str, Any]:
         while indent <= stack[-1][0]:
             stack.pop()
         holder, block = stack[-1][1], []
+        before = holder.get(key)
         if value:
             holder[key] = _value(value)
         elif len(stack) <= _DEEPEST:
@@ -37,7 +42,14 @@ def read(text: str) -> dict[str, Any]:
             holder[key] = inner
             stack.append((indent, inner))
             block = [(indent, inner.items_of_list)]
-    return _settled_blocks(root)
+        if before is not None:
+            twice.append((key, before, holder[key]))
+    return _settled_blocks(root), [key for key, *values in twice if not _are_same(*values)]
+
+
+def _are_same(before: Any, after: Any) -> bool:
+    settled = [_settled_blocks({"": value})[""] for value in (before, after)]
+    return bool(settled[0] == settled[1])
 
 
 def _append(opened: list[tuple[int, list]], indent: int, text: str) -> None:

@@ -119,7 +119,8 @@ def completed(picture: Image, pinhole: Pinhole) -> Image:
 
     A Position that is made lies on the ray through its pixel's center. Nothing was hit where the first of these that is there
     has 0 (a Position in all of its coordinates), BACKGROUND_DEPTH and more, what is infinite, or as a depth the largest half
-    float, or less than 0 beside others that are more; all passes hold there what the tracer's do.
+    float, or less than 0 beside others that are more; or, where none of these is anywhere, what is no number. All passes hold
+    there what the tracer's do.
     """
     passes = dict(picture.passes)
     name = next(name for name in ("Depth", "Distance", "Position") if name in passes)
@@ -129,6 +130,8 @@ def completed(picture: Image, pinhole: Pinhole) -> Image:
         missed |= measure == _LARGEST_HALF
         if (measure[~missed] > 0.0).any():
             missed |= measure < 0.0
+    if not missed.any():
+        missed = np.isnan(measure).all(axis=-1, keepdims=True)
     w = pinhole.basis()[2]
     rows, columns = np.mgrid[: pinhole.height, : pinhole.width]
     directions = pinhole.ray_directions(columns.ravel(), rows.ravel()).reshape(*rows.shape, 3)
