@@ -65,7 +65,7 @@ struct ShadingPoint {
         double size = length(requested);
         return size > 0 && size < INFINITE ? requested / size : point.shading;
     }
-    // The same of whatever length it has, as nodes compute with it.
+    // That normal of whatever length it has, as nodes compute with it.
     Vec3 unscaled_normal(const Color& input) const {
         if (input.node != NONE) return value_of_node(input.node);
         return is_black(input.rgb) ? point.shading : input.rgb;
