@@ -41,6 +41,7 @@ _TIMES = 8
 _MOST_LAYERS = 1_000
 _MOST_SAMPLES = 100_000
 _SUFFIXES = (".usd", ".usda", ".usdc")
+_MODELS = ("cameraProjectionType", "omni:lensdistortion:model")  # Omniverse's, of other lenses
 _LENS = (
     *("Projection", "FocalLength", "HorizontalAperture", "VerticalAperture", "HorizontalApertureOffset"),
     *("VerticalApertureOffset", "FStop"),
@@ -250,6 +251,9 @@ def _samples(prim: Any, stage: Any, size: str, usd: Any, usd_geom: Any) -> list[
         code = usd.TimeCode(moment) if is_moving or moment else usd.TimeCode.EarliestTime()
         sample = {name: _plain(getattr(camera, f"Get{name}Attr")().Get(code)) for name in _LENS}
         sample["matrix"] = [number for row in camera.ComputeLocalToWorldTransform(code) for number in row]
+        sample["model"] = next(
+            filter(None, (_plain(prim.GetAttribute(name).Get()) for name in _MODELS if prim.HasAttribute(name))), None
+        )
         sample["size"] = _plain(prim.GetAttribute(size).Get()) if prim.HasAttribute(size) else None
         sample |= {"time": moment if is_moving else None, "seconds": None}
         if is_moving:

@@ -327,7 +327,7 @@ SHAPES = {
 def test_an_array_whose_header_lies_is_refused_before_it_is_believed(tmp_path, name, file):
     data = npy(SHAPES[name])
     (tmp_path / file).write_bytes(data if file.endswith("npy") else npz(K=data, R=data, t=data))
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match="is damaged: save it again"):
         cameras.read(tmp_path / file)
 
 

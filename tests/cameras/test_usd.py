@@ -276,3 +276,14 @@ def test_a_camera_of_an_asset_stands_wherever_that_is_an_instance():
     )
     read_cameras = read(f'#usda 1.0\n(\n metersPerUnit = 1\n upAxis = "Z"\n)\n{asset}{"".join(instances)}')
     assert [camera.pinhole.eye for camera in read_cameras] == [(1, 0, 0), (2, 0, 0)]
+
+
+@pytest.mark.usefixtures("openusd_in_this_process")
+@pytest.mark.parametrize("attribute", ["cameraProjectionType", "omni:lensdistortion:model"])
+def test_a_lens_of_omniverse_is_named(attribute):
+    """A fisheye was read as a pinhole without a word."""
+    cameras_of_stage = "".join(
+        f'def Camera "{name}" {{\n token {attribute} = "{name}"\n}}\n' for name in ("pinhole", "fisheye")
+    )
+    (camera,) = read(f"#usda 1.0\n{cameras_of_stage}")
+    assert camera.name == "pinhole" and any("of the model 'fisheye'" in note for note in camera.notes)

@@ -313,6 +313,10 @@ def recognized(source: str | Path | Source) -> str:
                 return name
     if source.data.startswith(b"version https://git-lfs"):
         raise InputError(f"{source.name} is Git LFS's pointer to the file, and not the file: get it by git lfs pull")
+    if source.path and source.path.suffix.lower() in (".npy", ".npz"):
+        raise InputError(
+            f"{source.name} holds no arrays of a camera, or is damaged: save it again, with K, R and t or as a pose"
+        )
     if source.data.startswith(_READ_BY_BLENDER):
         raise InputError(f"{source.name} is read by Blender itself: import it there, save, and give the .blend")
     if source.json_problem:

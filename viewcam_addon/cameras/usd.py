@@ -31,6 +31,7 @@ TITLE = "USD"
 SUFFIX = ".usda"
 
 _SIZE = "userProperties:viewcam_resolution"
+_PINHOLE = "pinhole"
 _SIDES = ("Horizontal", "Vertical")
 _MOST_NAMED = 3
 
@@ -100,6 +101,8 @@ def _camera(name: str, sample: dict[str, Any], options: Options) -> Camera:
     name = name if sample["time"] is None else f"{name} {sample['time']:g}"
     what = f"camera {checks.quoted(name)}"
     values = Record(sample, what)
+    if str(sample["model"] or _PINHOLE).lower() != _PINHOLE:
+        not_a_pinhole(what, f"of the model {checks.quoted(sample['model'])}")
     if sample["Projection"] == "orthographic":
         not_a_pinhole(what, "orthographic")
     focal, across, upwards, right, up = (
@@ -152,7 +155,13 @@ def read_again(cameras: Sequence[Camera], options: Options) -> list[Camera]:
         lens, pinhole = _lens(camera.pinhole), camera.pinhole
         sample: dict[str, Any] = {key: float(np.float32(value)) for key, value in lens.items()}
         matrix = [number for column in zip(*axes.camera_to_world(pinhole), strict=True) for number in column]
-        sample |= {"Projection": "perspective", "FStop": 0.0, "size": [pinhole.width, pinhole.height], "matrix": matrix}
+        sample |= {
+            "Projection": "perspective",
+            "FStop": 0.0,
+            "model": None,
+            "size": [pinhole.width, pinhole.height],
+            "matrix": matrix,
+        }
         result.append(_camera(camera.name, sample | {"time": None, "seconds": None}, options))
     return result
 
