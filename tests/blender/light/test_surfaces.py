@@ -149,14 +149,22 @@ def test_images_of_bytes_and_floats(pictures, floor, image, interpolation, space
     assert not reasons(sides) and len(np.unique(sides[0].cycles[0]["Diffuse Color"])) > 10
 
 
-def test_a_color_beside_an_alpha_that_mixes_shaders_is_divided_by_it_as_in_cycles(pictures, floor, image):
+@pytest.mark.parametrize("asked", ["by the same node", "by one that is alike", "by one with other pixels", "in vain"])
+def test_a_color_is_divided_by_its_alpha_where_cycles_does_so(pictures, floor, image, asked):
     node = texture(floor, image(opacity=np.linspace(0.2, 1, 15), alpha=True), "Linear")
     tree = floor.node_tree
-    mix = tree.nodes.new("ShaderNodeMixShader")
-    tree.links.new(node.outputs["Alpha"], mix.inputs[0])
-    tree.links.new(tree.nodes["Shader"].outputs[0], mix.inputs[2])
-    tree.links.new(mix.outputs[0], tree.nodes["Output"].inputs["Surface"])
-    sides = pictures(scenes=2)
+    other = node
+    if asked.startswith("by one"):
+        other = texture(floor, node.image, "Linear" if "alike" in asked else "Closest")
+        tree.links.new(node.outputs["Color"], tree.nodes["Shader"].inputs["Color"])
+    if asked == "in vain":
+        tree.links.new(other.outputs["Alpha"], tree.nodes.new("ShaderNodeMath").inputs[0])
+    else:
+        mix = tree.nodes.new("ShaderNodeMixShader")
+        tree.links.new(other.outputs["Alpha"], mix.inputs[0])
+        tree.links.new(tree.nodes["Shader"].outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], tree.nodes["Output"].inputs["Surface"])
+    sides = pictures(scenes=1)
     check(sides, TEXTURED)
     assert not reasons(sides)
 

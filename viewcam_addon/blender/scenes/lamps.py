@@ -328,11 +328,12 @@ class _LampReader(shaders.Tree):
     of the world, as Cycles has them (shader_setup_from_sample, and the files of intern/cycles/kernel/light).
 
     matrix : (4, 4), the light's space to the world's.
+    output : the node that the light is shown by.
     uv : a function that makes its UV.
     """
 
-    def __init__(self, light: bpy.types.Light, matrix: np.ndarray, uv: UVMaker) -> None:
-        super().__init__(Color(_WHITE))
+    def __init__(self, light: bpy.types.Light, matrix: np.ndarray, output: bpy.types.Node, uv: UVMaker) -> None:
+        super().__init__(Color(_WHITE), divided=shaders.divided_images(output))
         self._light, self._matrix, self._uv = light, matrix, uv
 
     def emission(self, of: Input) -> RGB | Node:
@@ -403,7 +404,7 @@ def _emitted(
     light: bpy.types.Light, matrix: np.ndarray, output: bpy.types.Node, uv: UVMaker
 ) -> tuple[RGB | Node, shaders.Reading]:
     """The factor of its light that a light's output is shown, and what that asks for, or why there is none."""
-    reader = _LampReader(light, matrix, uv)
+    reader = _LampReader(light, matrix, output, uv)
     try:
         return reader.emission(Input(output.inputs["Surface"])), reader.reading
     except InputError as error:

@@ -112,11 +112,12 @@ def read(material: bpy.types.Material) -> Reading:
     if not output:
         return in_the_viewport(material)
     viewport, of = _viewport_color(material), Input(output.inputs["Surface"])
-    reader = Tree(viewport)
+    divided = divided_images(output)
+    reader = Tree(viewport, divided=divided)
     surface = reader.surface(of)
     shines = any(closure.node.is_shining for closure in closures(surface))
     if shines:
-        reader = Tree(viewport, shines)
+        reader = Tree(viewport, shines, divided)
         surface = reader.surface(of)
     simple = simplified(surface)
     is_tree = surface is not None and simple is surface
@@ -129,7 +130,7 @@ def _displaced(reading: Reading, material: bpy.types.Material, output: bpy.types
     if shines and versions.LOSES_LIGHT_OF_BUMPED and _loses_light(output):
         reading.reasons.append("gives off light beside a displacement, where Cycles loses most of it")
     elif is_only_bumped(material):
-        reader = Tree(PLAIN_COLOR, shines)
+        reader = Tree(PLAIN_COLOR, shines, divided_images(output))
         reader.reading = reading
         reading.material = replace(reading.material, displacement=reader.height(Input(output.inputs["Displacement"])))
     return reading
@@ -161,12 +162,14 @@ class Tree:
 
     viewport : the color that stands in for one that is not modeled.
     shines : true if the material gives off light.
+    divided : see divided_images.
     """
 
-    def __init__(self, viewport: Color, shines: bool = False) -> None:
+    def __init__(self, viewport: Color, shines: bool = False, divided: frozenset[object] = frozenset()) -> None:
         self.reading = Reading()
         self.viewport = viewport
         self._shines = shines
+        self._divided = divided
         self._deep = 0
         self._is_beside = False  # true while values are asked for a little beside, too, as heights are
 
@@ -263,7 +266,7 @@ class Tree:
     def _image(self, output: Output) -> Color:
         """An image that is a color alone: laid out by UV, repeated, with colors that nobody divides by its alpha."""
         node = output.node
-        if node.outputs["Alpha"].is_linked:
+        if _looked_up(output) in self._divided:
             self._reason(output, "has a color beside its alpha")
         if node.extension != "REPEAT":
             self._reason(output, f"does not repeat ({node.extension.lower()})")
@@ -451,7 +454,7 @@ class Tree:
                 return None
             image = node.image.original
             inputs["image"] = Color(_WHITE, image.name_full)
-            if ours == "image" and node.outputs["Alpha"].is_linked:
+            if ours == "image" and _looked_up(output) in self._divided:
                 if why := images.alpha_obstacle(image):
                     self._reason(output, why)
                     return None
@@ -585,6 +588,25 @@ class Tree:
             extension="extend",
             output="alpha" if output.socket.name == "Alpha" else "color",
         )
+
+
+def divided_images(output: bpy.types.Node) -> frozenset[object]:
+    """The ways in which images are looked up whose alpha an output asks for: there Cycles divides their colors by it.
+
+    Nodes that are alike are one to Cycles, which asks for both.
+    """
+    inputs = (Input(output.inputs[name]) for name in ("Surface", "Displacement") if name in output.inputs)
+    fed = set[Output]().union(*map(nodes.feeding, inputs))
+    return frozenset(_looked_up(each) for each in fed if each.node.type == "TEX_IMAGE" and each.socket.name == "Alpha")
+
+
+def _looked_up(output: Output) -> object:
+    """The way in which an Image Texture looks its image up, the same for nodes that are alike."""
+    node, vector = output.node, nodes.source(output.required("Vector"))
+    place: object = vector if isinstance(vector, Output) else None
+    if isinstance(vector, Output) and vector.node.type == "TEX_COORD":
+        place = vector.socket.name, vector.node.object
+    return node.image, node.interpolation, node.extension, node.projection, node.projection_blend, place
 
 
 def _counts(output: Output, ours: str, theirs: str | int) -> bool:
