@@ -149,6 +149,18 @@ def test_images_of_bytes_and_floats(pictures, floor, image, interpolation, space
     assert not reasons(sides) and len(np.unique(sides[0].cycles[0]["Diffuse Color"])) > 10
 
 
+def test_a_color_beside_an_alpha_that_mixes_shaders_is_divided_by_it_as_in_cycles(pictures, floor, image):
+    node = texture(floor, image(opacity=np.linspace(0.2, 1, 15), alpha=True), "Linear")
+    tree = floor.node_tree
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    tree.links.new(node.outputs["Alpha"], mix.inputs[0])
+    tree.links.new(tree.nodes["Shader"].outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], tree.nodes["Output"].inputs["Surface"])
+    sides = pictures(scenes=2)
+    check(sides, TEXTURED)
+    assert not reasons(sides)
+
+
 @pytest.mark.parametrize("packed", [False, True])
 @pytest.mark.parametrize("kind", ["PNG", "OPEN_EXR", "HDR"])
 @pytest.mark.parametrize("opacity", [1.0, 0.5])

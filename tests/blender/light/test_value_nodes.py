@@ -394,6 +394,21 @@ def test_bricks_without_a_width_have_the_mortar_that_they_have_in_cycles(floor):
     check(floor(graphs))
 
 
+def test_the_strength_of_light_that_falls_off_is_a_number_even_of_a_color(floor):
+    check(floor({"as it is": N("LightFalloff", {"Strength": N("TexCoord", output="Object")}, "Quadratic")}))
+
+
+def test_numbers_beyond_what_nodes_are_made_for_make_what_cycles_makes_of_them(floor):
+    place = N("TexCoord", output="Object")
+    graphs = {"to the power of 0": N("Gamma", {"Color": place, "Gamma": 0.0})}
+    for mode in ("HSV", "HSL"):
+        turned = {"Red": place, "Green": 0.8, "Blue": 0.5}
+        graphs[f"hues of {mode}"] = N("CombineColor", turned, mode=mode)
+    for kind, word in (("Fresnel", None), ("LayerWeight", "Fresnel"), ("LayerWeight", "Facing")):
+        graphs[f"{kind} {word} by no unit vector"] = N(kind, {"Normal": place}, word)
+    check(floor(graphs))
+
+
 @pytest.mark.skipif(bpy.app.version < (5, 2), reason="before, rows without a height are all mortar")
 def test_bricks_without_a_height_are_told(camera, add, mesh_from, make_material):
     material = make_material("Wall", "ShaderNodeBsdfDiffuse")

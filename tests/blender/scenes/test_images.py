@@ -101,3 +101,8 @@ def test_colors_beside_an_alpha_are_those_that_cycles_shows(kind, space, written
         # Half a byte's step, decoded where colors are brightest.
         assert theirs.any() and np.abs(theirs - ours).max() < 1.2 / 255, (alpha_mode, packed, theirs, ours)
         bpy.data.images.remove(image)
+
+
+@pytest.mark.parametrize(("space", "is_named"), [("sRGB", False), ("Linear Rec.709", True), ("Non-Color", False)])
+def test_the_alpha_of_linear_bytes_is_named(space, is_named):
+    assert bool(images.alpha_obstacle(new_image(False, space))) == is_named

@@ -66,9 +66,9 @@ def alpha_obstacle(image: bpy.types.Image) -> str | None:
 
 
 def is_multiplied(image: bpy.types.Image) -> bool:
-    """True if Cycles multiplies an image's colors by its alpha, in bytes."""
-    plain = image.is_float or image.colorspace_settings.is_data
-    return image.channels == 4 and image.alpha_mode == "STRAIGHT" and not plain
+    """True if Cycles multiplies an image's encoded colors by its alpha, in bytes."""
+    encoded = not image.is_float and image.colorspace_settings.name == "sRGB"
+    return image.channels == 4 and image.alpha_mode == "STRAIGHT" and encoded
 
 
 def picture_of(image: bpy.types.Image, alpha: bool = False) -> Picture:

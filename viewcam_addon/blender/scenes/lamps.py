@@ -378,7 +378,7 @@ class _LampReader(shaders.Tree):
             return None
         of = output.input("Strength")
         strength = of and self._value_input(of, 0.0)
-        return node("math", operation="add", a=strength, b=0.0) if isinstance(strength, tuple) else strength
+        return None if strength is None else node("math", operation="add", a=strength, b=0.0)
 
     def _of_itself(self, output: Output, known: object) -> Node | None:
         if known is INCOMING:

@@ -261,8 +261,10 @@ class Tree:
         return Color(rgb, textured.image, textured.closest, first.vertex or second.vertex)
 
     def _image(self, output: Output) -> Color:
-        """An image that is a color alone: laid out by UV, repeated."""
+        """An image that is a color alone: laid out by UV, repeated, with colors that nobody divides by its alpha."""
         node = output.node
+        if node.outputs["Alpha"].is_linked:
+            self._reason(output, "has a color beside its alpha")
         if node.extension != "REPEAT":
             self._reason(output, f"does not repeat ({node.extension.lower()})")
         if node.projection != "FLAT":
@@ -539,7 +541,7 @@ class Tree:
         if smooth != _ZERO:
             slower = _node("math", operation="add", a=squared, b=_node("math", operation="maximum", a=smooth, b=0.0))
             value = _node("math", operation="multiply", a=value, b=_node("math", operation="divide", a=squared, b=slower))
-        return value if isinstance(value, Color | Node) else _node("math", operation="add", a=value, b=0.0)
+        return _node("math", operation="add", a=value, b=0.0)  # a number, even of a color
 
     def _curves(self, output: Output) -> dict[str, object]:
         """The table that Cycles makes of a node's curves."""

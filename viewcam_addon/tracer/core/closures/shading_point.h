@@ -65,6 +65,11 @@ struct ShadingPoint {
         double size = length(requested);
         return size > 0 && size < INFINITE ? requested / size : point.shading;
     }
+    // That normal of whatever length it has, as nodes compute with it.
+    Vec3 unscaled_normal(const Color& input) const {
+        if (input.node != NONE) return value_of_node(input.node);
+        return is_black(input.rgb) ? point.shading : input.rgb;
+    }
     // A normal, bent so that a mirror's ray rises above the surface; and that which an input asks for.
     Vec3 specular(Vec3 normal) const { return VIEWCAM_ISA::specular_normal(incoming, point.normal, normal); }
     Vec3 specular_normal(const Color& input) const { return specular(normal(input)); }

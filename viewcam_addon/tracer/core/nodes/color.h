@@ -17,6 +17,7 @@ inline Vec3 hsv_of(Vec3 rgb) {
 inline Vec3 rgb_of_hsv(Vec3 hsv) {
     if (hsv.y == 0) return gray(hsv.z);
     double hue = hsv.x == 1 ? 0 : hsv.x * 6;
+    if (hue < 0 || hue >= 6) hue += 5 - std::floor(hue);  // as in Cycles, from magenta to red again and again
     auto channel = [&](double from) {  // 0 where the channel is full, and where it is empty 1
         double apart = std::fabs(hue - from);
         return hsv.z * (1 - hsv.y * unit_range(apart));
@@ -193,6 +194,7 @@ struct GammaNode {
     explicit GammaNode(const Inputs& in) : color(in["color"]), gamma(in["gamma"]) {}
     Vec3 eval(const ShadingPoint& at) const {
         double power = at.number(gamma);
+        if (power == 0) return gray(1);
         return safe::each([&](double x, double, double) { return x > 0 ? safe::power(x, power) : x; }, at.value(color));
     }
 };

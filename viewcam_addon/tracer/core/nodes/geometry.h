@@ -262,7 +262,7 @@ struct FresnelNode {
 
     explicit FresnelNode(const Inputs& in) : ior(in["ior"]), normal(in["normal"]) {}
     Vec3 eval(const ShadingPoint& at) const {
-        return gray(fresnel(std::fabs(dot(at.incoming, at.normal(normal))), at.ratio(max(at.number(ior), 1e-5))));
+        return gray(fresnel(std::fabs(dot(at.incoming, at.unscaled_normal(normal))), at.ratio(max(at.number(ior), 1e-5))));
     }
 };
 
@@ -275,7 +275,7 @@ struct LayerWeightNode {
 
     explicit LayerWeightNode(const Inputs& in) : blend(in["blend"]), normal(in["normal"]), facing(in.choice("output") == "facing") {}
     Vec3 eval(const ShadingPoint& at) const {
-        double cosine = std::fabs(dot(at.incoming, at.normal(normal))), blended = at.number(blend);
+        double cosine = std::fabs(dot(at.incoming, at.unscaled_normal(normal))), blended = at.number(blend);
         if (!facing) {
             double left = max(1 - blended, 1e-5);
             return gray(fresnel(cosine, at.point.backside ? left : 1 / left));
