@@ -1059,3 +1059,14 @@ def test_a_pose_that_is_not_read_is_not_asked_for_again():
     assert "give --pose" in refusal(json.dumps(k))
     with pytest.raises(InputError, match="has position, of which no pose is read: write R and t"):
         cameras.read(json.dumps(k), options=Options(pose="c2w_opencv"))
+
+
+@pytest.mark.parametrize("size", [(640, 360), (320, 180)])
+def test_a_picture_of_another_size_than_its_camera_says_is_told(tmp_path, size):
+    """Copies at half the size are beside many data sets."""
+    frames = [{"file_path": "images/a.png", "transform_matrix": np.eye(4).tolist()}]
+    (tmp_path / "transforms.json").write_text(json.dumps({"fl_x": 600, "w": 640, "h": 360, "frames": frames}))
+    (tmp_path / "images").mkdir()
+    (tmp_path / "images" / "a.png").write_bytes(files.png(*size))
+    (camera,) = cameras.read(tmp_path)
+    assert any("has 320 × 180 pixels and its camera 640 × 360" in note for note in camera.notes) == (size == (320, 180))

@@ -81,6 +81,7 @@ from . import (
     mitsuba,
     mujoco,
     mvsnet,
+    naming,
     nerfstudio_path,
     nvisii,
     open3d,
@@ -109,7 +110,7 @@ from . import (
 )
 from .axes import leveled, moved, moved_back
 from .camera import ANGLES, AXES, PIXELS, POSES, UPS, Camera, LeftOut, NoPinholeError, Options, choose
-from .source import Source
+from .source import Source, image_size
 
 __all__ = [
     "ANGLES",
@@ -278,6 +279,7 @@ def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
     cameras = _to_the_bit(cameras, [pinhole for text in notes for pinhole in own.pinholes_in(text)], module, options)
     world = module.in_world(source, options) if hasattr(module, "in_world") else options
     noted = _told_of_world(notes, world)
+    noted += _told_of_size(cameras, source)
     result = [_readable(_doubted(_unmirrored(moved(camera, world), options))) for camera in cameras]
     return [camera.noted(*noted) for camera in result] if noted else result
 
@@ -418,6 +420,19 @@ def _told_of_world(notes: Iterable[str], options: Options) -> tuple[str, ...]:
     if remembered is None or remembered[1] == options.remembered.partition(": ")[2]:
         return ()
     return (f"The file says that it was written with {remembered[1]}: choose the same to have the cameras back",)
+
+
+def _told_of_size(cameras: Sequence[Camera], source: Source) -> tuple[str, ...]:
+    """A note where the first picture that is there has another size than its camera says, as reduced copies have."""
+    folder = source.path if source.is_folder or source.path is None else source.path.parent
+    first = next((camera for camera in cameras if camera.size_stated and camera.image), None)
+    if first is None or folder is None or (file := naming.picture_of(first, folder)) is None:
+        return ()
+    size, stated = image_size(file), (first.pinhole.width, first.pinhole.height)
+    if size in (None, stated):
+        return ()
+    pixels, of_camera = (f"{width} × {height}" for width, height in (size or stated, stated))
+    return (f"{file} has {pixels} pixels and its camera {of_camera}, which counts",)
 
 
 def _doubted(camera: Camera) -> Camera:
