@@ -62,13 +62,14 @@ def write_sheet(folder: Path, path: Path) -> None:
     places, top = [], 0
     for names in ROWS:
         widths = [_width_over_height(folder / f"{name}.blend") for name in names]
-        height = round((WIDTH - GAP * (len(names) - 1)) / sum(widths))
-        left = 0
+        height, left = (WIDTH - GAP * (len(names) - 1)) / sum(widths), 0.0
         for name, width in zip(names, widths, strict=True):
+            right = left + width * height
             picture = Image.open(folder / f"{name}.png").convert("RGB")
-            places.append((picture.resize((round(width * height), height), Image.Resampling.LANCZOS), (left, top)))
-            left += round(width * height) + GAP
-        top += height + GAP
+            size = round(right) - round(left), round(height)
+            places.append((picture.resize(size, Image.Resampling.LANCZOS), (round(left), top)))
+            left = right + GAP
+        top += round(height) + GAP
     sheet = Image.new("RGB", (WIDTH, top - GAP), "white")
     for picture, place in places:
         sheet.paste(picture, place)
