@@ -132,6 +132,7 @@ _MOVES = {
     "filmoffset", "quaternion", "rotation", "flyto", "setview"
 }  # fmt: skip
 _TURNED = {"rotation", "quaternion", "matrix", "matrixworld", "rotate"}
+_TURNED |= {"rotationeuler", "rotationquaternion", "rotationaxisangle"}  # Blender's
 # Where they are made they turn the camera to their target, whatever it looked at before.
 _CONTROLS = {"OrbitControls", "TrackballControls", "MapControls", "ArcballControls"}
 _OTHER_CONTROLS = {"FirstPersonControls", "DeviceOrientationControls"}
