@@ -569,7 +569,7 @@ VTK_WITHOUT_AN_ANGLE = "camera.SetPosition(7, -6, 4); camera.SetFocalPoint(0, 0,
     [
         "mlab.view(azimuth=45, elevation=60, distance=10, focalpoint=(0, 0, 0))",
         "ctr.set_front([0.5, -0.2, 0.8]); ctr.set_lookat([0, 0, 0]); ctr.set_up([0, 0, 1])",
-        "camera.location = (7.4, -6.9, 5.0); camera.rotation_euler = (1.1, 0, 0.8)",
+        "camera.location = (7.4, -6.9, 5.0); camera.data.lens = 50",
     ],
 )
 def test_code_that_says_no_eye_or_target_is_not_completed_by_another_camera(text):
