@@ -20,12 +20,6 @@ from viewcam_addon.pinhole import Pinhole
 ROOT = Path(__file__).resolve().parent.parent.parent
 PICTURES = [each for each in [os.environ.get("VIEWCAM_PICTURES")] if each]
 
-# A gray pixel.
-PNG = bytes.fromhex(
-    "89504e470d0a1a0a0000000d49484452000000010000000108000000003a7e9b55"
-    "0000000a49444154789c636800000082008177cd72b60000000049454e44ae426082"
-)
-
 # A virtual screen on a busy machine may lose a click: one loss is no finding, two at different times are.
 ATTEMPTS = 2
 TALL = (1600, 2000)
@@ -59,6 +53,8 @@ def test_what_an_artist_tries_on_the_first_day_goes_as_with_blenders_own_cameras
 
 
 def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_a_paste(real_blender, tmp_path):
+    from PIL import Image
+
     angles = [2 * math.pi * number / 100 for number in range(100)]
     eyes = {f"shot_{i:03d}": (6 * math.cos(a), 6 * math.sin(a), 2 + math.sin(3 * a)) for i, a in enumerate(angles)}
     around = [
@@ -66,8 +62,8 @@ def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_
         for name, eye in eyes.items()
     ]
     cameras.save(around, tmp_path / "sparse", "colmap")
-    for camera in around:  # a missing one would be told in a popup, which takes the keys
-        (tmp_path / "sparse" / camera.image).write_bytes(PNG)
+    for camera in around:  # a missing one, or one of another size, would be told in a popup, which takes the keys
+        Image.new("L", (960, 540)).save(tmp_path / "sparse" / camera.image)
     (tmp_path / "cameras_of_colmap.json").write_text(json.dumps(eyes))
     go_through(real_blender, "cameras", tmp_path, *PICTURES, expected="done: paste_pbrt")
 
