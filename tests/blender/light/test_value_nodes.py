@@ -13,6 +13,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 bmesh = pytest.importorskip("bmesh")
 
+from viewcam_addon.blender import versions
 from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import cycles_attributes
 from viewcam_addon.jobs.job import Job
@@ -409,7 +410,13 @@ def test_numbers_beyond_what_nodes_are_made_for_make_what_cycles_makes_of_them(f
     check(floor(graphs))
 
 
-@pytest.mark.skipif(bpy.app.version < (5, 2), reason="before, rows without a height are all mortar")
+@pytest.mark.skipif(versions.ROWS_NEED_HEIGHTS, reason="since 5.1 they are told, see the next test")
+def test_bricks_without_a_height_are_what_they_are_in_cycles(floor):
+    bricks = {"Vector": N("TexCoord", output="Object"), "Scale": 3.0, "Row Height": 0.0}
+    check(floor({f"flat {word}": N("TexBrick", bricks, word) for word in ("Color", "Fac")}))
+
+
+@pytest.mark.skipif(not versions.ROWS_NEED_HEIGHTS, reason="before 5.1 they are what they are in Cycles, see the test above")
 def test_bricks_without_a_height_are_told(camera, add, mesh_from, make_material):
     material = make_material("Wall", "ShaderNodeBsdfDiffuse")
     tree = material.node_tree
