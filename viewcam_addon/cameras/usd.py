@@ -54,7 +54,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             result += [_camera(camera["name"], sample, options).noted(*notes) for sample in camera["samples"]]
     names = [camera.name for camera in result]
     if len({*names}) < len(names):
-        names = naming.distinct(names)
+        names = naming.numbered(names)
     return left_out.with_notes([dataclasses.replace(camera, name=name) for camera, name in zip(result, names, strict=True)])
 
 
