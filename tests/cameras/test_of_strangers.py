@@ -1098,3 +1098,36 @@ def test_a_picture_of_another_size_than_its_camera_says_is_told(tmp_path, size):
     (tmp_path / "images" / "a.png").write_bytes(files.png(*size))
     (camera,) = cameras.read(tmp_path)
     assert any("has 320 × 180 pixels and its camera 640 × 360" in note for note in camera.notes) == (size == (320, 180))
+
+
+POSED = "cam.location = (1, 2, 3)\ncam.rotation_euler = (1, 0, 0.5)\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        ("cam.constraints.new('TRACK_TO')", "by other means"),
+        ("cam.parent = rig", "by other means"),
+        ("cam.rotation_euler.z += 0.1", "from where it was"),
+        ("cam.location = (1, 2, 4)", "location is something else before"),
+        ("cam.location[2] = height", "give location in plain numbers"),
+        ("camera2.location = (1, 2, 3)", "this is another camera"),
+        ("cam.data.type = 'ORTHO'", "of the type ORTHO"),
+        ("cam.rotation_mode = 'QUATERNION'", "turns by its rotation_quaternion, which the text does not say"),
+        ("cam.data.lens = 50\ncam.data.angle = 1", "both a lens and an angle"),
+    ],
+)
+def test_what_blenders_python_leaves_open_of_a_camera_is_refused(more, sentence):
+    seen = Options(view_plane=CAMERAS["plain"].plane)
+    (camera,) = cameras.read(POSED, options=seen)
+    assert camera.pinhole.eye == (1, 2, 3) and any("in Blender's own, XYZ" in note for note in camera.notes)
+    with pytest.raises(InputError, match=sentence):
+        cameras.read(POSED + more, options=seen)
+
+
+def test_a_list_of_blenders_values_in_json_is_that_camera():
+    """Half a turn about x and a quarter about z: it looks up, and its right is y. 36 mm are 640 pixels: 50 mm are 888.9."""
+    values = {"location": [1, 2, 3], "rotation_euler": [math.pi, 0, math.pi / 2], "lens": 50, "sensor_width": 36}
+    pinhole = read(json.dumps(values)).pinhole
+    assert np.allclose(pinhole.axes(), [[0, 1, 0], [1, 0, 0], [0, 0, -1]], rtol=0, atol=1e-15)
+    assert pinhole.distance[0] == 50 / 36 * 640

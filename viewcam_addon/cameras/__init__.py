@@ -59,6 +59,7 @@ from . import (
     after_effects,
     arkit,
     arrays,
+    blender_python,
     bop,
     bundler,
     colmap,
@@ -168,6 +169,7 @@ FORMATS: dict[str, ModuleType] = {
     "three_js": three_js,
     "unreal": unreal,
     "unity": unity,
+    "blender_python": blender_python,
     "vtk": vtk,
     "textbook": textbook,
     "mujoco": mujoco,
@@ -185,7 +187,7 @@ FORMATS: dict[str, ModuleType] = {
 _LONGEST = 1000  # characters of a name or a sentence
 _YAML = (".yaml", ".yml")
 _JSON = (".json", ".gltf", ".sfm")
-_CODE = ("vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
+_CODE = ("blender_python", "vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
 """The formats that a damaged JSON file may look like."""
 _NO_JSON = "{} looks like JSON and is none ({}): correct it"
 _REMEMBERED = re.compile(rf"{own.KEY}: (axes=\w+ scale=[\d.e+-]+)")
