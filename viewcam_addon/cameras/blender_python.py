@@ -139,7 +139,7 @@ class _Script:
                     self.set_at.setdefault(key, []).insert(0, (None, at.end()))
 
     def _path(self, match: re.Match) -> str | None:
-        """What stands before a key, whose attribute it is; None where it is no statement."""
+        """The text before a key, whose attribute it is; None where it is no statement."""
         first = max(0, match.start() - _LONGEST_PATH)
         start = max(first, *(self.text.rfind(sign, first, match.start()) + 1 for sign in "\n;{"))
         before = self.text[start : match.start()].strip()
