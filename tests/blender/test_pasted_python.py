@@ -70,8 +70,8 @@ def test_what_blenders_console_shows_of_a_camera_is_that_camera(fresh_blender):
     bpy.context.view_layer.update()
     expected = blender_camera.read(obj, bpy.context.scene)
     options = cameras.Options(view_plane=expected.plane)
-    shown = f">>> C.object.location\n{obj.location!r}\n\n>>> C.object.rotation_euler\n{obj.rotation_euler!r}\n"
+    of_console = f">>> C.object.location\n{obj.location!r}\n\n>>> C.object.rotation_euler\n{obj.rotation_euler!r}\n"
     printed = f"location: {obj.location}\nrotation_euler: {obj.rotation_euler}\n"
-    for text, digits in ((shown, 16 * FLOAT32), (printed, 1e-4)):
+    for text, digits in ((of_console, 16 * FLOAT32), (printed, 1e-4)):
         (camera,) = cameras.read(text, options=options)
         assert np.abs(np.array(camera.pinhole.axes()) - np.array(expected.axes())).max() < digits

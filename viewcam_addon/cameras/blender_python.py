@@ -117,13 +117,13 @@ class _Script:
         self._reader = Expressions(self.text, self._number)
         self._whose: dict[str, str] = {}
         # The scene's camera, its data, and what is made of a camera's: objects.new("…", data).
-        made_of = {
+        data_of = {
             name: {data for each in stated for data in _MADE_OF.findall(each[2])} for name, stated in self._named.items()
         }
         data_of_cameras = {name for name, stated in self._named.items() if any("cameras.new" in each[2] for each in stated)}
         in_use = {*_IN_USE.findall(self.text)}
-        self._of_cameras = in_use.union(*(made_of.get(name, ()) for name in in_use))
-        self._of_cameras |= {name for name, data in made_of.items() if data & data_of_cameras}
+        self._of_cameras = in_use.union(*(data_of.get(name, ()) for name in in_use))
+        self._of_cameras |= {name for name, data in data_of.items() if data & data_of_cameras}
         self._added = [(match.start(), match[1]) for match in _ANY_ADDED.finditer(self.text)]
         statements = [*itertools.islice(_SET.finditer(self.text), _MOST_STATEMENTS)]
         if len(statements) == _MOST_STATEMENTS:
@@ -146,7 +146,7 @@ class _Script:
         is_printed = before.startswith(">>>")
         if match[4] == "\n" and not is_printed:
             return None
-        if match[4] == ":":  # of a list in JSON, or a dictionary
+        if match[4] == ":":  # JSON, or a dictionary
             return "" if before[-1:] in ("'", '"', "") else None
         return before.removeprefix(">>>").strip() if before.endswith(".") else None
 
@@ -190,10 +190,10 @@ class _Script:
         return value
 
     def _value(self, at: int) -> object:
-        made = _VALUE.match(self.text, at)
-        if not made:
+        constructor = _VALUE.match(self.text, at)
+        if not constructor:
             return self._reader.value(at)[0]
-        values, _, _ = self._reader.arguments(made.end())
+        values, _, _ = self._reader.arguments(constructor.end())
         return values[0] if values else None
 
     def vector(self, key: str) -> tuple[float, ...]:
@@ -231,8 +231,8 @@ class _Script:
     def turned(self) -> tuple[str, str, tuple[str, ...]]:
         """The key of the rotation that counts, the order of Euler angles, and notes."""
         mode = self._single("rotation_mode", str, "")
-        if not mode and (shown := _SHOWN.search(self.text)):  # an Euler that is set passes on its numbers alone
-            mode = shown[1]
+        if not mode and (of_console := _SHOWN.search(self.text)):  # an Euler that is set passes on its numbers alone
+            mode = of_console[1]
         stated = [key for key in _ROTATIONS if key in self.set_at]
         by_angles = mode not in ("QUATERNION", "AXIS_ANGLE")
         if by_angles and sorted(mode or "XYZ") != [*"XYZ"]:
