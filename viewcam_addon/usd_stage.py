@@ -173,7 +173,7 @@ class _Renders:
 
     def __init__(self) -> None:
         self._stated: dict[str, tuple[dict[str, Any], list[str]]] = {}  # by path: attributes, and cameras
-        self._products: dict[str, list[str]] = {}  # of settings
+        self._products: dict[str, list[str]] = {}  # paths, by their settings
 
     def add(self, prim: Any) -> None:
         attributes = {key: prim.GetAttribute(key) for key in _PICTURE if prim.HasAttribute(key)}

@@ -162,7 +162,7 @@ def _conformed(
     """The apertures as they are made to fit the picture, and notes.
 
     shape : the picture's width over its height, in pixels.
-    picture : what the stage says of it; None where it says nothing.
+    picture : its entry of the camera's `renders`; None where there is none.
     """
     policy, pixel_aspect = "expandAperture", options.pixel_aspect
     if picture is not None:
