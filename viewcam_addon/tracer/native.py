@@ -177,6 +177,7 @@ class _Core(Structure):
         ("add_lamp", _function(c_int, c_void_p, POINTER(_Lamp), POINTER(_Color))),
         ("set_film", _function(c_int, c_void_p, POINTER(_Film))),
         ("light_create", _function(c_int, c_void_p, POINTER(_LightSettings), POINTER(c_void_p))),
+        ("learn_light", _function(c_int, c_void_p, c_int, c_void_p)),
         ("light_free", _function(None, c_void_p)),
         ("light_pairs", _function(c_size_t, c_void_p, c_size_t, c_void_p, c_void_p)),
         ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, c_uint32, c_void_p, c_void_p)),
@@ -613,6 +614,10 @@ class CoreLight:
     def __del__(self) -> None:
         if self._handle:
             self._scene.core.light_free(self._handle)
+
+    def learn(self, threads: int, stop: Any) -> None:
+        """Learn where light comes from, before the first tile, if rays that know it make the picture's noise so much smaller."""
+        self._scene.check(self._scene.core.learn_light(self._handle, threads, stop))
 
     def trace(self, passes: Passes, row: int, column: int, samples: int, stop: Any) -> None:
         """Write a tile, by its lowest row and first column, into `LIGHT`'s passes, (height, width, channels), C-contiguous.

@@ -110,6 +110,8 @@ class Tracer:
         names = LIGHT_PASSES if error is None else (*LIGHT_PASSES, "Sample Count")
         passes = self._blank(lambda shape: _dark(shape, names) | unwritten(shape, CENTERS))
         light = CoreLight(self._core, self._scene, level, samples, seed, error)
+        for _ in self._in_threads(lambda _, stop: light.learn(self._threads, stop), (light,), watcher):
+            pass
         width, height = self._camera.width, self._camera.height
         centers = {name: passes[name] for name in CENTERS}
         steps = steps or (samples,)

@@ -168,6 +168,8 @@ typedef struct {
     int (*set_film)(ViewcamScene*, const ViewcamFilm*);
     /* What is made must be freed before its scene, or what gives light there, changes. */
     int (*light_create)(const ViewcamScene*, const ViewcamLightSettings*, ViewcamLight** light);
+    /* Learns where light comes from, if that pays: once, before the first tile. stop: or null; what it points to ends the work. */
+    int (*learn_light)(ViewcamLight*, int threads, const volatile int* stop);
     void (*light_free)(ViewcamLight*);
     /* The objects, two and two, that paths have met in one place, and how often: the first `most`. Returns how many there are. */
     size_t (*light_pairs)(const ViewcamLight*, size_t most, uint32_t* objects, uint64_t* counts);

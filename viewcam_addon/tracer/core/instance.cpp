@@ -478,6 +478,7 @@ const ViewcamCore core = {
                 *light = reinterpret_cast<ViewcamLight*>(create_light(scene_of(scene), *settings));
             });
         },
+    .learn_light = [](ViewcamLight* light, int threads, const volatile int* stop) { return guarded([&] { light_of(light).learn(threads, stop); }); },
     .light_free = [](ViewcamLight* light) { delete &light_of(light); },
     .light_pairs = [](const ViewcamLight* light, size_t most, uint32_t* objects, uint64_t* counts) -> size_t {
         auto pairs = light_of(light).integrator().coincident_pairs();

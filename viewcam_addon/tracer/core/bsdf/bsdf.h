@@ -148,6 +148,11 @@ template <class T> class BSDFOf {
     // u_lobe: which lobe, in [0, 1). direction: two numbers in [0, 1) that are made where they are asked for.
     template <class Numbers>
     BSDFSampleOf<T> sample(T u_lobe, Numbers&& direction) const {
+        return sample(u_lobe, direction, [](const auto& lobe, Vec2Of<T> u) { return lobe.sample(u); });
+    }
+    // sample_lobe(lobe, u): the direction of a lobe.
+    template <class Numbers, class SampleLobe>
+    BSDFSampleOf<T> sample(T u_lobe, Numbers&& direction, const SampleLobe& sample_lobe) const {
         T chosen{}, reached{};
         for (int i = 0; i < count_; i++) {  // the last is taken even where the sum is rounded to less than u
             chosen = select(Mask<T>(u_lobe >= reached) & Mask<T>(shares_[i] > 0.0), splat<T>(i), chosen);
@@ -161,7 +166,7 @@ template <class T> class BSDFOf {
             std::visit(
                 [&](const auto& lobe) {
                     if (!lobe.DELTA && !u) u = direction();
-                    LobeSampleOf<T> of_lobe = lobe.sample(lobe.DELTA ? Vec2Of<T>{} : *u);
+                    LobeSampleOf<T> of_lobe = sample_lobe(lobe, lobe.DELTA ? Vec2Of<T>{} : *u);
                     if (any(bumped_) && lobe.IS_DIFFUSE && lobe.KIND != TRANSMISSION)  // so Cycles has it
                         of_lobe.weight = of_lobe.weight * select(bumped_, terminator_.left(normal_of(lobe), true, of_lobe.direction), splat<T>(1));
                     sample.direction = select(lanes, of_lobe.direction, sample.direction);

@@ -35,6 +35,12 @@ struct PathLight {
         brought |= uint8_t(1 << category);
     }
     void add(Category category, Vec3 rgb) { add(category, double4{rgb.x, rgb.y, rgb.z, 0}); }
+    // All of it.
+    Vec3 combined() const {
+        double4 sum{};
+        for (unsigned left = brought & ~(1u << COLOR); left;) sum += of[take_bit(left)];
+        return {sum[0], sum[1], sum[2]};
+    }
 };
 
 // The settings by which samples become pixels.

@@ -16,8 +16,8 @@
 // along the whole of each, past all that it meets, with a shadow ray to each such light that it runs into.
 //
 // Nothing is traced that can't bring anything: without lights no shadow rays, without anything bright that rays could run into
-// no last ray, without either one ray a sample. What a path brings depends on its own numbers alone, and is added up in an order
-// of its own: whichever paths go along with it, and whether rays are traced in packets, changes no bit.
+// no last ray, without either one ray a sample. What a path brings depends on its own numbers alone, and on the guide (guide.h) if there
+// is one, and is added up in an order of its own: whichever paths go along with it, and whether rays are traced in packets, changes no bit.
 //
 // Several surfaces in one place are a matter of rounding: which of them a ray of a float32 renderer meets, and which shadows
 // the other. The light that depends on that choice can be asked for: then that alone counts which comes by such a place, as
@@ -41,6 +41,7 @@
 #include "../lights/light_sampler.h"
 #include "../samplers/sobol.h"
 #include "../scene.h"
+#include "guide.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -120,8 +121,13 @@ class PathIntegrator {
         return lit_ && random;
     }
 
-    // The light of up to 64 paths.
-    void trace(const CameraSamples& samples, int count, PathLight* light) const {
+    // True if a guide may find light that diffuse surfaces get from one another, or from what else shines.
+    bool may_be_guided() const { return lit_ && kinds_ & DIFFUSE && std::min(most_, most_of_[DIFFUSE]) > 1 && coincident_ == 0; }
+    // Diffuse rays follow it from now on, or none if it is null.
+    void set_guide(const Guide* guide) { guide_ = guide; }
+
+    // The light of up to 64 paths. learned: receives their diffuse rays, if it is not null.
+    void trace(const CameraSamples& samples, int count, PathLight* light, std::vector<Guide::LearnedRay>* learned = nullptr) const {
         Block& block = of_this_thread<Block>();
         block.samples = &samples, block.light = light;
         block.live = 0;
@@ -129,8 +135,10 @@ class PathIntegrator {
         for (int depth = 1; block.live > 0 || block.wide; depth++) {
             scatter(depth, block);
             gather(depth, block);
+            if (learned) note_rays(block);
             arrive(depth, block);
         }
+        if (learned) learn(block, *learned);
     }
 
    private:
@@ -192,9 +200,16 @@ class PathIntegrator {
         Vec3x4 incoming, weight;
         double4 footprint;  // where materials ask for that
     };
+    // A diffuse ray from which a guide may learn, and the light that its path had brought before.
+    struct NotedRay {
+        int sample;
+        Vec3 position, normal, direction, weight, before;
+        double pdf;
+    };
     struct Block {
         const CameraSamples* samples;
         PathLight *light, ignored;
+        std::vector<NotedRay> noted;
         int live = 0;
         Path paths[MOST], onwards[MOST];
         // Paths at wide materials by slot, which is the sample's number for rays from the eye; `wide`: a bit for each slot that has one.
@@ -209,6 +224,24 @@ class PathIntegrator {
         Hit met[MOST];
         const Ray* met_by[MOST];
     };
+
+    static void note_rays(Block& block) {
+        for (int i = 0; i < block.live; i++) {
+            const Path& path = block.onwards[i];
+            const Interaction& from = block.points[path.from];
+            if (path.kind == DIFFUSE)
+                block.noted.push_back({path.sample, from.position, from.normal, path.ray.direction, path.weight, block.light[path.sample].combined(), path.pdf});
+        }
+    }
+    void learn(Block& block, std::vector<Guide::LearnedRay>& learned) const {
+        for (const NotedRay& ray : block.noted) {
+            double brought = mean(block.light[ray.sample].combined() - ray.before), weight = mean(ray.weight), mixed = ray.pdf;
+            if (!(weight > 0)) continue;
+            if (guide_) mixed = GuideAt<double>(*guide_, [&](int) { return std::pair(ray.position, ray.normal); }).mixed(ray.pdf, ray.direction);
+            learned.push_back(Guide::learned(ray.position, ray.normal, ray.direction, brought / weight, ray.pdf, mixed));
+        }
+        block.noted.clear();
+    }
 
     static int row(RayKind kind) { return kind == DIFFUSE ? 0 : kind == GLOSSY ? 1 : 2; }
 
@@ -509,6 +542,15 @@ class PathIntegrator {
         }
     }
 
+    // The direction in which a path goes on, diffuse ones with the guide where there is one. point(i): position and normal.
+    template <class T, class Numbers, class Point> BSDFSampleOf<T> sample_bsdf(const BSDFOf<T>& bsdf, T u_lobe, const Numbers& direction, const Point& point) const {
+        if (!guide_) return bsdf.sample(u_lobe, direction);
+        GuideAt<T> guide(*guide_, point);
+        return bsdf.sample(u_lobe, direction, [&]<class Lobe>(const Lobe& lobe, Vec2Of<T> u) {
+            if constexpr (Lobe::KIND == DIFFUSE && !Lobe::DELTA) return guide.sample(lobe, u); else return lobe.sample(u);
+        });
+    }
+
     // Adds what lights may bring to all points where paths are, and finds the rays on which they go on.
     void scatter(int depth, Block& block) const {
         int onwards = 0;
@@ -549,8 +591,8 @@ class PathIntegrator {
             for (int k = 0; k < chosen; k++) ask(choices[k], at, u_light, path, depth, bsdf, block);
 
             if (!(bsdf.kinds() & leading)) continue;
-            BSDFSample sampled =
-                bsdf.sample(bsdf.needs_choice() ? number(SobolSampler::LOBE) : 0, [&] { return pair(SobolSampler::DIRECTION); });
+            BSDFSample sampled = sample_bsdf<double>(bsdf, bsdf.needs_choice() ? number(SobolSampler::LOBE) : 0, [&] { return pair(SobolSampler::DIRECTION); },
+                                                     [&](int) { return std::pair(point.position, point.normal); });
             if (const Environment& sky = lights_.environment(); coincident_ > 0 && !path.coincident && !lights_.has_sky() && sampled.pdf < INFINITE && !is_black(sky.radiance)) {
                 double all;
                 ScatteredLight light = weighed_otherwise(bsdf, sampled.direction, sky.hidden_from, {}, all);
@@ -702,7 +744,8 @@ class PathIntegrator {
             if (choices[slot].lanes) ask(choices[slot], slot, four, bsdf, point_of, u_light, depth, block);
 
         if (!(four.lanes & (diffuse | glossy))) return;
-        BSDFSampleOf<double4> sampled = bsdf.sample(bsdf.needs_choice() ? number(SobolSampler::LOBE) : double4{}, [&] { return pair(SobolSampler::DIRECTION); });
+        BSDFSampleOf<double4> sampled = sample_bsdf<double4>(bsdf, bsdf.needs_choice() ? number(SobolSampler::LOBE) : double4{}, [&] { return pair(SobolSampler::DIRECTION); },
+                                                             [&](int i) { return std::pair(lane(four.at.position, i), lane(four.at.normal, i)); });
         unsigned is_diffuse = bits(sampled.is_diffuse), goes_diffuse = lanes_with(sampled.kind, DIFFUSE);
         unsigned going = four.lanes & ((goes_diffuse & diffuse) | (lanes_with(sampled.kind, GLOSSY) & glossy));
         going &= bits(long4(dot(sampled.direction, four.at.normal) > 0.0));
@@ -983,6 +1026,7 @@ class PathIntegrator {
     std::vector<char> wide_;  // by material, Material::is_wide
     LightSampler lights_;
     SobolSampler sampler_;
+    const Guide* guide_ = nullptr;
     int most_, most_of_[TRANSMISSION + 1] = {};
     bool meets_[TRANSMISSION + 1] = {}, only_sky_[TRANSMISSION + 1] = {};
     bool lit_, transparent_ = false, mixed_ = false;  // true if materials let anything straight through, and beside that scatter
