@@ -46,6 +46,9 @@ _LENS = (
     *("Projection", "FocalLength", "HorizontalAperture", "VerticalAperture", "HorizontalApertureOffset"),
     *("VerticalApertureOffset", "FStop"),
 )
+_PICTURE = {"resolution": None, "pixelAspectRatio": 1.0, "aspectRatioConformPolicy": "expandAperture"}
+"""The attributes of UsdRender's settings and products that decide a picture's shape, with their usual values."""
+
 _TOO_MUCH = "OpenUSD needed more time or memory for it than its size accounts for: export the cameras alone, without references"
 
 
@@ -57,8 +60,9 @@ def read(name: str, path: Path | None, text: str, size: str, values: str) -> dic
     values : the key of its customData that is wanted.
 
     It has y_up; meters_per_unit; documentation of the root layer; values (of all prims, texts); left_out (what is not read, as
-    it stands in the file); cameras: each a name and an error, or samples: each with the time, seconds (None if there is one
-    alone), size, matrix (16, for row vectors) and the attributes of the lens by their names.
+    it stands in the file); cameras: each a name, a path, renders (the values of _PICTURE for each shape that the stage renders
+    it in) and an error, or samples: each with the time, seconds (None if there is one alone), size, matrix (16, for row
+    vectors) and the attributes of the lens by their names.
 
     Raises InputError if OpenUSD is not here, can't open it, or needs more than the bounds.
     """
@@ -140,12 +144,16 @@ def _read(request: dict[str, Any]) -> dict[str, Any]:
         "left_out": layers.left_out,
     }
     samples = 0
+    renders = _Renders()
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if value := _text(partial(prim.GetCustomDataByKey, request["values"])):
             result["values"].append(value)
+        if prim.GetTypeName() in ("RenderSettings", "RenderProduct"):
+            renders.add(prim)
         if not prim.IsA(UsdGeom.Camera):
             continue
         camera: dict[str, Any] = {"name": _text(prim.GetDisplayName) or _text(prim.GetName) or "camera"}
+        camera["path"] = str(prim.GetPath())
         result["cameras"].append(camera)
         try:
             camera["samples"] = _samples(prim, stage, request["size"], Usd, UsdGeom)
@@ -154,7 +162,44 @@ def _read(request: dict[str, Any]) -> dict[str, Any]:
         samples += len(camera.get("samples", "1"))
         if samples > _MOST_SAMPLES:
             raise InputError(f"its cameras have more than {_MOST_SAMPLES} time samples")
+    by_camera = renders.by_camera()
+    for camera in result["cameras"]:
+        camera["renders"] = by_camera.get(camera["path"], [])
     return result
+
+
+class _Renders:
+    """The pictures that a stage renders, by UsdRender's rule: of what a product does not say, the settings that list it do."""
+
+    def __init__(self) -> None:
+        self._stated: dict[str, tuple[dict[str, Any], list[str]]] = {}  # by path: attributes, and cameras
+        self._products: dict[str, list[str]] = {}  # paths, by their settings
+
+    def add(self, prim: Any) -> None:
+        attributes = {key: prim.GetAttribute(key) for key in _PICTURE if prim.HasAttribute(key)}
+        values = {key: _plain(each.Get()) for key, each in attributes.items() if each.HasAuthoredValue()}
+        path = str(prim.GetPath())
+        self._stated[path] = values, self._targets(prim, "camera")
+        if prim.GetTypeName() == "RenderSettings":
+            self._products[path] = self._targets(prim, "products")
+
+    @staticmethod
+    def _targets(prim: Any, name: str) -> list[str]:
+        return [*map(str, prim.GetRelationship(name).GetForwardedTargets())] if prim.HasRelationship(name) else []
+
+    def by_camera(self) -> dict[str, list[dict[str, Any]]]:
+        """The different pictures of each camera whose resolution is said."""
+        of_settings = {product: path for path, products in self._products.items() for product in products}
+        result: dict[str, list[dict[str, Any]]] = {}
+        for path, (values, cameras) in self._stated.items():
+            if any(product in self._stated for product in self._products.get(path, ())):
+                continue
+            shared, usual = self._stated.get(of_settings.get(path, ""), ({}, []))
+            picture = _PICTURE | shared | values
+            for camera in cameras or usual:
+                if picture["resolution"] is not None and picture not in result.setdefault(camera, []):
+                    result[camera].append(picture)
+        return result
 
 
 class _Layers:

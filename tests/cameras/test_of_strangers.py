@@ -1002,11 +1002,39 @@ def test_a_table_is_read_with_blanks_at_its_end_and_middleburys_without_a_line_e
     assert camera.pinhole.distance == (500, 500)
 
 
+AWKWARD = ("left/0001.png", "C:/a", "a\\b", "..", "", ' #1: "x" [y', "nul.exr", "x" * 300, "\u3042", "it's", "-x", "/")
+
+
+@pytest.mark.parametrize("form", ["opencv", "ros", "pbrt", "pov_ray", "sidecar"])
+@pytest.mark.parametrize("name", AWKWARD)
+def test_a_camera_that_no_file_can_be_called_by_is_read_again_by_its_name(tmp_path, form, name):
+    """A name with a slash became a subfolder's file, which was not read again."""
+    called = [Camera(each, CAMERAS["plain"]) for each in ("front", name)]
+    files = cameras.save(called, tmp_path, form)
+    for file in files:
+        assert file.parent == tmp_path and not set(file.name) & set('<>:"/\\|?*') and len(file.name.encode()) < 250
+        assert not file.name.upper().startswith("NUL.") and file.stem.rstrip(". ") == file.stem
+    back = {camera.name for camera in cameras.read(tmp_path)}
+    assert back == {"front", name or ("_" if form == "ros" else "")}, f"{back} of {[file.name for file in files]}"
+
+
 @pytest.mark.parametrize("form", ["opencv", "sidecar"])
-def test_cameras_called_by_a_drive_of_windows_are_no_files_there(form):
-    called = [Camera(f"C:/{name}", CAMERAS["plain"]) for name in ("a", "b")]
-    with pytest.raises(InputError, match="inside the folder"):
-        cameras.write(called, form)
+def test_cameras_whose_files_would_be_one_are_refused_by_their_names(form):
+    with pytest.raises(InputError, match=r"^'a/b', 'A_b' would be one file for several cameras"):
+        cameras.write([Camera(name, CAMERAS["plain"]) for name in ("a/b", "A_b")], form)
+
+
+def test_a_copy_of_a_cameras_file_is_called_by_its_own(tmp_path):
+    file, _ = cameras.save([Camera(name, CAMERAS["plain"]) for name in ("rig/left", "b")], tmp_path, "opencv")
+    (tmp_path / "right.yml").write_text(file.read_text())
+    assert [camera.name for camera in cameras.read(tmp_path)] == ["b", "rig/left", "right"]
+
+
+@pytest.mark.parametrize("form", ["gltf", "usd"])
+def test_a_name_of_a_node_is_no_path(form):
+    called = ["rig/left", "a.png", "a.png", "b"]
+    back = cameras.read(cameras.write([Camera(name, CAMERAS["plain"]) for name in called], form), options=VGA)
+    assert [camera.name for camera in back] == ["rig/left", "a.png", "a.png #2", "b"]
 
 
 def test_a_matrix_that_is_transposed_is_refused_by_its_last_row():
@@ -1070,3 +1098,36 @@ def test_a_picture_of_another_size_than_its_camera_says_is_told(tmp_path, size):
     (tmp_path / "images" / "a.png").write_bytes(files.png(*size))
     (camera,) = cameras.read(tmp_path)
     assert any("has 320 × 180 pixels and its camera 640 × 360" in note for note in camera.notes) == (size == (320, 180))
+
+
+POSED = "cam.location = (1, 2, 3)\ncam.rotation_euler = (1, 0, 0.5)\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        ("cam.constraints.new('TRACK_TO')", "by other means"),
+        ("cam.parent = rig", "by other means"),
+        ("cam.rotation_euler.z += 0.1", "from where it was"),
+        ("cam.location = (1, 2, 4)", "location is something else before"),
+        ("cam.location[2] = height", "give location in plain numbers"),
+        ("camera2.location = (1, 2, 3)", "this is another camera"),
+        ("cam.data.type = 'ORTHO'", "of the type ORTHO"),
+        ("cam.rotation_mode = 'QUATERNION'", "turns by its rotation_quaternion, which the text does not say"),
+        ("cam.data.lens = 50\ncam.data.angle = 1", "both a lens and an angle"),
+    ],
+)
+def test_what_blenders_python_leaves_open_of_a_camera_is_refused(more, sentence):
+    seen = Options(view_plane=CAMERAS["plain"].plane)
+    (camera,) = cameras.read(POSED, options=seen)
+    assert camera.pinhole.eye == (1, 2, 3) and any("in Blender's own, XYZ" in note for note in camera.notes)
+    with pytest.raises(InputError, match=sentence):
+        cameras.read(POSED + more, options=seen)
+
+
+def test_a_list_of_blenders_values_in_json_is_that_camera():
+    """Half a turn about x and a quarter about z: it looks up, and its right is y. 36 mm are 640 pixels: 50 mm are 888.9."""
+    values = {"location": [1, 2, 3], "rotation_euler": [math.pi, 0, math.pi / 2], "lens": 50, "sensor_width": 36}
+    pinhole = read(json.dumps(values)).pinhole
+    assert np.allclose(pinhole.axes(), [[0, 1, 0], [1, 0, 0], [0, 0, -1]], rtol=0, atol=1e-15)
+    assert pinhole.distance[0] == 50 / 36 * 640

@@ -922,6 +922,24 @@ def test_yaml_in_brackets_is_read_as_pyyaml_reads_it():
         assert ours.read(f"k: {broken}\nl: 1\n")[0].get("k") in (broken, f"{broken} l: 1", None)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        'a: "x # y" # c',
+        "a: it's # c",
+        'a: "x[y"\nb: 2',
+        'a: [1, "]", 2]',
+        "a: 'q # r' # d",
+        'a: "\\u00e9\\\\ \\""',
+        "a: 5'3 # x's",
+    ],
+)
+def test_quotes_of_yaml_hold_whatever_stands_in_them_as_pyyaml_reads_it(text):
+    from viewcam_addon.cameras import yaml as ours
+
+    assert ours.read(text)[0] == pytest.importorskip("yaml").safe_load(text)
+
+
 def test_infinigens_t_is_the_camera_in_the_world_and_its_k_counts_from_the_corner(tmp_path):
     known = Known("pixels_not_square")
     pose = np.eye(4)

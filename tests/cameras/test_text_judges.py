@@ -741,7 +741,6 @@ def test_vtks_window_center_and_horizontal_angle_are_its_formulas():
         ),
         (CODE["three.js"] + "camera.rotation.x = 1;", "by other means"),
         (CODE["three.js"] + "camera.position.applyAxisAngle(axis, 2);", "by other means"),
-        ("camera.location = (7, -6, 5)\ncamera.rotation_euler = (1.1, 0, 0.8)", "by other means"),
         (CODE["three.js"] + "camera.position.z += 2;", "moves the camera"),
         (CODE["weekend_4"] + "cam.lookfrom = point3(1, 2, 3);", "something else in line"),
         (CODE["weekend_4"].replace("defocus_angle = 0;", "defocus_angle = 0.6;"), "blurs"),

@@ -287,3 +287,60 @@ def test_a_lens_of_omniverse_is_named(attribute):
     )
     (camera,) = read(f"#usda 1.0\n{cameras_of_stage}")
     assert camera.name == "pinhole" and any("of the model 'fisheye'" in note for note in camera.notes)
+
+
+def rendered(settings="", product="", products="</Render/P>"):
+    return f"""#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Z"
+)
+def Camera "Cam" {{
+    float focalLength = 50
+    float horizontalAperture = 36
+    float verticalAperture = 24
+}}
+def Scope "Render" {{
+    def RenderSettings "S" {{
+        int2 resolution = (1600, 800)
+        rel camera = </Cam>
+        rel products = [{products}]
+        {settings}
+    }}
+    def RenderProduct "P" {{
+        {product}
+    }}
+}}
+"""
+
+
+POLICY = "uniform token aspectRatioConformPolicy = "
+
+
+@pytest.mark.usefixtures("openusd_in_this_process")
+@pytest.mark.parametrize(
+    ("settings", "product", "size", "distance"),
+    [
+        ("", "", (1600, 800), (50 / 48 * 1600, 50 / 24 * 800)),  # grown across, from 36 to 24 · 2
+        ("", "int2 resolution = (800, 800)", (800, 800), (50 / 36 * 800, 50 / 36 * 800)),
+        (f'{POLICY}"cropAperture"', "int2 resolution = (800, 800)", (800, 800), (50 / 24 * 800, 50 / 24 * 800)),
+        (f'{POLICY}"cropAperture"', "", (1600, 800), (50 / 36 * 1600, 50 / 18 * 800)),
+        (f'{POLICY}"cropAperture"', f'{POLICY}"adjustApertureWidth"', (1600, 800), (50 / 48 * 1600, 50 / 24 * 800)),
+        (f'{POLICY}"adjustApertureHeight"', "", (1600, 800), (50 / 36 * 1600, 50 / 18 * 800)),
+        (f'{POLICY}"adjustPixelAspectRatio"', "", (1600, 800), (50 / 36 * 1600, 50 / 24 * 800)),
+        ("float pixelAspectRatio = 0.75", "", (1600, 800), (50 / 36 * 1600, 50 / 24 * 800)),  # 1600 · 0.75 / 800 = 36 / 24
+    ],
+)
+def test_what_a_stage_renders_says_a_cameras_size_and_how_its_aperture_fits(settings, product, size, distance):
+    (camera,) = read(rendered(settings, product))
+    pinhole = camera.pinhole
+    assert camera.size_stated and (pinhole.width, pinhole.height) == size
+    assert pinhole.distance == pytest.approx(distance, rel=1e-12)
+
+
+@pytest.mark.usefixtures("openusd_in_this_process")
+def test_of_a_camera_that_is_rendered_in_several_shapes_none_is_taken():
+    (camera,) = read(rendered(product="int2 resolution = (640, 480)\n rel camera = </Cam>", products=""))
+    assert not camera.size_stated and any("2 shapes, as 1600 × 800, 640 × 480" in note for note in camera.notes)
+    with pytest.raises(InputError, match="aspectRatioConformPolicy of camera 'Cam' is 'wide'"):
+        read(rendered(f'{POLICY}"wide"'))

@@ -20,6 +20,17 @@ from viewcam_addon.cameras import Camera, Options
 SHIFTED, PLAIN, SQUARE = (CAMERAS[name] for name in ("shifted_and_not_square", "plain", "rolled"))
 POSE = "1 0 0\n0 1 0\n0 0 1\n0 0 -4\n"
 
+BLENDER = """data = bpy.data.cameras.new("C")
+cam = bpy.data.objects.new("C", data)
+size = 640
+cam.location = (1, 2, 3)
+cam.rotation_mode = 'ZXY'
+cam.rotation_euler = Euler((math.radians(60), 0.1, 45 * pi / 180), 'ZXY')
+cam.rotation_euler[1] = 0.2  # a little
+data.lens = 35
+data.shift_x = 0.1
+scene.render.resolution_x = size
+"""
 LOOKS = """const camera = new THREE.PerspectiveCamera(50, 1.33, 0.1, 100); camera.position.set(3, 4, 5); camera.lookAt(0, 1, 0);
 gluPerspective(60, 1.333, 1, 100); gluLookAt(1, 2, 3, 0, 0, 0, 0, 0, 1);
 plotter.camera_position = [(1, 2, 3), (0, 0, 0), (0, 0, 1)]
@@ -219,6 +230,7 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "looks": {"a.js": LOOKS.splitlines()[0]},
         "looks_gl": {"a.c": LOOKS.splitlines()[1]},
         "looks_vtk": {"a.py": LOOKS.splitlines()[2]},
+        "blender_python": {"a.py": BLENDER},
         "text": {"a.json": _several("text", SHIFTED)},
         "text_of_people": {"a.txt": "eye=(7, -6, 4) look_at=0,0,1 up=[0 0 1] fov=40° axis=x size=640x360"},
         "chan": {"a.chan": "1 0 1 5 0 0 0 45\n2 0 1 5 0 0 0 45\n"},

@@ -526,7 +526,7 @@ CAMERAS = (
     *("instant_ngp", "kubric", "nvisii", "infinigen", "fspy_exported"),
     *("supersplat", "supersplat_project", "earth_studio", "after_effects"),
     *("realitycapture_table", "visualsfm", "mvsnet", "middlebury", "middlebury_pair", "neus", "kitti_calibration", "pmvs"),
-    *("bop_sensor", "pose_files", "redwood", "replica"),
+    *("bop_sensor", "pose_files", "redwood", "replica", "blender_python"),
 )
 """The kinds of camera_files.py, which makes them only when it is asked."""
 

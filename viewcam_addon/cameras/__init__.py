@@ -59,6 +59,7 @@ from . import (
     after_effects,
     arkit,
     arrays,
+    blender_python,
     bop,
     bundler,
     colmap,
@@ -168,6 +169,7 @@ FORMATS: dict[str, ModuleType] = {
     "three_js": three_js,
     "unreal": unreal,
     "unity": unity,
+    "blender_python": blender_python,
     "vtk": vtk,
     "textbook": textbook,
     "mujoco": mujoco,
@@ -185,7 +187,7 @@ FORMATS: dict[str, ModuleType] = {
 _LONGEST = 1000  # characters of a name or a sentence
 _YAML = (".yaml", ".yml")
 _JSON = (".json", ".gltf", ".sfm")
-_CODE = ("vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
+_CODE = ("blender_python", "vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
 """The formats that a damaged JSON file may look like."""
 _NO_JSON = "{} looks like JSON and is none ({}): correct it"
 _REMEMBERED = re.compile(rf"{own.KEY}: (axes=\w+ scale=[\d.e+-]+)")
@@ -227,13 +229,15 @@ def _of_all(source: Source, module: ModuleType, options: Options) -> list[Camera
         return _each_of_folder(source, module, options)
     parts = own.parts(source.text) if getattr(module, "SEVERAL", "") == "a text" else []
     if not parts:
-        return _read(source, module, options)
+        cameras = _read(source, module, options)
+        is_one = len(cameras) == 1 and getattr(module, "SEVERAL", "") == "a folder"
+        return [_called(cameras[0], source, cameras[0].name)] if is_one else cameras
     sources = [source] if len(parts) == 1 else [Source(text) for _, text in parts]
     cameras = []
     for (name, _), part in zip(parts, sources, strict=True):
         if not module.recognizes(part):
             raise InputError(f"{source.name} names the camera {checks.quoted(name)} and has no such camera: export it again")
-        cameras += [replace(camera, name=name) for camera in _read(part, module, options)]
+        cameras += [replace(camera, name=_quoted(name)) for camera in _read(part, module, options)]
     return cameras
 
 
@@ -260,9 +264,17 @@ def _each_of_folder(source: Source, module: ModuleType, options: Options) -> lis
             continue
         with left_out.unless_pinhole(name):
             members = _read(file, module, options)
-            cameras += [replace(camera, name=name if len(members) == 1 else f"{name} {camera.name}") for camera in members]
+            is_one = len(members) == 1
+            cameras += [_called(each, file, name) if is_one else replace(each, name=f"{name} {each.name}") for each in members]
     notes = (f"Not read, since they are not {module.TITLE}: {several(others)}",) if others else ()
     return [camera.noted(*notes) for camera in left_out.with_notes(sorted(cameras, key=lambda camera: camera.name))]
+
+
+def _called(camera: Camera, file: Source, otherwise: str) -> Camera:
+    """The camera by the name that its file says, if the file is called by that."""
+    stated = (*(name for name, _ in own.parts(file.text)), camera.name)
+    stem = file.path.stem if file.path else None
+    return replace(camera, name=_quoted(next((name for name in stated if naming.as_file(name) == stem), otherwise)))
 
 
 def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:

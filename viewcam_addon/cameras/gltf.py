@@ -52,7 +52,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             result.append(_camera(name, camera, worlds.of(index), options))
             if worlds.moves(index):
                 result[-1] = result[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
-    names = naming.distinct([camera.name for camera in result])
+    names = naming.numbered([camera.name for camera in result])
     return left_out.with_notes([dataclasses.replace(camera, name=name) for camera, name in zip(result, names, strict=True)])
 
 

@@ -5,6 +5,7 @@ elsewhere, since a file from anybody should make a program open nothing of whoev
 """
 
 import contextlib
+import re
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -20,6 +21,10 @@ _PICTURES = (
     ".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".webp", ".bmp", ".hdr", ".tga", ".ppm", ".pgm", ".heic", ".dng",
     ".avif",
 )  # fmt: skip
+_NOT_IN_FILES = '<>:"/\\|?*'
+_DEVICE = re.compile(r"(?:con|prn|aux|nul|com\d|lpt\d)(?:\.|$)", re.IGNORECASE)
+"""The names that are no files of Windows, whatever follows their first full stop."""
+_MOST_BYTES = 200
 
 
 def stem(path: str) -> str:
@@ -38,7 +43,11 @@ def distinct(paths: Sequence[str]) -> list[str]:
     """A name for each picture: its stem, or where two would be called alike its path, or that and its number."""
     stems = [stem(path) for path in paths]
     twice = {name for name, count in Counter(stems).items() if count > 1 or not name}
-    names = [path if name in twice else name for path, name in zip(paths, stems, strict=True)]
+    return numbered([path if name in twice else name for path, name in zip(paths, stems, strict=True)])
+
+
+def numbered(names: Sequence[str]) -> list[str]:
+    """The names, from the second one of a name on with a number."""
     seen: Counter[str] = Counter()
     result = []
     for name in names:
@@ -127,23 +136,32 @@ def checked(cameras: Iterable[Camera], written: str) -> tuple[Camera, ...]:
     return cameras
 
 
-def refuse_taken(names: Sequence[str]) -> None:
-    """Raise InputError if two cameras would be one file, or a name can't be a file's."""
-    for name in names:
-        check_image(name)
-    if twice := [name for name, count in Counter(name.casefold() for name in names).items() if count > 1]:
-        raise InputError(f"{several(twice)} would be one file for several cameras: rename them")
+def as_file(name: str) -> str:
+    """The name as files can be called on every system, in one folder: what they can't have is _ there."""
+    plain = "".join("_" if character in _NOT_IN_FILES or _is_unseen(character) else character for character in name)
+    plain = plain.encode("utf-8", errors="replace")[:_MOST_BYTES].decode("utf-8", errors="ignore").rstrip(". ")
+    return f"_{plain}" if not plain or _DEVICE.match(plain) else plain
+
+
+def files(cameras: Sequence[Camera], suffix: str) -> list[str]:
+    """The names of the files that have a camera each. Raises InputError if two cameras would be one file."""
+    names = [as_file(camera.name) + suffix for camera in cameras]
+    twice = {name for name, count in Counter(map(str.casefold, names)).items() if count > 1}
+    if alike := [checks.quoted(each.name) for each, name in zip(cameras, names, strict=True) if name.casefold() in twice]:
+        raise InputError(f"{several(alike)} would be one file for several cameras: rename them")
+    return names
 
 
 def a_file_each(cameras: Sequence[Camera], suffix: str, text: Callable[[Camera], str]) -> str | dict[str, str]:
     """The result of `write` in a format whose files have one camera: its text, or of several the files, called as the cameras.
 
-    Raises InputError as `refuse_taken` does.
+    text : the function that makes it. It says the camera's name, which the file's need not be.
+
+    Raises InputError as `files` does.
     """
     if len(cameras) == 1:
         return text(cameras[0])
-    refuse_taken([camera.name for camera in cameras])
-    return {f"{camera.name}{suffix}": text(camera) for camera in cameras}
+    return dict(zip(files(cameras, suffix), map(text, cameras), strict=True))
 
 
 def refuse_mirrored(cameras: Iterable[Camera], written: str) -> None:

@@ -154,7 +154,7 @@ def _text(camera: Camera, options: Options) -> str:
         "%YAML:1.0",
         "---",
         *([f"# {options.remembered}"] if options.remembered else []),
-        f"# {own.comment(camera.pinhole)}",
+        *own.beginning(camera, "#"),
         f"image_width: {camera.pinhole.width}",
         f"image_height: {camera.pinhole.height}",
         _matrix("camera_matrix", [[f_x, 0.0, c_x - half], [0.0, f_y, c_y - half], [0.0, 0.0, 1.0]]),

@@ -361,7 +361,7 @@ def _written(camera: Camera) -> str:
     look = "  ".join(texts.listed(vector) for vector in texts.look(pinhole))
     return "\n".join(
         [
-            f"# {own.comment(pinhole)}",
+            *own.beginning(camera, "#"),
             *mirror,
             f"LookAt {look}",
             f'Camera "perspective" "float fov" [ 90 ] "float screenwindow" [ {texts.listed(window)} ]',

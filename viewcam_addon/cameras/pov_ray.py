@@ -330,7 +330,7 @@ def _written(camera: Camera) -> str:
     pinhole = camera.pinhole
     (d_x, d_y), (c_x, c_y), (width, height) = pinhole.distance, pinhole.principal_point, (pinhole.width, pinhole.height)
     e = texts.listed(pinhole.eye, ", ")
-    lines = [f"// +W{width} +H{height}", f"// {own.comment(pinhole)}", "camera {", f"  location <{e}>"]
+    lines = [f"// +W{width} +H{height}", *own.beginning(camera, "//"), "camera {", f"  location <{e}>"]
     if (c_x, c_y) == (width / 2, height / 2):
         across = texts.shortest(width / d_x)
         lines += [

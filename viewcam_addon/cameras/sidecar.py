@@ -65,11 +65,9 @@ def read(source: Source, options: Options) -> list[Camera]:
 
 
 def write(cameras: Sequence[Camera], _options: Options) -> dict[str, str]:
-    naming.refuse_taken([camera.name for camera in cameras])
-    return {
-        f"{camera.name}.json": json.dumps({"image": camera.image, **record(camera.pinhole, lens=camera.lens)}, indent=1) + "\n"
-        for camera in cameras
-    }
+    records = [{"name": each.name, "image": each.image} | record(each.pinhole, lens=each.lens) for each in cameras]
+    texts = (json.dumps(each, indent=1) + "\n" for each in records)
+    return dict(zip(naming.files(cameras, SUFFIX), texts, strict=True))
 
 
 def _is_ours(source: Source) -> bool:
@@ -86,6 +84,8 @@ def _camera(source: Source, options: Options) -> Camera:
         raise InputError(f"{camera.place} has no {min(missing)}: it can't be a camera without")
     preview = next((document.get(key) for key in ("preview", "image") if isinstance(document.get(key), str)), None)
     name = naming.stem(preview) if preview else source.path.stem if source.path else "camera"
+    if isinstance(document.get("name"), str):  # the key that a batch leaves out
+        name = document.text("name")
     pinhole = Pinhole(**camera.values)
     lens: Lens | None = None
     notes: tuple[str, ...] = ()

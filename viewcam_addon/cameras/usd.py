@@ -4,18 +4,19 @@ the package index), in a process of its own (usd_stage.py).
 The camera's axes are x right, y up, z away from the view, whatever the stage's upAxis is; matrices are for row vectors. The
 world is brought to z up and to meters by what the stage says of its own, as Blender's importer does it: a stage that says
 nothing counts in centimeters and has y up. Lens,
-apertures and their offsets count in tenths of a scene unit, of which only ratios decide the picture. A stage says no number of
-pixels; what is written here has it as userProperties of the camera, and else it is given. Where the apertures' aspect is not
-the picture's, the aperture grows to fit, which is UsdRender's rule. Written as text, so that writing needs no library; lens and
-apertures are float32 there, by the schema.
+apertures and their offsets count in tenths of a scene unit, of which only ratios decide the picture. A camera says no number of
+pixels: what is written here has it as its userProperties, a RenderProduct or RenderSettings says it of the camera that it
+renders, and else it is given. Where the apertures' aspect is not the picture's, the aperture grows to fit, unless
+aspectRatioConformPolicy says otherwise. Written as text, so that writing needs no library; lens and apertures are float32
+there, by the schema.
 
-Source: OpenUSD's pxr/usd/usdGeom/schema.usda, pxr/base/gf/camera.cpp and usdRender/schema.usda (aspectRatioConformPolicy).
+Source: OpenUSD's pxr/usd/usdGeom/schema.usda, pxr/base/gf/camera.cpp, usdRender/schema.usda and spec.cpp (aspect ratios).
 """
 
 import dataclasses
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,13 @@ _SIZE = "userProperties:viewcam_resolution"
 _PINHOLE = "pinhole"
 _SIDES = ("Horizontal", "Vertical")
 _MOST_NAMED = 3
+_KEEPS_WIDTH: dict[str, Callable[[bool], bool]] = {
+    "expandAperture": lambda is_wider: is_wider,
+    "cropAperture": lambda is_wider: not is_wider,
+    "adjustApertureHeight": lambda is_wider: True,
+    "adjustApertureWidth": lambda is_wider: False,
+}
+"""By UsdRender's policy: whether the width of an aperture that is wider than the picture, or not, stays."""
 
 
 def recognizes(source: Source) -> bool:
@@ -51,10 +59,12 @@ def read(source: Source, options: Options) -> list[Camera]:
         with left_out.unless_pinhole(camera["name"]):
             if "error" in camera:
                 raise InputError(f"camera {checks.quoted(camera['name'])} can't be read ({camera['error']}): export it again")
-            result += [_camera(camera["name"], sample, options).noted(*notes) for sample in camera["samples"]]
+            picture, more = _picture(camera)
+            each = [_camera(camera["name"], sample | picture, options) for sample in camera["samples"]]
+            result += [read.noted(*notes, *more) for read in each]
     names = [camera.name for camera in result]
     if len({*names}) < len(names):
-        names = naming.distinct(names)
+        names = naming.numbered(names)
     return left_out.with_notes([dataclasses.replace(camera, name=name) for camera, name in zip(result, names, strict=True)])
 
 
@@ -97,6 +107,17 @@ def _stage(source: Source) -> dict[str, Any]:
     return source.parsed[TITLE]
 
 
+def _picture(camera: dict[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """The picture that the stage renders of a camera, if it is one alone; and notes."""
+    pictures = camera["renders"]
+    if len(pictures) < 2:
+        return {"picture": pictures[0] if pictures else None}, ()
+    sizes = ", ".join(" × ".join(map(str, picture["resolution"])) for picture in pictures[:_MOST_NAMED])
+    return {"picture": None}, (
+        f"The stage renders {camera['name']} in {len(pictures)} shapes, as {sizes}: none of them was taken",
+    )
+
+
 def _camera(name: str, sample: dict[str, Any], options: Options) -> Camera:
     name = name if sample["time"] is None else f"{name} {sample['time']:g}"
     what = f"camera {checks.quoted(name)}"
@@ -111,13 +132,17 @@ def _camera(name: str, sample: dict[str, Any], options: Options) -> Camera:
     )
     if min(focal, across, upwards) <= 0:
         raise InputError(f"{what} has a focal length or aperture that is not above 0: correct it")
-    stated = sample["size"] is not None
-    width, height = _size(sample["size"], what) if stated else options.size_or_refuse(what)
+    size, picture = sample["size"], sample["picture"]
+    stated = size is not None or picture is not None
+    if size is not None:
+        width, height = _size(size, f"{_SIZE} of {what}")
+    elif picture is not None:
+        width, height = _size(picture["resolution"], f"the resolution that the stage renders {what} in")
+    else:
+        width, height = options.size_or_refuse(what)
     notes: tuple[str, ...] = ()
-    aspect = width / height * options.pixel_aspect
-    if not stated and abs(across / upwards / aspect - 1) > 1e-3:
-        notes += (f"{what} is made for an aspect of {across / upwards:.6g} and the picture's is {aspect:.6g}: it grew to fit",)
-        across, upwards = (across, across / aspect) if across / upwards > aspect else (upwards * aspect, upwards)
+    if size is None:
+        across, upwards, notes = _conformed(across, upwards, width / height, picture, options, what)
     if sample["FStop"]:
         notes += (f"{what} has depth of field, which was left out",)
     plane = ViewPlane(
@@ -131,10 +156,33 @@ def _camera(name: str, sample: dict[str, Any], options: Options) -> Camera:
     return Camera(name, pinhole, stated, (*notes, *more), time=sample["seconds"])
 
 
-def _size(size: object, what: str) -> tuple[int, int]:
+def _conformed(
+    across: float, upwards: float, shape: float, picture: dict[str, Any] | None, options: Options, what: str
+) -> tuple[float, float, tuple[str, ...]]:
+    """The apertures as they are made to fit the picture, and notes.
+
+    shape : the picture's width over its height, in pixels.
+    picture : its entry of the camera's `renders`; None where there is none.
+    """
+    policy, pixel_aspect = "expandAperture", options.pixel_aspect
+    if picture is not None:
+        policy = str(picture["aspectRatioConformPolicy"])
+        pixel_aspect = checks.number(f"pixelAspectRatio of {what}", picture["pixelAspectRatio"], 1e-12, 1e12)
+    aspect, own_aspect = shape * pixel_aspect, across / upwards
+    if policy == "adjustPixelAspectRatio" or abs(own_aspect / aspect - 1) <= 1e-3:
+        return across, upwards, ()
+    if policy not in _KEEPS_WIDTH:
+        raise InputError(f"the aspectRatioConformPolicy of {what} is {checks.quoted(policy)}: give one that UsdRender has")
+    changed = "shrank" if policy == "cropAperture" else "grew" if policy == "expandAperture" else "was changed"
+    notes = (f"{what} is made for an aspect of {own_aspect:.6g} and the picture's is {aspect:.6g}: it {changed} to fit",)
+    keeps_width = _KEEPS_WIDTH[policy](own_aspect > aspect)
+    return (across, across / aspect, notes) if keeps_width else (upwards * aspect, upwards, notes)
+
+
+def _size(size: object, name: str) -> tuple[int, int]:
     if not isinstance(size, list) or len(size) != 2:
-        raise InputError(f"{_SIZE} of {what} is {checks.quoted(size)}: it should be two numbers of pixels")
-    width, height = (pixels(f"{_SIZE} of {what}", side) for side in size)
+        raise InputError(f"{name} is {checks.quoted(size)}: it should be two numbers of pixels")
+    width, height = (pixels(name, side) for side in size)
     return width, height
 
 
@@ -160,6 +208,7 @@ def read_again(cameras: Sequence[Camera], options: Options) -> list[Camera]:
             "FStop": 0.0,
             "model": None,
             "size": [pinhole.width, pinhole.height],
+            "picture": None,
             "matrix": matrix,
         }
         result.append(_camera(camera.name, sample | {"time": None, "seconds": None}, options))

@@ -5,11 +5,16 @@ What is not of it is left out, so that whoever looks for a key does not find it.
 line and tags, and which Blender's Python has not.
 """
 
+import contextlib
+import json
 import re
 from typing import Any
 
 _NO_KEY = re.compile(r"[\"'#\[\]{}]")
 _BRACKET = re.compile(r"[\[\]{}]")
+_QUOTED = r"""(?<![^\s\[{,:])(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
+_IN_QUOTES = re.compile(_QUOTED)
+_COMMENT = re.compile(rf"(?P<quoted>{_QUOTED})|\s#.*$")
 _ITEM = re.compile(r"(\s*)-\s+(.*)$")
 _FLOW = re.compile(r"""[\[\]{},]|:(?=[\s\[\]{},"']|$)|"[^"]*"|'[^']*'|[^\s\[\]{},:"'](?:[^\[\]{},:]|:(?![\s\[\]{},"']|$))*""")
 _DEEPEST = 8
@@ -99,9 +104,10 @@ def _joined(text: str) -> list[str]:
     for line in text.split("\n"):
         if not line or line.startswith(("%", "---", "...")) or line.lstrip().startswith("#"):
             continue
-        line = re.sub(r"\s#.*$", "", line) if "#" in line else line
+        line = _COMMENT.sub(lambda match: match["quoted"] or "", line) if "#" in line else line
         parts.append(line if not parts else line.strip())
         if _BRACKET.search(line):
+            line = _IN_QUOTES.sub("", line)
             open_brackets += line.count("[") + line.count("{") - line.count("]") - line.count("}")
         if open_brackets <= 0:
             lines.append(" ".join(parts))
@@ -114,6 +120,9 @@ def _without_tag(value: str) -> str:
 
 
 def _value(text: str) -> Any:
+    if text[:1] == '"' and text[1:].endswith('"'):
+        with contextlib.suppress(ValueError):
+            return json.loads(text, strict=False)
     if text[:1] in ("[", "{"):
         try:
             return _flow(text)
