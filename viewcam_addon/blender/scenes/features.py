@@ -209,8 +209,8 @@ def note_hair(instance: bpy.types.DepsgraphObjectInstance, ledger: Ledger) -> No
     evaluated = instance.object
     if not instance.show_particles or not evaluated.particle_systems:
         return
-    shown = (each.particle_system for each in evaluated.modifiers if each.type == "PARTICLE_SYSTEM" and each.show_render)
-    if any(system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in shown):
+    systems = (each.particle_system for each in evaluated.modifiers if each.type == "PARTICLE_SYSTEM" and each.show_render)
+    if any(system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in systems):
         ledger.note(evaluated.original.name, "skipped", "particle hair is not modeled")
 
 
