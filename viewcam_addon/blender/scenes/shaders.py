@@ -458,8 +458,8 @@ class Tree:
                 if why := images.alpha_obstacle(image):
                     self._reason(output, why)
                     return None
-                inputs["straight"] = images.is_multiplied(image)
-                self.reading.alphas.add(image.name_full)
+                inputs["straight"] = images.is_divided(image)
+                self._ask_for_alpha(image, inputs)
         if "table" in KINDS[ours].inputs:
             inputs |= self._curves(output)
         if ours == "ies":
@@ -499,6 +499,17 @@ class Tree:
         if result == plain and result["interpolation"] != "cubic":
             return Color(_WHITE, result["image"].image, result["interpolation"] == "closest")
         return result
+
+    def _ask_for_alpha(self, image: bpy.types.Image, inputs: dict[str, object]) -> None:
+        """Note that an image's alpha is asked for: one that is packed is a picture of its own, since a picture's colors are
+        multiplied by the alpha beside them."""
+        key = image.name_full
+        if image.alpha_mode == "CHANNEL_PACKED" and image.colorspace_settings.name == "sRGB":
+            if inputs["output"] != "alpha":
+                return
+            key += " (alpha)"
+            self.reading.images[key], inputs["image"] = image, Color(_WHITE, key)
+        self.reading.alphas.add(key)
 
     def _value_input(self, of: Input, known: object) -> Color | Node | tuple[float, ...] | None:
         """The value of an input of a node that makes values. known : its default, a number where it is one."""
