@@ -254,7 +254,7 @@ def _pixels(path: Path) -> _File:
         for name, channel in part.channels.items():
             whole = f"{part.name()}.{name}"
             with_parts[whole] = name if named[name] == 1 else whole
-            channels[with_parts[whole]] = channel.pixels[_shown(part.header)]
+            channels[with_parts[whole]] = channel.pixels[_displayed(part.header)]
     attributes = {
         key: value for key, value in headers[0].items() if isinstance(value, str) and key not in (_CAMERA_ATTRIBUTE, "name")
     }
@@ -274,7 +274,7 @@ def _size(window: Any) -> tuple[int, int]:
     return right - left + 1, bottom - top + 1
 
 
-def _shown(header: Mapping[str, Any]) -> tuple[slice, slice]:
+def _displayed(header: Mapping[str, Any]) -> tuple[slice, slice]:
     """The rows and columns of a part's pixels that are the picture's, without what is rendered around it."""
     (left, top), _ = np.array(header["displayWindow"], dtype=np.int64) - np.array(header["dataWindow"], dtype=np.int64)[0]
     width, height = _size(header["displayWindow"])
