@@ -700,6 +700,25 @@ def test_what_blenders_own_importers_read_is_sent_there(tmp_path, data):
         cameras.read(tmp_path / "camera")
 
 
+@pytest.mark.parametrize(
+    ("name", "data", "sentence"),
+    [
+        ("transforms.json.gz", b"\x1f\x8b\x08\0", "is packed: unpack it"),
+        ("scan.zip", b"PK\x03\x04\0", "is packed: unpack it"),
+        ("transforms.json", b"<!DOCTYPE html>\n<html>", "is a page of the web: download the file itself"),
+        ("a.exr", b"v/1\x01\x02", "is a picture: give the file of its camera"),
+        ("a.ply", b"ply\nformat ascii 1.0\n", "is a point cloud or a mesh"),
+        ("database.db", b"SQLite format 3\0", "is a database, as COLMAP's, which has no poses"),
+        ("poses.pkl", b"\x80\x04\x95", "is a pickle, which may run programs"),
+        ("a.json", b" \n", "is empty"),
+    ],
+)
+def test_a_file_of_another_kind_is_called_by_it_and_not_by_a_list_of_all_formats(tmp_path, name, data, sentence):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(InputError, match=f"{name} {sentence}"):
+        cameras.read(tmp_path / name)
+
+
 def test_a_pointer_of_git_lfs_says_how_to_get_the_file():
     with pytest.raises(InputError, match="git lfs pull"):
         cameras.read("version https://git-lfs.github.com/spec/v1\noid sha256:997004fb\nsize 772721\n")
