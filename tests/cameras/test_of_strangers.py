@@ -1150,3 +1150,26 @@ def test_a_list_of_blenders_values_in_json_is_that_camera():
     pinhole = read(json.dumps(values)).pinhole
     assert np.allclose(pinhole.axes(), [[0, 1, 0], [1, 0, 0], [0, 0, -1]], rtol=0, atol=1e-15)
     assert pinhole.distance[0] == 50 / 36 * 640
+
+
+def test_arkits_k_in_the_other_order_and_a_pose_with_a_number_missing_are_refused():
+    """The principal point was taken as 0, 0; the camera stood at the origin."""
+    k = [500, 0, 300, 0, 500, 200, 0, 0, 1]
+    scanned = {"cameraPoseARFrame": np.eye(4).ravel().tolist(), "intrinsics": k}
+    recorded = {"poses": [[0, 0, 0, 1, 1, 2, 3]], "K": np.reshape(k, (3, 3)).T.ravel().tolist(), "w": 640, "h": 480}
+    for document, key in ((scanned, "intrinsics"), (recorded, "K")):
+        (camera,) = cameras.read(json.dumps(document), options=VGA)
+        assert camera.pinhole.principal_point == (300, 480 - 200)
+        turned = np.reshape(document[key], (3, 3)).T.ravel().tolist()
+        with pytest.raises(InputError, match="transpose it"):
+            cameras.read(json.dumps(document | {key: turned}), options=VGA)
+    phone = {f"t_{row}{column}": float(row == column) for row in range(3) for column in range(4) if (row, column) != (1, 3)}
+    with pytest.raises(InputError, match="has no t_13"):
+        cameras.read(json.dumps(phone | {"fx": 500, "fy": 500, "cx": 320, "cy": 240, "width": 640, "height": 480}))
+
+
+def test_gltf_without_its_asset_is_no_sensor_of_mitsubas():
+    document = json.loads(cameras.write([Camera("a", CAMERAS["plain"])], "gltf"))
+    del document["asset"]
+    (camera,) = cameras.read(json.dumps(document))
+    assert camera.name == "a" and camera.pinhole == CAMERAS["plain"]

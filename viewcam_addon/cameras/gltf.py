@@ -32,7 +32,8 @@ _NEAR = 0.01  # written where glTF asks for one
 
 def recognizes(source: Source) -> bool:
     document = _document(source)
-    return "asset" in document and ("cameras" in document or "nodes" in document)
+    lists = [isinstance(document.get(key), list) for key in ("cameras", "nodes")]
+    return all(lists) or ("asset" in document and ("cameras" in document or "nodes" in document))
 
 
 def read(source: Source, options: Options) -> list[Camera]:
