@@ -1034,7 +1034,7 @@ def test_a_camera_that_no_file_can_be_called_by_is_read_again_by_its_name(tmp_pa
         assert file.parent == tmp_path and not set(file.name) & set('<>:"/\\|?*') and len(file.name.encode()) < 250
         assert not file.name.upper().startswith("NUL.") and file.stem.rstrip(". ") == file.stem
     back = {camera.name for camera in cameras.read(tmp_path)}
-    assert back == {"front", name or ("_" if form == "ros" else "")}, f"{back} of {[file.name for file in files]}"
+    assert back == {"front", name or ("_" if form == "ros" else "#1")}, f"{back} of {[file.name for file in files]}"
 
 
 @pytest.mark.parametrize("form", ["opencv", "sidecar"])
@@ -1047,6 +1047,22 @@ def test_a_copy_of_a_cameras_file_is_called_by_its_own(tmp_path):
     file, _ = cameras.save([Camera(name, CAMERAS["plain"]) for name in ("rig/left", "b")], tmp_path, "opencv")
     (tmp_path / "right.yml").write_text(file.read_text())
     assert [camera.name for camera in cameras.read(tmp_path)] == ["b", "rig/left", "right"]
+
+
+@pytest.mark.parametrize("form", ["gltf", "three_js", "mitsuba", "vtk", "text"])
+def test_each_of_two_cameras_of_one_name_can_be_chosen(form):
+    """Their names were said to be one, and to be changed."""
+    called = [Camera("Cam", CAMERAS[name]) for name in ("plain", "rolled")]
+    back = cameras.read(cameras.write(called, form), options=VGA)
+    assert [camera.name for camera in back] == ["Cam", "Cam #2"]
+    assert cameras.choose(back, "Cam #2").pinhole == CAMERAS["rolled"]
+
+
+def test_mitsubas_ids_are_names_of_any_characters_and_none_is_twice():
+    called = ['a & "b"', "<c>", "'", "Cam", "Cam"]
+    text = cameras.write([Camera(name, CAMERAS["plain"]) for name in called], "mitsuba")
+    assert [camera.name for camera in cameras.read(text)] == [*called[:4], "Cam #2"]
+    assert text.count('id="Cam"') == 1
 
 
 @pytest.mark.parametrize("form", ["gltf", "usd"])

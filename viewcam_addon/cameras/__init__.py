@@ -219,6 +219,8 @@ def read(content: str | Path, *, format: str | None = None, options: Options | N
     content : a text, or the Path of a file or folder.
     format : one of `readable()`; None to recognize it by its content.
 
+    From the second one of a name on, that has a number: `Cam #2`.
+
     Raises InputError if there is no camera in it, or one that is no pinhole, lacks something, or is not what it should be.
     """
     options = options or Options()
@@ -228,6 +230,11 @@ def read(content: str | Path, *, format: str | None = None, options: Options | N
         if format and not _recognizes(module, source):
             raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
         read_cameras = _of_all(source, module, options)
+        names = naming.numbered([camera.name for camera in read_cameras])
+        read_cameras = [
+            camera if camera.name == name else replace(camera, name=name)
+            for camera, name in zip(read_cameras, names, strict=True)
+        ]
         if options.up_from == "ground":
             return ground.leveled(read_cameras, source, options)
         return leveled(read_cameras) if options.up_from == "cameras" else read_cameras
