@@ -51,7 +51,7 @@ from types import ModuleType
 
 import numpy as np
 
-from .. import checks, terminal
+from .. import checks, file_names, terminal
 from ..errors import InputError, several
 from ..files import written_whole
 from ..pinhole import Pinhole
@@ -293,7 +293,7 @@ def _called(camera: Camera, file: Source, otherwise: str) -> Camera:
     """The camera by the name that its file says, if the file is called by that."""
     stated = (*(name for name, _ in own.parts(file.text)), camera.name)
     stem = file.path.stem if file.path else None
-    return replace(camera, name=_quoted(next((name for name in stated if naming.as_file(name) == stem), otherwise)))
+    return replace(camera, name=_quoted(next((name for name in stated if file_names.made_fit(name) == stem), otherwise)))
 
 
 def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
