@@ -1433,7 +1433,9 @@ def test_realestate10k_counts_in_the_pictures_sides(name):
     text = f"https://www.youtube.com/watch?v=abc\n\n33366667 {text_of(parts)} 0.0 0.0 {text_of(pose)}\n"
     with pytest.raises(InputError, match="give the size"):
         cameras.read(text)
-    read = the_same(cameras.read(text, options=Options(size=(known.width, known.height))), known, 2.0**-48)
+    size = Options(size=(known.width, known.height))
+    assert len(cameras.read("\n".join(text.splitlines()[2:] * 2), options=size)) == 2
+    read = the_same(cameras.read(text, options=size), known, 2.0**-48)
     assert (read.name, read.time, read.size_stated) == ("33366667", 33.366667, False)
 
 
@@ -1573,3 +1575,40 @@ def test_gazebos_camera_that_nothing_turns_looks_along_the_models_x():
     ):
         with pytest.raises(InputError, match=problem):
             cameras.read(gazebo(Known("plain"), "0 0 0 0 0 0", more, attributes))
+
+
+def nerfies(known, **more):
+    return {
+        "orientation": known.opencv.tolist(),
+        "position": known.e.tolist(),
+        "focal_length": known.f_x,
+        "pixel_aspect_ratio": known.f_y / known.f_x,
+        "principal_point": [known.c_x, known.c_y],
+        "image_size": [known.width, known.height],
+        "skew": 0.0,
+        "radial_distortion": [0, 0, 0],
+        "tangential": [0, 0],
+        **more,
+    }
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_nerfies_have_world_to_camera_and_the_eye(tmp_path, name):
+    known = Known(name)
+    (tmp_path / "camera").mkdir()
+    (tmp_path / "camera" / "000001.json").write_text(json.dumps(nerfies(known)))
+    read = the_same(cameras.read(tmp_path), known, 2.0**-48)
+    assert (read.name, read.image) == ("000001", "000001.png")
+
+
+def test_nerfies_lens_is_opencvs_and_skew_is_named():
+    cv2, known = pytest.importorskip("cv2"), Known("plain")
+    document = nerfies(known, radial_distortion=[-0.1, 0.02, 0.003], tangential=[1e-3, -2e-3])
+    (camera,) = cameras.read(json.dumps(document))
+    points = np.array([[0.1, 0.2], [-0.3, 0.15], [0.25, -0.2]])
+    rays = np.column_stack([points, np.ones(3)])
+    coefficients = np.array([-0.1, 0.02, 1e-3, -2e-3, 0.003])
+    theirs, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), np.eye(3), coefficients)
+    assert np.abs(camera.lens.distort(points) - theirs[:, 0]).max() < 1e-12
+    with pytest.raises(InputError, match="a camera with skew"):
+        cameras.read(json.dumps(nerfies(known, skew=2.0)))

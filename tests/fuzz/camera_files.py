@@ -232,6 +232,7 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
         "looks_vtk": {"a.py": LOOKS.splitlines()[2]},
         "blender_python": {"a.py": BLENDER},
         "realestate10k": {"a.txt": "https://a.b/c\n" + "1 0.5 0.9 0.5 0.5 0 0 1 0 0 1 0 1 0 2 0 0 1 3\n" * 3},
+        "nerfies": {".": "", "camera/a.json": json.dumps(published.nerfies(known))},
         "basalt": {"a.json": json.dumps({"value0": published.basalt(known, "kb4", k1=0.1, k2=0, k3=0, k4=0)})},
         "azure_kinect": {"a.json": json.dumps(published.azure_kinect(known))},
         "nuscenes": {f"{name}.json": json.dumps(rows) for name, rows in published.nuscenes(known).items()},

@@ -9,7 +9,6 @@ Poses relative to another frame, and models that are included from other files, 
 Source: sdformat.org's specification of sensor, camera, pose and link; gz-sim's camera frame (x forward, z up).
 """
 
-import dataclasses
 import itertools
 import math
 from collections.abc import Iterator
@@ -19,7 +18,7 @@ import numpy as np
 
 from .. import checks, rotation
 from ..errors import InputError
-from . import axes, naming, opencv, texts
+from . import axes, opencv, texts
 from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Source, flat, number, pixels
 
@@ -51,9 +50,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             cameras.append(_camera(name, sensor.get("type", "camera"), camera, matrix, options))
     included = [element.findtext("uri", "").strip() for element in root.iter("include")]
     notes = (f"Not read, since it is of other files: {', '.join(map(checks.quoted, included[:3]))}",) if included else ()
-    names = naming.numbered([camera.name for camera in cameras])
-    cameras = [dataclasses.replace(each, name=name).noted(*notes) for name, each in zip(names, cameras, strict=True)]
-    return left_out.with_notes(cameras)
+    return left_out.with_notes([camera.noted(*notes) for camera in cameras])
 
 
 def _inside(

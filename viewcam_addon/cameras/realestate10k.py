@@ -1,4 +1,4 @@
-"""RealEstate10K's and ACID's cameras: the address of a video, and a line of nineteen numbers for each of its pictures.
+"""RealEstate10K's and ACID's cameras: a video's address, if it is there, and a line of nineteen numbers for each picture.
 
     microseconds fx fy cx cy 0 0 and then 3 × 4, row by row, world to camera: x right, y down, z into the view
 
@@ -24,7 +24,7 @@ def recognizes(source: Source) -> bool:
     if source.is_folder or source.is_binary:
         return False
     lines = [line.split() for line in source.text[:4000].split("\n") if line.strip()][:2]
-    return len(lines) == 2 and len(lines[0]) == 1 and _is_pose(lines[1])
+    return len(lines) == 2 and (len(lines[0]) == 1 or _is_pose(lines[0])) and _is_pose(lines[1])
 
 
 def _is_pose(words: list[str]) -> bool:
