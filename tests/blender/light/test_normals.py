@@ -317,7 +317,7 @@ def test_a_smooth_body_has_normals_of_its_own(render_pair, body, turned_by):
 @pytest.mark.parametrize("flat", ["all", "a line", "below", "some faces"])
 @pytest.mark.parametrize("smooth", [True, False])
 def test_a_map_stands_on_cycles_tangents_where_the_uv_map_has_no_area(render_pair, body, flat, smooth):
-    """As what was never unwrapped, or in part."""
+    """The UV map of what was never unwrapped, or in part."""
     mesh = bpy.data.objects["Monkey"].data
     for polygon in mesh.polygons:
         polygon.use_smooth = smooth
