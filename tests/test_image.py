@@ -184,12 +184,55 @@ def window(path, data=((0, 0), (4, 3)), display=((0, 0), (4, 3)), aspect=1.0):
     OpenEXR.File(header, {"ViewLayer.Depth.Z": pixels}).write(str(path))
 
 
-@pytest.mark.parametrize("data", [((100, 0), (104, 3)), ((1, 1), (3, 2)), ((-1, 0), (4, 3))])
+@pytest.mark.parametrize("data", [((100, 0), (104, 3)), ((1, 1), (3, 2)), ((-1, 0), (3, 3))])
 def test_a_part_of_a_picture_is_refused_with_both_windows(tmp_path, data):
     window(tmp_path / "a.exr", data)
     words = f"holds the pixels from {data[0]} to {data[1]} of a picture from (0, 0) to (4, 3): render all of it"
     with pytest.raises(InputError, match=re.escape(words)):
         image.read(tmp_path / "a.exr")
+
+
+def test_what_is_rendered_around_a_picture_is_left_out(tmp_path):
+    """An overscan was refused as a part of a picture."""
+    numbers = np.arange(8 * 9, dtype=np.float32).reshape(8, 9)
+    windows = {"dataWindow": ((-2, -1), (6, 6)), "displayWindow": ((0, 0), (4, 3))}
+    header = {name: tuple(np.array(corner, np.int32) for corner in corners) for name, corners in windows.items()}
+    OpenEXR.File(header, {"ViewLayer.Depth.Z": numbers}).write(str(tmp_path / "a.exr"))
+    assert (image.read(tmp_path / "a.exr")["Depth"][::-1, :, 0] == numbers[1:5, 2:7]).all()
+
+
+def test_a_channel_of_a_part_is_named_with_it_or_without(tmp_path):
+    """P.X was none of a file whose parts P and Z have the channels X, Y, Z and Z."""
+    numbers = {letter: np.full((2, 3), i, np.float32) for i, letter in enumerate("XYZ")}
+    parts = [OpenEXR.Part({}, numbers, "P"), OpenEXR.Part({}, {"Z": np.full((2, 3), 9, np.float32)}, "Z")]
+    OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
+    for named in (["P.X", "P.Y", "P.Z"], ["X", "Y", "P.Z"]):
+        read = image.read_channels(tmp_path / "a.exr", {"Position": named, "Depth": ["Z.Z"]})
+        assert read["Position"][0, 0].tolist() == [0, 1, 2] and read["Depth"][0, 0] == 9
+
+
+@pytest.mark.parametrize(
+    ("compression", "kind", "lossy"),
+    [
+        ("ZIP", np.float16, ""),
+        ("PIZ", np.float32, ""),
+        ("PXR24", np.float16, ""),
+        ("PXR24", np.float32, "PXR24"),
+        ("B44", np.float32, ""),
+        ("B44", np.float16, "B44"),
+        ("DWAA", np.float32, "DWAA"),
+        ("DWAB", np.float16, "DWAB"),
+    ],
+)
+def test_a_compression_that_changes_pixels_is_known(tmp_path, compression, kind, lossy):
+    numbers = np.random.default_rng(1).random((40, 40)).astype(kind)
+    header = {"compression": getattr(OpenEXR, f"{compression}_COMPRESSION")}
+    OpenEXR.File(
+        header, {"ViewLayer.Position.Y": numbers, "ViewLayer.Position.X": numbers, "ViewLayer.Position.Z": numbers}
+    ).write(str(tmp_path / "a.exr"))
+    read = image.read(tmp_path / "a.exr")
+    changed = bool((read["Position"][::-1, :, 1] != numbers).any())
+    assert (read.lossy, changed) == (lossy, bool(lossy))
 
 
 def test_a_picture_may_begin_anywhere(tmp_path):

@@ -32,6 +32,7 @@ ROOMS = {
     "machine": "errors",
     "npy": "",
     "files": "errors",
+    "file_names": "errors checks",
     "terminal": "",
     "events": "terminal",
     "argument_types": "",
@@ -51,22 +52,26 @@ ROOMS = {
     "image": "errors machine files terminal pinhole",
     "intrinsics": "errors checks pinhole",
     "camera_values": "errors checks pinhole roll intrinsics",
-    "cameras": "errors checks files terminal npy usd_stage pinhole rotation intrinsics",
+    "cameras": "errors checks files file_names terminal npy usd_stage pinhole rotation intrinsics",
     "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks machine files npy pinhole image",
     "labels": "errors machine files png pinhole image cameras tracer",
     "api": "errors image comparison tracer labels",
     "pytest_plugin": "errors junit jobs",
     "jobs": (
+        "file_names "
         "errors checks machine files terminal events argument_types html_page child_process png pinhole moves image cameras "
         "comparison "
         "tracer labels api"
     ),
     "blender": (
+        "file_names "
         "errors checks files terminal events html_page child_process png pinhole roll rotation moves diagram photo_match image "
         "intrinsics camera_values cameras comparison tracer labels jobs"
     ),
-    "commands": ("errors files terminal argument_types events crashes pinhole image cameras comparison tracer labels api jobs"),
+    "commands": (
+        "errors files file_names terminal argument_types events crashes pinhole image cameras comparison tracer labels api jobs"
+    ),
     "cli": "errors checks files junit events argument_types commands",
 }
 BLENDER_ROOMS = {

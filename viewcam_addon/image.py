@@ -27,7 +27,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,6 +125,7 @@ class Image:
     camera : the camera of the picture, or None where the file does not tell.
     attributes : further text attributes of the file.
     halves : the passes that the file holds in half floats, of 11 bits.
+    lossy : the compression of the file, if it changes pixels; else empty.
     """
 
     passes: dict[str, NDArray[np.float32]]
@@ -132,6 +133,7 @@ class Image:
     attributes: dict[str, str] = field(default_factory=dict)
     source: str = "the image"
     halves: frozenset[str] = frozenset()
+    lossy: str = ""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -156,28 +158,31 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
     Raises InputError if there is no such file, if it is no EXR or a damaged one, if it holds no known pass, or, by its header,
     a part of a picture only, another size than its camera's, or more than there is memory for.
     """
-    pixels, camera, attributes = _pixels(Path(path))
-    channels = {name: each for name, each in _passes(pixels).items() if only is None or name in only}
+    file = _pixels(Path(path))
+    channels = {name: each for name, each in _passes(file.channels).items() if only is None or name in only}
     if not channels:
         wanted = ", ".join(only or (*LIGHT_PASSES, *GEOMETRY_PASSES))
         raise InputError(
-            f"{path} holds none of the passes {wanted} but the channels {several(list(pixels))}: render a multilayer EXR "
-            "with them"
+            f"{path} holds none of the passes {wanted} but the channels {several(list(file.channels))}: render a multilayer "
+            "EXR with them"
         )
-    return _image(channels, camera, attributes, path)
+    return _image(channels, file, path)
 
 
 def read_channels(path: str | os.PathLike[str], named: Mapping[str, Sequence[str]]) -> Image:
     """Read an EXR of which it is told what its channels hold.
 
-    named : pass → its channels, each by its whole name or by how that ends, `Depth.Z` for `ViewLayer.Depth.Z`.
+    named : pass → its channels, each by its whole name, also with its part's before it, or by how that ends, `Depth.Z` for
+        `ViewLayer.Depth.Z`.
 
     Raises InputError as `read` does, and if there is no such channel, or more than one.
     """
-    pixels, camera, attributes = _pixels(Path(path))
+    file = _pixels(Path(path))
+    pixels = file.channels
 
     def channel(wanted: str) -> NDArray[Any]:
-        names = [wanted] if wanted in pixels else [name for name in pixels if name.endswith(f".{wanted}")]
+        whole = file.with_parts.get(wanted, wanted)
+        names = [whole] if whole in pixels else [name for name in pixels if name.endswith(f".{wanted}")]
         if len(names) == 1:
             return pixels[names[0]]
         if names:
@@ -185,7 +190,7 @@ def read_channels(path: str | os.PathLike[str], named: Mapping[str, Sequence[str
         raise InputError(f"{path} has no channel {wanted!r}: name some of {', '.join(pixels)}")
 
     channels = {name: [channel(wanted) for wanted in channels] for name, channels in named.items()}
-    return _image(channels, camera, attributes, path)
+    return _image(channels, file, path)
 
 
 def text_attribute(path: str | os.PathLike[str], name: str) -> str:
@@ -194,15 +199,25 @@ def text_attribute(path: str | os.PathLike[str], name: str) -> str:
     return value if isinstance(value, str) else ""
 
 
-def _image(
-    channels: Mapping[str, Sequence[NDArray[Any]]],
-    camera: Pinhole | None,
-    attributes: dict[str, str],
-    path: str | os.PathLike[str],
-) -> Image:
+class _File(NamedTuple):
+    """The content of a file.
+
+    channels : name → pixels, rows from the top.
+    with_parts : a channel's name with its part's before it → its name in `channels`.
+    lossy : see `Image`.
+    """
+
+    channels: dict[str, NDArray[Any]]
+    with_parts: dict[str, str]
+    camera: Pinhole | None
+    attributes: dict[str, str]
+    lossy: str
+
+
+def _image(channels: Mapping[str, Sequence[NDArray[Any]]], file: _File, path: str | os.PathLike[str]) -> Image:
     passes = {name: _stacked(each) for name, each in channels.items()}
     halves = frozenset(name for name, each in channels.items() if any(channel.dtype == np.float16 for channel in each))
-    return Image(passes, camera, attributes, str(path), halves)
+    return Image(passes, file.camera, file.attributes, str(path), halves, file.lossy)
 
 
 def _stacked(channels: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
@@ -211,8 +226,8 @@ def _stacked(channels: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
     return stacked
 
 
-def _pixels(path: Path) -> tuple[dict[str, NDArray[Any]], Pinhole | None, dict[str, str]]:
-    """The channels of a file, rows from the top, its camera and its text attributes."""
+def _pixels(path: Path) -> _File:
+    """The channels of a file, its camera and its text attributes."""
     import OpenEXR
 
     headers = _headers(path)
@@ -222,8 +237,8 @@ def _pixels(path: Path) -> tuple[dict[str, NDArray[Any]], Pinhole | None, dict[s
     if camera is not None and (camera.width, camera.height) != frame.size:
         other = f"{camera.width} × {camera.height}"
         raise InputError(f"{path} has {width} × {height} pixels and its camera {other}: render it again")
-    count = sum(len(header["channels"]) for header in headers)
-    machine.check(f"the pixels of {path}", _COPIES * 4 * count * width * height, "render it smaller")
+    count = sum(len(header["channels"]) * math.prod(_size(header["dataWindow"])) for header in headers)
+    machine.check(f"the pixels of {path}", _COPIES * 4 * count, "render it smaller")
     try:
         with silent_libraries():
             parts = OpenEXR.File(str(path), separate_channels=True).parts
@@ -233,15 +248,37 @@ def _pixels(path: Path) -> tuple[dict[str, NDArray[Any]], Pinhole | None, dict[s
         raise InputError(f"{path} is cut short or damaged, its pixels can't be read: render it again")
     named = Counter(name for part in parts for name in part.channels)
     # The names of channels that several parts have, as one for each eye, begin with the part's.
-    channels = {
-        name if named[name] == 1 else f"{part.name()}.{name}": channel.pixels
-        for part in parts
-        for name, channel in part.channels.items()
-    }
+    channels: dict[str, NDArray[Any]] = {}
+    with_parts = {}
+    for part in parts:
+        for name, channel in part.channels.items():
+            whole = f"{part.name()}.{name}"
+            with_parts[whole] = name if named[name] == 1 else whole
+            channels[with_parts[whole]] = channel.pixels[_displayed(part.header)]
     attributes = {
         key: value for key, value in headers[0].items() if isinstance(value, str) and key not in (_CAMERA_ATTRIBUTE, "name")
     }
-    return channels, camera, attributes
+    return _File(channels, with_parts, camera, attributes, next(filter(None, map(_loss, parts)), ""))
+
+
+def _loss(part: Any) -> str:
+    """The name of a part's compression, if it changes pixels: of floats, of half floats, or of colors."""
+    name = part.header["compression"].name.removesuffix("_COMPRESSION")
+    kinds = {channel.pixels.dtype for channel in part.channels.values()}
+    loses = {"PXR24": np.float32, "B44": np.float16, "B44A": np.float16}.get(name)
+    return name if name.startswith("DWA") or (loses is not None and np.dtype(loses) in kinds) else ""
+
+
+def _size(window: Any) -> tuple[int, int]:
+    (left, top), (right, bottom) = np.array(window, dtype=np.int64).tolist()
+    return right - left + 1, bottom - top + 1
+
+
+def _displayed(header: Mapping[str, Any]) -> tuple[slice, slice]:
+    """The rows and columns of a part's pixels that are the picture's, without what is rendered around it."""
+    (left, top), _ = np.array(header["displayWindow"], dtype=np.int64) - np.array(header["dataWindow"], dtype=np.int64)[0]
+    width, height = _size(header["displayWindow"])
+    return slice(top, top + height), slice(left, left + width)
 
 
 @dataclass(frozen=True)
@@ -311,8 +348,8 @@ def _unreadable(path: Path, error: Exception) -> InputError:
 def _frame(headers: Sequence[dict[str, Any]], path: Path) -> FrameSize:
     """The frame of all parts. What is not stored pixel by pixel, and the whole picture, is refused.
 
-    A part of a picture (a data window that is not its display window) would have to be put in its place, with something around
-    it that nobody rendered.
+    A part of a picture (a data window that does not cover its display window) would have to be put in its place, with something
+    around it that nobody rendered. What is rendered beyond the picture is left out.
     """
     import OpenEXR
 
@@ -323,12 +360,12 @@ def _frame(headers: Sequence[dict[str, Any]], path: Path) -> FrameSize:
             raise InputError(f"{path} holds several depths in each pixel: render it as an EXR that is not deep")
         if any((channel.xSampling, channel.ySampling) != (1, 1) for channel in header["channels"]):
             raise InputError(f"{path} has channels of less than all pixels: render it again")
-        if data != display:
+        (left, top), (right, bottom) = display
+        if not (data[0][0] <= left <= right <= data[1][0] and data[0][1] <= top <= bottom <= data[1][1]):
             raise InputError(
                 f"{path} holds the pixels from {tuple(data[0])} to {tuple(data[1])} of a picture from {tuple(display[0])} to "
                 f"{tuple(display[1])}: render all of it"
             )
-        (left, top), (right, bottom) = data
         frames.add(FrameSize((right - left + 1, bottom - top + 1), float(header["pixelAspectRatio"])))
     if len(frames) > 1:
         raise InputError(f"{path} holds passes of different sizes: render it again")
@@ -374,7 +411,8 @@ def rewrite(path: str | os.PathLike[str], change: Callable[[NDArray[Any], bool],
 
     Raises InputError as `read` and `write` do.
     """
-    channels, _, attributes = _pixels(Path(path))
+    file = _pixels(Path(path))
+    channels, attributes = file.channels, file.attributes
     result: dict[str, NDArray[Any]] = {}
     for is_data in (False, True):
         names = [name for name in channels if _is_data(name) == is_data]

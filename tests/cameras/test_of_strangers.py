@@ -700,6 +700,25 @@ def test_what_blenders_own_importers_read_is_sent_there(tmp_path, data):
         cameras.read(tmp_path / "camera")
 
 
+@pytest.mark.parametrize(
+    ("name", "data", "sentence"),
+    [
+        ("transforms.json.gz", b"\x1f\x8b\x08\0", "is packed: unpack it"),
+        ("scan.zip", b"PK\x03\x04\0", "is packed: unpack it"),
+        ("transforms.json", b"<!DOCTYPE html>\n<html>", "is a page of the web: download the file itself"),
+        ("a.exr", b"v/1\x01\x02", "is a picture: give the file of its camera"),
+        ("a.ply", b"ply\nformat ascii 1.0\n", "is a point cloud or a mesh"),
+        ("database.db", b"SQLite format 3\0", "is a database, as COLMAP's, which has no poses"),
+        ("poses.pkl", b"\x80\x04\x95", "is a pickle, which may run programs"),
+        ("a.json", b" \n", "is empty"),
+    ],
+)
+def test_a_file_of_another_kind_is_called_by_it_and_not_by_a_list_of_all_formats(tmp_path, name, data, sentence):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(InputError, match=f"{name} {sentence}"):
+        cameras.read(tmp_path / name)
+
+
 def test_a_pointer_of_git_lfs_says_how_to_get_the_file():
     with pytest.raises(InputError, match="git lfs pull"):
         cameras.read("version https://git-lfs.github.com/spec/v1\noid sha256:997004fb\nsize 772721\n")
@@ -1015,7 +1034,7 @@ def test_a_camera_that_no_file_can_be_called_by_is_read_again_by_its_name(tmp_pa
         assert file.parent == tmp_path and not set(file.name) & set('<>:"/\\|?*') and len(file.name.encode()) < 250
         assert not file.name.upper().startswith("NUL.") and file.stem.rstrip(". ") == file.stem
     back = {camera.name for camera in cameras.read(tmp_path)}
-    assert back == {"front", name or ("_" if form == "ros" else "")}, f"{back} of {[file.name for file in files]}"
+    assert back == {"front", name or ("_" if form == "ros" else "#1")}, f"{back} of {[file.name for file in files]}"
 
 
 @pytest.mark.parametrize("form", ["opencv", "sidecar"])
@@ -1028,6 +1047,22 @@ def test_a_copy_of_a_cameras_file_is_called_by_its_own(tmp_path):
     file, _ = cameras.save([Camera(name, CAMERAS["plain"]) for name in ("rig/left", "b")], tmp_path, "opencv")
     (tmp_path / "right.yml").write_text(file.read_text())
     assert [camera.name for camera in cameras.read(tmp_path)] == ["b", "rig/left", "right"]
+
+
+@pytest.mark.parametrize("form", ["gltf", "three_js", "mitsuba", "vtk", "text"])
+def test_each_of_two_cameras_of_one_name_can_be_chosen(form):
+    """Their names were said to be one, and to be changed."""
+    called = [Camera("Cam", CAMERAS[name]) for name in ("plain", "rolled")]
+    back = cameras.read(cameras.write(called, form), options=VGA)
+    assert [camera.name for camera in back] == ["Cam", "Cam #2"]
+    assert cameras.choose(back, "Cam #2").pinhole == CAMERAS["rolled"]
+
+
+def test_mitsubas_ids_are_names_of_any_characters_and_none_is_twice():
+    called = ['a & "b"', "<c>", "'", "Cam", "Cam"]
+    text = cameras.write([Camera(name, CAMERAS["plain"]) for name in called], "mitsuba")
+    assert [camera.name for camera in cameras.read(text)] == [*called[:4], "Cam #2"]
+    assert text.count('id="Cam"') == 1
 
 
 @pytest.mark.parametrize("form", ["gltf", "usd"])
@@ -1131,3 +1166,26 @@ def test_a_list_of_blenders_values_in_json_is_that_camera():
     pinhole = read(json.dumps(values)).pinhole
     assert np.allclose(pinhole.axes(), [[0, 1, 0], [1, 0, 0], [0, 0, -1]], rtol=0, atol=1e-15)
     assert pinhole.distance[0] == 50 / 36 * 640
+
+
+def test_arkits_k_in_the_other_order_and_a_pose_with_a_number_missing_are_refused():
+    """The principal point was taken as 0, 0; the camera stood at the origin."""
+    k = [500, 0, 300, 0, 500, 200, 0, 0, 1]
+    scanned = {"cameraPoseARFrame": np.eye(4).ravel().tolist(), "intrinsics": k}
+    recorded = {"poses": [[0, 0, 0, 1, 1, 2, 3]], "K": np.reshape(k, (3, 3)).T.ravel().tolist(), "w": 640, "h": 480}
+    for document, key in ((scanned, "intrinsics"), (recorded, "K")):
+        (camera,) = cameras.read(json.dumps(document), options=VGA)
+        assert camera.pinhole.principal_point == (300, 480 - 200)
+        turned = np.reshape(document[key], (3, 3)).T.ravel().tolist()
+        with pytest.raises(InputError, match="transpose it"):
+            cameras.read(json.dumps(document | {key: turned}), options=VGA)
+    phone = {f"t_{row}{column}": float(row == column) for row in range(3) for column in range(4) if (row, column) != (1, 3)}
+    with pytest.raises(InputError, match="has no t_13"):
+        cameras.read(json.dumps(phone | {"fx": 500, "fy": 500, "cx": 320, "cy": 240, "width": 640, "height": 480}))
+
+
+def test_gltf_without_its_asset_is_no_sensor_of_mitsubas():
+    document = json.loads(cameras.write([Camera("a", CAMERAS["plain"])], "gltf"))
+    del document["asset"]
+    (camera,) = cameras.read(json.dumps(document))
+    assert camera.name == "a" and camera.pinhole == CAMERAS["plain"]

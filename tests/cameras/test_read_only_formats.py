@@ -1423,3 +1423,192 @@ def test_what_the_books_camera_lacks_is_named(old, new, problem):
         cameras.read(BOOK.replace(old, new))
     with pytest.raises(InputError, match="adds 2 cameras"):
         cameras.read(BOOK + BOOK)
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_realestate10k_counts_in_the_pictures_sides(name):
+    known = Known(name)
+    parts = [known.f_x / known.width, known.f_y / known.height, known.c_x / known.width, known.c_y / known.height]
+    pose = np.column_stack([known.opencv, -known.opencv @ known.e])
+    text = f"https://www.youtube.com/watch?v=abc\n\n33366667 {text_of(parts)} 0.0 0.0 {text_of(pose)}\n"
+    with pytest.raises(InputError, match="give the size"):
+        cameras.read(text)
+    size = Options(size=(known.width, known.height))
+    assert len(cameras.read("\n".join(text.splitlines()[2:] * 2), options=size)) == 2
+    read = the_same(cameras.read(text, options=size), known, 2.0**-48)
+    assert (read.name, read.time, read.size_stated) == ("33366667", 33.366667, False)
+
+
+def test_what_realestate10k_does_not_explain_is_refused():
+    text = "https://a.b/c\n0 1 1 0.5 0.5 {} 0 1 0 0 0 0 1 0 0 0 0 1 0\n"
+    (camera,) = cameras.read(text.format("0.0"), options=Options(size=(640, 360)))
+    assert camera.pinhole.distance == (640, 360) and camera.pinhole.principal_point == (320, 180)
+    with pytest.raises(InputError, match="what they mean is not published"):
+        cameras.read(text.format("0.1"), options=Options(size=(640, 360)))
+    with pytest.raises(InputError, match="focal lengths 0 and 1"):
+        cameras.read(text.replace("0 1 1", "0 0 1", 1).format("0.0"), options=Options(size=(640, 360)))
+
+
+def basalt(known, kind="pinhole", **numbers):
+    x, y, z, w = known.quaternion()
+    pose = dict(zip(("px", "py", "pz", "qx", "qy", "qz", "qw"), (*known.e.tolist(), x, y, z, w), strict=True))
+    k = {"fx": known.f_x, "fy": known.f_y, "cx": known.c_x - 0.5, "cy": known.c_y - 0.5}
+    entry = {"camera_type": kind, "intrinsics": k | numbers}
+    return {"T_imu_cam": [pose], "intrinsics": [entry], "resolution": [[known.width, known.height]]}
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_basalts_cameras_stand_on_their_imu(name):
+    known = Known(name)
+    the_same(cameras.read(json.dumps({"value0": basalt(known)})), known, 2.0**-48)
+
+
+def test_basalts_lenses_are_opencvs_and_double_spheres_are_left_out():
+    cv2, known = pytest.importorskip("cv2"), Known("plain")
+    k = dict(
+        zip(("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"), (0.3, -0.1, 1e-3, -2e-3, 0.01, 0.6, -0.1, 0.02), strict=True)
+    )
+    several = basalt(known, "pinhole-radtan8", rpmax=2.7, **k)
+    for key, value in basalt(known, "ds", xi=-0.2, alpha=0.6).items():
+        several[key] += value
+    (camera,) = cameras.read(json.dumps({"value0": several}))
+    points = np.array([[0.1, 0.2], [-0.3, 0.15], [0.25, -0.2]])
+    rays = np.column_stack([points, np.ones(3)])
+    theirs, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), np.eye(3), np.array([*k.values()]))
+    assert np.abs(camera.lens.distort(points) - theirs[:, 0]).max() < 1e-12
+    assert camera.name == "cam0" and any("cam1 is of the model 'ds'" in note for note in camera.notes)
+
+
+def azure_kinect(known):
+    numbers = [known.c_x / known.width, known.c_y / known.height, known.f_x / known.width, known.f_y / known.height]
+    pose = {"Rotation": known.opencv.ravel().tolist(), "Translation": (-known.opencv @ known.e).tolist()}
+    model = {"ModelType": "CALIBRATION_LensDistortionModelBrownConrady", "ModelParameters": [*numbers, *[0.0] * 10]}
+    entry = {"Intrinsics": model, "Rt": pose, "SensorWidth": known.width, "SensorHeight": known.height}
+    entry["Location"] = "CALIBRATION_CameraLocationPV0"
+    return {"CalibrationInformation": {"Cameras": [entry]}}
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_azure_kinect_counts_in_the_sides_of_its_sensor(tmp_path, name):
+    """A published device: its SDK prints 0.49676 and 0.470907 of 1920, 953.784 and 904.1415, as 953.284 and 904.1415."""
+    known = Known(name)
+    document = azure_kinect(known)
+    path = tmp_path / "calibration.json"
+    path.write_bytes(json.dumps(document).encode() + b"\0")
+    assert the_same(cameras.read(path), known, 2.0**-48).name == "PV0"
+    model = document["CalibrationInformation"]["Cameras"][0]["Intrinsics"]
+    model["ModelParameters"][-2:] = [-2e-3, 1e-3]
+    (camera,) = cameras.read(json.dumps(document))
+    assert camera.lens.tangential == (1e-3, -2e-3)
+    model["ModelType"] = "CALIBRATION_LensDistortionModelRational6KT"
+    with pytest.raises(InputError, match="Rational6KT"):
+        cameras.read(json.dumps(document))
+
+
+def nuscenes(known):
+    """The tables of a camera on a vehicle that has turned by 90° to the left and moved, and of a lidar."""
+    vehicle = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    moved = np.array([600.0, 1600, 0])
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    quaternions = [
+        rotation.from_matrix(each).as_quat()[[3, 0, 1, 2]].tolist() for each in (vehicle, vehicle.T @ known.opencv.T)
+    ]
+    place = (vehicle.T @ (known.e - moved)).tolist()
+    k = [[known.f_x, 0, known.c_x - 0.5], [0, known.f_y, known.c_y - 0.5], [0, 0, 1]]
+    lidar = {"token": "l", "translation": [0, 0, 2], "rotation": [1, 0, 0, 0], "camera_intrinsic": []}
+    picture = {"filename": "samples/CAM_FRONT/a.jpg", "width": known.width, "height": known.height, "ego_pose_token": "e"}
+    return {
+        "calibrated_sensor": [lidar, {"token": "c", "translation": place, "rotation": quaternions[1], "camera_intrinsic": k}],
+        "ego_pose": [{"token": "e", "timestamp": 1, "translation": moved.tolist(), "rotation": quaternions[0]}],
+        "sample_data": [picture | {"calibrated_sensor_token": "l"}, picture | {"calibrated_sensor_token": "c"}],
+    }
+
+
+@pytest.mark.parametrize("name", [name for name in UNMIRRORED if name != "far"])
+def test_nuscenes_cameras_stand_on_a_vehicle_that_moves(tmp_path, name):
+    known = Known(name)
+    for table, rows in nuscenes(known).items():
+        (tmp_path / f"{table}.json").write_text(json.dumps(rows))
+    read = the_same(cameras.read(tmp_path), known, 2.0**-40)
+    assert (read.name, read.image) == ("a", "samples/CAM_FRONT/a.jpg")
+    (alone,) = cameras.read(tmp_path / "calibrated_sensor.json", options=Options(size=(640, 360)))
+    assert alone.name == "c" and any("stands at the origin" in note for note in alone.notes)
+
+
+def gazebo(known, pose, camera="", attributes=""):
+    angle = 2 * math.atan2(known.width / 2, known.f_x)
+    return (
+        f'<sdf version="1.9"><world name="w"><model name="m"><pose>1 2 3 0 0 {math.pi / 2!r}</pose><link name="l">'
+        f'<sensor name="s" type="camera"><pose {attributes}>{pose}</pose><camera><horizontal_fov>{angle!r}</horizontal_fov>'
+        f"<image><width>{known.width}</width><height>{known.height}</height></image>{camera}</camera></sensor></link></model>"
+        "</world></sdf>"
+    )
+
+
+@pytest.mark.parametrize("name", [name for name in CENTERED if name != "far"])
+@pytest.mark.parametrize("form", ["radians", "degrees", "quaternion"])
+def test_gazebos_camera_looks_along_x_in_its_model(name, form):
+    """The model has turned by 90°: its x is the world's y."""
+    known = Known(name)
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    model = rotation.from_euler("z", 90, degrees=True)
+    sensor = model.inv() * rotation.from_matrix(np.column_stack([-known.w, -known.u, known.v]))
+    place = model.inv().apply(known.e - np.array([1, 2, 3]))
+    turn = sensor.as_quat() if form == "quaternion" else sensor.as_euler("xyz", degrees=form == "degrees")
+    attributes = {"radians": "", "degrees": 'degrees="true"', "quaternion": 'rotation_format="quat_xyzw"'}[form]
+    the_same(cameras.read(gazebo(known, text_of([*place, *turn]), attributes=attributes)), known, 2.0**-40)
+
+
+def test_gazebos_camera_that_nothing_turns_looks_along_the_models_x():
+    (camera,) = cameras.read(gazebo(Known("plain"), "0.5 0 0 0 0 0"))
+    assert np.allclose(camera.pinhole.eye, (1, 2.5, 3)) and np.allclose(
+        camera.pinhole.axes(), [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    )
+    lens = "<lens><intrinsics><fx>500</fx><fy>400</fy><cx>300</cx><cy>200</cy></intrinsics></lens>"
+    (camera,) = cameras.read(gazebo(Known("plain"), "0 0 0 0 0 0", lens))
+    assert camera.pinhole.distance == (500, 400)
+    assert camera.pinhole.principal_point == (300, Known("plain").height - 200)
+    for more, attributes, problem in (
+        ("<distortion><k1>-0.1</k1></distortion>", "", "a distortion"),
+        ("<lens><type>equidistant</type></lens>", "", "equidistant"),
+        ("", 'relative_to="arm"', "relative to 'arm'"),
+    ):
+        with pytest.raises(InputError, match=problem):
+            cameras.read(gazebo(Known("plain"), "0 0 0 0 0 0", more, attributes))
+
+
+def nerfies(known, **more):
+    return {
+        "orientation": known.opencv.tolist(),
+        "position": known.e.tolist(),
+        "focal_length": known.f_x,
+        "pixel_aspect_ratio": known.f_y / known.f_x,
+        "principal_point": [known.c_x, known.c_y],
+        "image_size": [known.width, known.height],
+        "skew": 0.0,
+        "radial_distortion": [0, 0, 0],
+        "tangential": [0, 0],
+        **more,
+    }
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_nerfies_have_world_to_camera_and_the_eye(tmp_path, name):
+    known = Known(name)
+    (tmp_path / "camera").mkdir()
+    (tmp_path / "camera" / "000001.json").write_text(json.dumps(nerfies(known)))
+    read = the_same(cameras.read(tmp_path), known, 2.0**-48)
+    assert (read.name, read.image) == ("000001", "000001.png")
+
+
+def test_nerfies_lens_is_opencvs_and_skew_is_named():
+    cv2, known = pytest.importorskip("cv2"), Known("plain")
+    document = nerfies(known, radial_distortion=[-0.1, 0.02, 0.003], tangential=[1e-3, -2e-3])
+    (camera,) = cameras.read(json.dumps(document))
+    points = np.array([[0.1, 0.2], [-0.3, 0.15], [0.25, -0.2]])
+    rays = np.column_stack([points, np.ones(3)])
+    coefficients = np.array([-0.1, 0.02, 1e-3, -2e-3, 0.003])
+    theirs, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), np.eye(3), coefficients)
+    assert np.abs(camera.lens.distort(points) - theirs[:, 0]).max() < 1e-12
+    with pytest.raises(InputError, match="a camera with skew"):
+        cameras.read(json.dumps(nerfies(known, skew=2.0)))

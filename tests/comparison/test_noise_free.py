@@ -199,6 +199,8 @@ def test_light_in_half_floats_is_the_same_and_a_thousandth_brighter_is_not(paper
     comparison = compare(picture(paper_scene), [stored()], paper_scene.pinhole)
     assert comparison.passed, "\n".join(comparison.lines())
     assert not compare(picture(paper_scene), [stored(1.003)], paper_scene.pinhole).passed
+    lossy = compare(picture(paper_scene), [replace(stored(1.003), lossy="DWAA")], paper_scene.pinhole)
+    assert "the test picture is compressed with loss (DWAA): write it with ZIP; " in lossy.sentence, lossy.sentence
 
 
 @pytest.mark.parametrize(

@@ -100,6 +100,16 @@ def test_a_pass_in_half_floats_is_told(name, paper_scene, tmp_path):
     assert f"{name} is in half floats, of 11 bits: write 32 bits" in comparison.sentence, comparison.sentence
 
 
+def test_a_compression_that_changes_positions_is_told(paper_scene, tmp_path):
+    """A picture in DWAA was said to be magnified."""
+    openexr = pytest.importorskip("OpenEXR")
+    test = only(paper_scene.rendered(), "Position")
+    channels = {f"Position.{letter}": np.ascontiguousarray(test["Position"][::-1, :, i]) for i, letter in enumerate("XYZ")}
+    openexr.File({"compression": openexr.DWAA_COMPRESSION}, channels).write(str(tmp_path / "a.exr"))
+    comparison = judged(paper_scene, image.read_channels(tmp_path / "a.exr", {"Position": list(channels)}))
+    assert "the test picture is compressed with loss (DWAA): write it with ZIP" in comparison.sentence, comparison.sentence
+
+
 def test_with_a_position_alone_a_moved_ball_is_found(paper_scene):
     other = replace(paper_scene, spheres=((0.001, 0.0, 1.0, 1.0), *paper_scene.spheres[1:]))
     assert not judged(paper_scene, only(other.picture(), "Position")).passed

@@ -527,6 +527,7 @@ CAMERAS = (
     *("supersplat", "supersplat_project", "earth_studio", "after_effects"),
     *("realitycapture_table", "visualsfm", "mvsnet", "middlebury", "middlebury_pair", "neus", "kitti_calibration", "pmvs"),
     *("bop_sensor", "pose_files", "redwood", "replica", "blender_python"),
+    *("realestate10k", "basalt", "azure_kinect", "nuscenes", "gazebo", "nerfies"),
 )
 """The kinds of camera_files.py, which makes them only when it is asked."""
 

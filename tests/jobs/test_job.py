@@ -16,10 +16,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from viewcam_addon import cli
+from viewcam_addon import file_names as names
 from viewcam_addon.cameras.calibration import Calibration
 from viewcam_addon.cameras.distortion import opencv
 from viewcam_addon.errors import InputError
-from viewcam_addon.jobs import job, names
+from viewcam_addon.jobs import job
 from viewcam_addon.jobs.folder import settings_hash
 from viewcam_addon.jobs.job import FIELDS, Job
 from viewcam_addon.jobs.lists import ShotsError

@@ -51,7 +51,7 @@ from types import ModuleType
 
 import numpy as np
 
-from .. import checks, terminal
+from .. import checks, file_names, terminal
 from ..errors import InputError, several
 from ..files import written_whole
 from ..pinhole import Pinhole
@@ -59,6 +59,8 @@ from . import (
     after_effects,
     arkit,
     arrays,
+    azure_kinect,
+    basalt,
     blender_python,
     bop,
     bundler,
@@ -68,6 +70,7 @@ from . import (
     earth_studio,
     fspy,
     gaussian_splatting,
+    gazebo,
     gltf,
     ground,
     infinigen,
@@ -83,7 +86,9 @@ from . import (
     mujoco,
     mvsnet,
     naming,
+    nerfies,
     nerfstudio_path,
+    nuscenes,
     nvisii,
     open3d,
     opencv,
@@ -95,6 +100,7 @@ from . import (
     pov_ray,
     projections,
     ray_tracer_challenge,
+    realestate10k,
     realitycapture,
     ros,
     sidecar,
@@ -153,6 +159,7 @@ FORMATS: dict[str, ModuleType] = {
     "pose_files": pose_files,
     "arkit": arkit,
     "gaussian_splatting": gaussian_splatting,
+    "nerfies": nerfies,
     "nerfstudio_path": nerfstudio_path,
     "instant_ngp": instant_ngp,
     "kubric": kubric,
@@ -161,10 +168,14 @@ FORMATS: dict[str, ModuleType] = {
     "supersplat": supersplat,
     "earth_studio": earth_studio,
     "after_effects": after_effects,
+    "nuscenes": nuscenes,
+    "basalt": basalt,
+    "azure_kinect": azure_kinect,
     "open3d": open3d,
     "opensfm": opensfm,
     "ros": ros,
     "opencv": opencv,
+    "realestate10k": realestate10k,
     "trajectories": trajectories,
     "three_js": three_js,
     "unreal": unreal,
@@ -172,6 +183,7 @@ FORMATS: dict[str, ModuleType] = {
     "blender_python": blender_python,
     "vtk": vtk,
     "textbook": textbook,
+    "gazebo": gazebo,
     "mujoco": mujoco,
     "ray_tracer_challenge": ray_tracer_challenge,
     "mitsuba": mitsuba,
@@ -209,6 +221,8 @@ def read(content: str | Path, *, format: str | None = None, options: Options | N
     content : a text, or the Path of a file or folder.
     format : one of `readable()`; None to recognize it by its content.
 
+    From the second one of a name on, that has a number: `Cam #2`.
+
     Raises InputError if there is no camera in it, or one that is no pinhole, lacks something, or is not what it should be.
     """
     options = options or Options()
@@ -218,6 +232,11 @@ def read(content: str | Path, *, format: str | None = None, options: Options | N
         if format and not _recognizes(module, source):
             raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
         read_cameras = _of_all(source, module, options)
+        names = naming.numbered([camera.name for camera in read_cameras])
+        read_cameras = [
+            camera if camera.name == name else replace(camera, name=name)
+            for camera, name in zip(read_cameras, names, strict=True)
+        ]
         if options.up_from == "ground":
             return ground.leveled(read_cameras, source, options)
         return leveled(read_cameras) if options.up_from == "cameras" else read_cameras
@@ -274,7 +293,7 @@ def _called(camera: Camera, file: Source, otherwise: str) -> Camera:
     """The camera by the name that its file says, if the file is called by that."""
     stated = (*(name for name, _ in own.parts(file.text)), camera.name)
     stem = file.path.stem if file.path else None
-    return replace(camera, name=_quoted(next((name for name in stated if naming.as_file(name) == stem), otherwise)))
+    return replace(camera, name=_quoted(next((name for name in stated if file_names.made_fit(name) == stem), otherwise)))
 
 
 def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
@@ -309,8 +328,23 @@ def _told_of_damage(source: Source, title: str) -> Iterator[None]:
         raise InputError(f"{source.name} is damaged where it says its cameras ({title}): export it again") from error
 
 
-_READ_BY_BLENDER = (b"Kaydara FBX Binary", b"; FBX ", b"Ogawa")
-"""The first bytes of FBX files and of Alembic's, whose cameras Blender's own importers read."""
+_BY_BLENDER = "is read by Blender itself: import it there, save, and give the .blend"
+_PACKED, _A_PICTURE = "is packed: unpack it, and give what was in it", "is a picture: give the file of its camera"
+_A_PAGE = "is a page of the web: download the file itself that it shows"
+_OTHER_FILES = {
+    b"version https://git-lfs": "is Git LFS's pointer to the file, and not the file: get it by git lfs pull",
+    **dict.fromkeys((b"Kaydara FBX Binary", b"; FBX ", b"Ogawa"), _BY_BLENDER),
+    **dict.fromkeys((b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"(\xb5/\xfd", b"7z\xbc\xaf", b"Rar!"), _PACKED),
+    **dict.fromkeys((b"\x89PNG", b"\xff\xd8\xff", b"v/1\x01", b"II*\0", b"MM\0*", b"RIFF"), _A_PICTURE),
+    **dict.fromkeys((b"<!DOCTYPE html", b"<!doctype html", b"<html"), _A_PAGE),
+    **dict.fromkeys((b"ply\n", b"ply\r"), "is a point cloud or a mesh, which has no cameras: give the file of these"),
+    b"SQLite format 3": "is a database, as COLMAP's, which has no poses: give the model, as the folder sparse/0",
+    **dict.fromkeys(
+        (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"), "is a pickle, which may run programs: save JSON or NPZ"
+    ),
+    **dict.fromkeys((b"\x89HDF", b"MATLAB 5.0"), "is of a kind that is not read: save its numbers as JSON or as text"),
+}
+"""The first bytes of files that hold no camera that is read here, and what is to be said of them."""
 
 
 def recognized(source: str | Path | Source) -> str:
@@ -325,14 +359,17 @@ def recognized(source: str | Path | Source) -> str:
                 if is_json and name in _CODE and source.json_problem:
                     break
                 return name
-    if source.data.startswith(b"version https://git-lfs"):
-        raise InputError(f"{source.name} is Git LFS's pointer to the file, and not the file: get it by git lfs pull")
+    for beginning, sentence in _OTHER_FILES.items():
+        if source.data.startswith(beginning):
+            raise InputError(f"{source.name} {sentence}")
     if source.path and source.path.suffix.lower() in (".npy", ".npz"):
         raise InputError(
             f"{source.name} holds no arrays of a camera, or is damaged: save it again, with K, R and t or as a pose"
         )
-    if source.data.startswith(_READ_BY_BLENDER):
-        raise InputError(f"{source.name} is read by Blender itself: import it there, save, and give the .blend")
+    if source.data.startswith(b"PK\x03\x04"):
+        raise InputError(f"{source.name} {_PACKED}")
+    if not source.is_folder and not source.data.strip():
+        raise InputError(f"{source.name} is empty: export it again")
     if source.json_problem:
         raise InputError(_NO_JSON.format(source.name, source.json_problem))
     if source.path is None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from . import axes
+from . import axes, opencv
 from .camera import Camera, Options
 from .source import Record, Source, image_size
 
@@ -50,7 +50,7 @@ def _files(source: Source) -> list[Source]:
 
 def _is_ours(source: Source) -> bool:
     keys = source.document.keys()
-    return keys >= _POLYCAM or {"cameraPoseARFrame", "intrinsics"} <= keys
+    return len(keys & _POLYCAM) > len(_POLYCAM) / 2 or {"cameraPoseARFrame", "intrinsics"} <= keys
 
 
 def _record3d_in(source: Source) -> Source | None:
@@ -64,7 +64,7 @@ def _camera(source: Source, options: Options) -> Camera:
     matrix = np.eye(4)
     if "cameraPoseARFrame" in values:
         matrix[:] = np.array(values.numbers("cameraPoseARFrame", 16)).reshape(4, 4)
-        f_x, _, c_x, _, f_y, c_y, *_ = values.numbers("intrinsics", 9)
+        f_x, f_y, c_x, c_y = opencv.matrix_of_k(values.numbers("intrinsics", 9), name)
         size = (
             next(filter(None, (image_size(source.path.with_suffix(s)) for s in (".jpg", ".png"))), None)
             if source.path
@@ -94,11 +94,9 @@ def _picture(path: Path) -> str:
 
 def _record3d(source: Source, options: Options) -> list[Camera]:
     values = Record(source.document, source.name)
-    k = np.array(values.numbers("K", 9)).reshape(3, 3).T
-    if not (k[0, 0] > 0 and k[1, 1] > 0):
-        raise InputError(f"K of {source.name} has no focal lengths above 0: record it again")
+    k = np.array(values.numbers("K", 9)).reshape(3, 3).T.ravel().tolist()
     size = (values.size("w"), values.size("h"))
-    plane = axes.view_plane(k[0, 0], k[1, 1], k[0, 2], k[1, 2], size)
+    plane = axes.view_plane(*opencv.matrix_of_k(k, source.name), size)
     poses = values.get("poses")
     if not isinstance(poses, list) or not poses:
         raise InputError(f"{source.name} has no poses: record it again")

@@ -8,7 +8,6 @@ by the specification.
 Source: Khronos' glTF 2.0 specification, sections 3.10 and 5.12.
 """
 
-import dataclasses
 import json
 import math
 import re
@@ -32,7 +31,8 @@ _NEAR = 0.01  # written where glTF asks for one
 
 def recognizes(source: Source) -> bool:
     document = _document(source)
-    return "asset" in document and ("cameras" in document or "nodes" in document)
+    lists = [isinstance(document.get(key), list) for key in ("cameras", "nodes")]
+    return all(lists) or ("asset" in document and ("cameras" in document or "nodes" in document))
 
 
 def read(source: Source, options: Options) -> list[Camera]:
@@ -52,8 +52,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             result.append(_camera(name, camera, worlds.of(index), options))
             if worlds.moves(index):
                 result[-1] = result[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
-    names = naming.numbered([camera.name for camera in result])
-    return left_out.with_notes([dataclasses.replace(camera, name=name) for camera, name in zip(result, names, strict=True)])
+    return left_out.with_notes(result)
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:

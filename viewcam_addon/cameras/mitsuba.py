@@ -17,12 +17,13 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from .. import checks
+from .. import checks, terminal
 from ..errors import InputError
-from . import axes, own, texts, tokens
+from . import axes, naming, own, texts, tokens
 from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .expressions import Expressions, Unknown, numbers
 from .source import Source
@@ -491,10 +492,11 @@ def _rows(value: object) -> np.ndarray | None:
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
     """A scene with a sensor for each camera. Raises InputError if the pixels of one are not square, which Mitsuba can't say."""
-    return "\n".join(['<scene version="3.0.0">', *map(_written, cameras), "</scene>", ""])
+    names = naming.numbered([camera.name for camera in cameras])  # ids, of which Mitsuba takes none twice
+    return "\n".join(['<scene version="3.0.0">', *map(_written, cameras, names), "</scene>", ""])
 
 
-def _written(camera: Camera) -> str:
+def _written(camera: Camera, name: str) -> str:
     pinhole = camera.pinhole
     (d_x, d_y), (c_x, c_y) = pinhole.distance, pinhole.principal_point
     if abs(d_x / d_y - 1) > 2.0**-23:
@@ -508,13 +510,12 @@ def _written(camera: Camera) -> str:
         for axis, offset in (("x", offset_x), ("y", offset_y))
         if offset
     ]
-    named = re.sub(r"[&<>\"]", "_", camera.name)
     mirror = ['            <scale value="-1, 1, 1"/>'] if pinhole.mirrored else []
     e, l, up = (texts.listed(vector, ", ") for vector in texts.look(pinhole))
     return "\n".join(
         [
             f"    <!-- {own.comment(pinhole)} -->",
-            f'    <sensor type="perspective" id="{named}">',
+            f'    <sensor type="perspective" id={quoteattr(terminal.plain(name))}>',
             f'        <float name="fov" value="{texts.shortest(math.degrees(2 * math.atan(width / 2 / d_x)))}"/>',
             '        <string name="fov_axis" value="x"/>',
             *offsets,

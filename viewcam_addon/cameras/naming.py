@@ -5,13 +5,12 @@ elsewhere, since a file from anybody should make a program open nothing of whoev
 """
 
 import contextlib
-import re
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
-from .. import checks
+from .. import checks, file_names
 from ..errors import InputError, several
 from .camera import Camera
 
@@ -21,10 +20,6 @@ _PICTURES = (
     ".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".webp", ".bmp", ".hdr", ".tga", ".ppm", ".pgm", ".heic", ".dng",
     ".avif",
 )  # fmt: skip
-_NOT_IN_FILES = '<>:"/\\|?*'
-_DEVICE = re.compile(r"(?:con|prn|aux|nul|com\d|lpt\d)(?:\.|$)", re.IGNORECASE)
-"""The names that are no files of Windows, whatever follows their first full stop."""
-_MOST_BYTES = 200
 
 
 def stem(path: str) -> str:
@@ -136,20 +131,14 @@ def checked(cameras: Iterable[Camera], written: str) -> tuple[Camera, ...]:
     return cameras
 
 
-def as_file(name: str) -> str:
-    """The name as files can be called on every system, in one folder: what they can't have is _ there."""
-    plain = "".join("_" if character in _NOT_IN_FILES or _is_unseen(character) else character for character in name)
-    plain = plain.encode("utf-8", errors="replace")[:_MOST_BYTES].decode("utf-8", errors="ignore").rstrip(". ")
-    return f"_{plain}" if not plain or _DEVICE.match(plain) else plain
-
-
 def files(cameras: Sequence[Camera], suffix: str) -> list[str]:
     """The names of the files that have a camera each. Raises InputError if two cameras would be one file."""
-    names = [as_file(camera.name) + suffix for camera in cameras]
-    twice = {name for name, count in Counter(map(str.casefold, names)).items() if count > 1}
-    if alike := [checks.quoted(each.name) for each, name in zip(cameras, names, strict=True) if name.casefold() in twice]:
-        raise InputError(f"{several(alike)} would be one file for several cameras: rename them")
-    return names
+    names = [file_names.made_fit(camera.name) for camera in cameras]
+    counts = Counter(map(file_names.one_file, names))
+    alike = [camera.name for camera, name in zip(cameras, names, strict=True) if counts[file_names.one_file(name)] > 1]
+    if alike:
+        raise InputError(f"{several([*map(checks.quoted, alike)])} would be one file for several cameras: rename them")
+    return [name + suffix for name in names]
 
 
 def a_file_each(cameras: Sequence[Camera], suffix: str, text: Callable[[Camera], str]) -> str | dict[str, str]:

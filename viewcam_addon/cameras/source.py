@@ -85,7 +85,7 @@ class Source:
 
     @cached_property
     def is_binary(self) -> bool:
-        return b"\0" in self.data[:4096] and not self._utf_16
+        return b"\0" in self.data[:4096].rstrip(b"\0") and not self._utf_16
 
     @property
     def _utf_16(self) -> str | None:
@@ -129,7 +129,7 @@ class Source:
 
     @cached_property
     def _json(self) -> tuple[Any, str]:
-        text = self.text.strip()
+        text = self.text.strip().rstrip("\0")  # Azure Kinect's ends as a text of C
         if text[:1] not in ("{", "["):
             return None, ""
         problem = ""

@@ -28,6 +28,7 @@ MIRRORED = (
 _UNSAID = re.compile(r"[\s_$-]+")
 _GAP = re.compile(r"[\s,;|()\[\]{}<>'\"]*")
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
+_NARROWEST = 1e-100  # radians, whose tangent divides
 _ASKEW, _NOTED = 2e-3, 1e-5  # cosine between the picture's sides: refused from, told from
 
 
@@ -107,7 +108,7 @@ class Film:
 
         angle : radians, between 0 and π, along one of AXES.
         """
-        if not 0 < angle < math.pi:
+        if not _NARROWEST < angle < math.pi:
             raise InputError(f"{name} is {math.degrees(angle):g}°: give an angle between 0 and 180")
         width, height = self.width * self.pixel_aspect, float(self.height)
         side = {

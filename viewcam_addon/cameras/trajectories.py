@@ -82,7 +82,7 @@ def _kind(source: Source) -> str | None:
     """The kind of trajectory, by its first lines that are none of comments; "chan" if it is Nuke's, which looks alike."""
     if source.is_folder or source.is_binary or source.text[:1] in "{[<%":
         return None
-    if re.match(r"#\s*timestamp.*p_(?:RS_)?R_?", source.text[:400]):
+    if re.match(r"\s*#\s*timestamp.*p_(?:RS_)?R_?", source.text[:400]):
         return "EuRoC"
     counts: set[tuple[int, bool]] = set()
     rows: list[list[float]] = []

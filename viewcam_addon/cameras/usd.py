@@ -24,7 +24,7 @@ import numpy as np
 from .. import checks, usd_stage
 from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
-from . import axes, naming, own
+from . import axes, own
 from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Record, Source, pixels
 
@@ -62,10 +62,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             picture, more = _picture(camera)
             each = [_camera(camera["name"], sample | picture, options) for sample in camera["samples"]]
             result += [read.noted(*notes, *more) for read in each]
-    names = [camera.name for camera in result]
-    if len({*names}) < len(names):
-        names = naming.numbered(names)
-    return left_out.with_notes([dataclasses.replace(camera, name=name) for camera, name in zip(result, names, strict=True)])
+    return left_out.with_notes(result)
 
 
 def _notes(stage: dict[str, Any]) -> tuple[str, ...]:

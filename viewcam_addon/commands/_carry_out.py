@@ -16,13 +16,13 @@ from .. import argument_types as types
 from .. import crashes
 from ..errors import InputError
 from ..events import Events
+from ..file_names import one_file
 from ..jobs import cluster, dataset, one, served_renderer
 from ..jobs import run as running
 from ..jobs.folder import Folder, settings_hash
 from ..jobs.interruption import Interruption
 from ..jobs.job import Job
 from ..jobs.lists import ShotsError
-from ..jobs.names import one_file
 from ..jobs.plan import Plan, shard
 from ..jobs.summary import Summary
 from ..terminal import say, silent_libraries

@@ -12,12 +12,12 @@ from typing import Any
 
 from .. import argument_types as types
 from .. import cameras
+from .. import file_names as shot_names
 from ..cameras import calibration as calibrations
 from ..cameras import distortion
 from ..cameras.calibration import Rig
 from ..errors import InputError
 from ..jobs import lists, makers
-from ..jobs import names as shot_names
 from ..jobs.folder import Outputs
 from ..jobs.job import ENGINES, LEVELS, Job
 from ..labels import KINDS

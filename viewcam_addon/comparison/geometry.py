@@ -32,7 +32,7 @@ from .mismatches import (
     settle,
 )
 from .renderers import CYCLES, Renderer, completed
-from .statistics import PassErrors, looks_turned, measure, plain
+from .statistics import PassErrors, compressed_with_loss, looks_turned, measure, plain
 from .tolerances import Array, Seen, in_float32
 from .verdict import GeometryComparison, allowed_unexplained, far_from_origin
 
@@ -160,7 +160,10 @@ def _mistaken(pinhole: Pinhole, expected: Seen, seen: Seen, test: Image, measure
         if sentence:
             return sentence
     halves = sorted(test.halves & {"Depth", "Distance", "Position"})
-    return f"{listed(halves)} {'is' if len(halves) == 1 else 'are'} in half floats, of 11 bits: write 32 bits" if halves else ""
+    rounded = (
+        f"{listed(halves)} {'is' if len(halves) == 1 else 'are'} in half floats, of 11 bits: write 32 bits" if halves else ""
+    )
+    return "; ".join(filter(None, (rounded, compressed_with_loss(test.lossy))))
 
 
 def _unlike(reference: Array, test: Array) -> Array:

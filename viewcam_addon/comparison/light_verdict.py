@@ -15,7 +15,7 @@ from .hypothesis_tests import CONTOURS, PIXELS, WHOLE, HypothesisTest, Place
 from .noise_free import Edges
 from .perception import Appearance
 from .sides import CHANNEL_NAMES
-from .statistics import PassErrors, percentile_name, plain
+from .statistics import PassErrors, compressed_with_loss, percentile_name, plain
 from .tolerances import PERCENTILES, Array
 from .verdict import mark, pairs_text, percent
 
@@ -144,6 +144,7 @@ class RadianceComparison:
     stated : the camera that was asked for, or None.
     search : the state of the search, of a comparison in rounds.
     turned : the way in which the test looks turned over, one of TURNS; empty if it does not.
+    lossy : the compression that changed the test's pixels; empty if none has.
     """
 
     pinhole: Pinhole
@@ -160,6 +161,7 @@ class RadianceComparison:
     stated: Pinhole | None = None
     search: Search | None = None
     turned: str = ""
+    lossy: str = ""
     renderer = "Cycles"
     """The renderer of the test: light is compared with Cycles' alone."""
 
@@ -181,10 +183,11 @@ class RadianceComparison:
         if worst:
             others = f"; {listed([row.name for row in worst[1:]])} too" if len(worst) > 1 else ""
             turned = f"the picture looks {self.turned}; " if self.turned else ""
+            lossy = f"{compressed_with_loss(self.lossy)}; " if self.lossy else ""
             return answered(
                 False,
                 "Different here",
-                f"{turned}{_difference(worst[0])}{_hint(worst[0])}{others}{_without(self)}.",
+                f"{turned}{lossy}{_difference(worst[0])}{_hint(worst[0])}{others}{_without(self)}.",
                 self.not_modeled,
             )
         if self.is_empty:

@@ -98,6 +98,7 @@ def compare(
         maps,
         taken_out=taken_out,
         turned=looks_turned(combined.reference, combined.test, _unlike, _TURNED),
+        lossy=next((picture.lossy for picture in tests if picture.lossy), ""),
     )
 
 

@@ -101,3 +101,8 @@ def looks_turned(reference: Array, test: Array, unlike: Callable[[Array, Array],
     }
     best = min(errors, key=errors.__getitem__)
     return best if errors[best] < share * float(unlike(reference[steps], test[steps]).mean()) else ""
+
+
+def compressed_with_loss(lossy: str) -> str:
+    """The sentence that the test's file is. lossy : its compression, empty if it loses nothing."""
+    return f"the test picture is compressed with loss ({lossy}): write it with ZIP" if lossy else ""

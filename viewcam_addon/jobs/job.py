@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any, Self
 
 from .. import argument_types, checks
+from .. import file_names as names
 from ..cameras.calibration import Calibration
 from ..errors import InputError
 from ..pinhole import Triple, check_distance
 from ..tracer.scene import film
-from . import names
 
 ENGINES = ("CYCLES", "EEVEE", "VIEWCAM", "WORKBENCH")
 TESTED = ("CYCLES", "EEVEE", "WORKBENCH")

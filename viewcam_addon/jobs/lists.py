@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from .. import checks
+from .. import file_names as names
 from ..errors import InputError
 from ..files import read_bytes
 from ..terminal import plain
-from . import names
 from .job import BESIDE_THEM, FIELDS, Job, conflicts
 
 VECTORS = ("eye", "look_at", "up")

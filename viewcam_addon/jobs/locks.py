@@ -17,8 +17,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from .. import file_names as names
 from ..errors import InputError
-from . import names
 
 _ON_WINDOWS = sys.platform == "win32"
 if sys.platform == "win32":

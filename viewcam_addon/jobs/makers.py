@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from .. import checks, moves
+from .. import file_names as names
 from ..cameras.calibration import Calibration
 from ..errors import InputError
 from ..pinhole import Pinhole
-from . import names
 from .job import Job
 from .lists import Problems
 

@@ -86,14 +86,34 @@ def test_cycles_shows_the_same_of_linked_lights(pictures, add_lamp, link, what, 
     assert differs >= 2  # linking is seen: without it, the difference is found
 
 
-def test_a_light_that_is_linked_to_instances_is_named(lamp, link, scene):
-    bpy.data.collections.new("Placed").objects.link(bpy.data.objects["Monkey"])
-    empty = bpy.data.objects.new("Instance", None)
-    empty.instance_type, empty.instance_collection = "COLLECTION", bpy.data.collections["Placed"]
-    scene.collection.objects.link(empty)
-    assert "Lamp" not in linked()[2]
-    link(lamp, receiver_collection={"Monkey": "INCLUDE"})
-    assert "linked to instances" in linked()[2]["Lamp"]
+@pytest.fixture
+def places(lamp, scene):
+    """Two instances of Suzanne, named First and Second, in her own place."""
+    placed = bpy.data.collections.new("Placed")
+    placed.objects.link(bpy.data.objects["Monkey"])
+    scene.collection.objects.unlink(bpy.data.objects["Monkey"])
+    for number, name in enumerate(("First", "Second")):
+        empty = bpy.data.objects.new(name, None)
+        empty.instance_type, empty.instance_collection, empty.location = "COLLECTION", placed, (3 * number - 1.5, 0, 0)
+        scene.collection.objects.link(empty)
+
+
+@pytest.mark.parametrize("state", ["INCLUDE", "EXCLUDE"])
+@pytest.mark.parametrize("who", [("First", "Second"), ("Monkey",), ("Floor",)])
+def test_instances_are_lit_by_what_lights_whoever_places_them_or_their_object_as_in_cycles(
+    pictures, lamp, places, link, who, state
+):
+    link(lamp, receiver_collection=dict.fromkeys(who, state))
+    for each in pictures(scenes=2):
+        error = np.abs(each.traced["Combined"] - each.cycles[0]["Combined"])[..., :3].max(axis=-1)
+        assert np.percentile(error, 99) < 1e-5 and each.cycles[0]["Combined"][..., :3].max() > 0.05, error.max()
+        assert all(entry.status == "exported" for entry in each.exported.ledger), each.exported.ledger
+
+
+def test_a_light_that_is_linked_to_some_places_of_an_object_is_named(lamp, places, link):
+    link(lamp, receiver_collection={"First": "INCLUDE"})
+    receivers, _, reasons = linked()
+    assert receivers == {"Monkey"} and "linked to some places" in reasons["Lamp"], (receivers, reasons)
 
 
 EVERYTHING = {"Monkey", "Floor", "Panel"}

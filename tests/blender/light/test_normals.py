@@ -314,6 +314,23 @@ def test_a_smooth_body_has_normals_of_its_own(render_pair, body, turned_by):
     assert summary[0] > 200 and summary[1] < USUAL and summary[3] < 2e-3, summary
 
 
+@pytest.mark.parametrize("flat", ["all", "a line", "below", "some faces"])
+@pytest.mark.parametrize("smooth", [True, False])
+def test_a_map_stands_on_cycles_tangents_where_the_uv_map_has_no_area(render_pair, body, flat, smooth):
+    """The UV map of what was never unwrapped, or in part."""
+    mesh = bpy.data.objects["Monkey"].data
+    for polygon in mesh.polygons:
+        polygon.use_smooth = smooth
+        is_flat = {"all": True, "a line": True, "below": polygon.center.z < 0.1, "some faces": polygon.index % 3 == 0}[flat]
+        for loop in polygon.loop_indices if is_flat else ():
+            uv = mesh.uv_layers[0].data[loop].uv
+            uv[1] = 0.0
+            uv[0] = uv[0] if flat == "a line" else 0.0
+    map_normals(body[0], ("Normal",), (0.8, 0.35, 0.85))
+    summary = errors_of_the_body(render_pair)
+    assert summary[0] > 200 and summary[1] < USUAL and summary[3] < 2e-3, summary
+
+
 @pytest.mark.parametrize("tangent", ["X", "Y", "Z", "UV_MAP", None])
 def test_a_smooth_body_is_stretched_along_tangents_of_its_own(render_pair, body, tangent):
     """Round axes of its generated coordinates, which are none of the world's, along its UV map, and by default."""

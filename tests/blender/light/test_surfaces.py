@@ -169,6 +169,65 @@ def test_a_color_is_divided_by_its_alpha_where_cycles_does_so(pictures, floor, i
     assert not reasons(sides)
 
 
+@pytest.mark.parametrize(
+    ("kind", "values", "alpha", "output", "to"),
+    [
+        ("Math", {1: 0.0}, 0, 0, "Roughness"),
+        ("Mix", {0: 0.0}, 3, 0, "Roughness"),
+        ("Mix", {0: 2.0}, 2, 0, "Roughness"),
+        ("MixRGB", {0: 0.0}, 2, 0, "Roughness"),
+        ("MixShader", {0: 1.0}, None, 0, None),
+        ("BsdfPrincipled", {"Emission Strength": 0.0}, "Emission Color", 0, None),
+    ],
+)
+def test_an_alpha_that_cycles_folds_away_divides_no_color(pictures, floor, image, kind, values, alpha, output, to):
+    node, tree = texture(floor, image(opacity=np.linspace(0.2, 1, 15), alpha=True), "Linear"), floor.node_tree
+    other, shader = tree.nodes.new(f"ShaderNode{kind}"), tree.nodes["Shader"]
+    if kind == "Math":
+        other.operation = "MULTIPLY"
+    for name, value in values.items():
+        other.inputs[name].default_value = value
+    if kind == "MixShader":
+        emission = tree.nodes.new("ShaderNodeEmission")
+        tree.links.new(node.outputs["Alpha"], emission.inputs["Strength"])
+        tree.links.new(emission.outputs[0], other.inputs[1])
+        tree.links.new(shader.outputs[0], other.inputs[2])
+    else:
+        tree.links.new(node.outputs["Alpha"], other.inputs[alpha])
+    if kind == "BsdfPrincipled":
+        other.inputs["Roughness"].default_value, other.inputs["Specular IOR Level"].default_value = 1.0, 0.0
+        tree.links.new(node.outputs["Color"], other.inputs["Base Color"])
+    tree.links.new(other.outputs[output], shader.inputs[to] if to else tree.nodes["Output"].inputs["Surface"])
+    sides = pictures(scenes=1)
+    check(sides, TEXTURED)
+    assert not reasons(sides)
+
+
+@pytest.mark.parametrize("mode", ["STRAIGHT", "PREMUL", "CHANNEL_PACKED", "NONE"])
+@pytest.mark.parametrize("kind", ["PNG", "OPEN_EXR", "floats", "bytes"])
+def test_a_color_beside_its_alpha_is_cycles_in_every_way_to_keep_it(pictures, floor, image, tmp_path, kind, mode):
+    is_float = kind in ("OPEN_EXR", "floats")
+    block = image("Non-Color" if is_float else "sRGB", np.linspace(0.2, 1, 15), float_buffer=is_float, alpha=True)
+    if kind in ("PNG", "OPEN_EXR"):
+        block.filepath_raw, block.file_format = str(tmp_path / "file"), kind
+        block.save()
+        block = bpy.data.images.load(str(tmp_path / "file"))
+    elif is_float:  # linear all the same
+        pixels = np.array(block.pixels[:], np.float32)
+        block.colorspace_settings.name = "Linear Rec.709"
+        block.pixels.foreach_set(pixels)
+        block.update()
+    block.alpha_mode = mode
+    node, tree = texture(floor, block, "Linear"), floor.node_tree
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    tree.links.new(node.outputs["Alpha"], mix.inputs[0])
+    tree.links.new(tree.nodes["Shader"].outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], tree.nodes["Output"].inputs["Surface"])
+    sides = pictures(scenes=1)
+    check(sides, TEXTURED)
+    assert bool(reasons(sides)) == (mode == "PREMUL" and not is_float), reasons(sides)
+
+
 @pytest.mark.parametrize("packed", [False, True])
 @pytest.mark.parametrize("kind", ["PNG", "OPEN_EXR", "HDR"])
 @pytest.mark.parametrize("opacity", [1.0, 0.5])

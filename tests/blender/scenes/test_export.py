@@ -357,6 +357,13 @@ def test_hair_and_volumes_are_skipped_on_both_sides(add, monkey, both_sides):
     assert isinstance(next(iter(sides.exported.geometries.values())), Mesh)
 
 
+def test_hair_that_is_off_in_renders_is_not_told(monkey, both_sides):
+    monkey.modifiers.new("Hair", "PARTICLE_SYSTEM").show_render = False
+    monkey.particle_systems[0].settings.type = "HAIR"
+    of_monkey = entry(both_sides().exported, monkey.name)
+    assert of_monkey.status == "exported", of_monkey
+
+
 # --- Meshes, normals, UV maps, materials and point clouds are read as Cycles reads them: rendered by both sides and compared
 
 

@@ -244,13 +244,12 @@ def test_what_makes_a_lamp_uneven_is_its_emission(add_lamp, export, kind, output
     assert not reasons and point.power == (10.0,) * 3 and point.emission.type == type
 
 
-@pytest.mark.parametrize(("scale", "words"), [(1e-30, "nodes that are too much"), (0.0, None)])
-def test_a_lamp_that_is_scaled_to_nothing_has_no_nodes(add_lamp, export, scale, words):
+def test_a_lamp_that_is_scaled_to_nearly_nothing_has_no_nodes(add_lamp, export):
     lamp = add_lamp("POINT")
     attach(lamp, "TexCoord", "UV")
-    lamp.scale = (scale,) * 3
+    lamp.scale = (1e-30,) * 3
     ((point,), reasons) = export()
-    assert point.emission is None and (words is None or words in reasons["Lamp"])
+    assert point.emission is None and "nodes that are too much" in reasons["Lamp"]
 
 
 def attach(block, kind, output, to="Strength"):
@@ -295,6 +294,49 @@ def test_a_sheared_area_light_is_told_and_off_where_it_is_much(add_lamp, export,
     bpy.context.view_layer.update()
     lamps, reasons = export()
     assert "sheared" in reasons["Lamp"] and bool(lamps) == (scale < 2)
+
+
+@pytest.mark.parametrize(
+    ("kind", "scale", "shines"),
+    [
+        ("SUN", (0, 0, 0), False),
+        ("SUN", (0, 1, 1), True),
+        ("SPOT", (1, 1, 0), False),
+        ("AREA", (1, 1, 0), False),
+        ("POINT", (0, 0, 0), True),
+    ],
+)
+def test_a_light_that_its_scale_leaves_no_direction_is_off_on_both_sides(
+    add_lamp, export, add, mesh_from, read_passes, tmp_path, kind, scale, shines
+):
+    add_lamp(kind, energy=30.0).scale = scale
+    add(mesh_from("plane", size=20), "Floor")
+    lamps, reasons = export()
+    jobs.both_sides(Job(threads=2, level="direct", samples=1, width=48, height=32), [tmp_path / "cycles.exr"])
+    (cycles,) = read_passes([tmp_path / "cycles.exr"])
+    lit = cycles["Combined"][..., :3].max()
+    assert (bool(lamps), "scaled to 0" in reasons.get("Lamp", ""), lit > 0) == (shines, not shines, shines), (reasons, lit)
+
+
+def test_a_flat_lights_nodes_count_where_they_say_the_same_everywhere(add_lamp, export):
+    lamp = add_lamp("POINT", energy=100.0)
+    lamp.scale, lamp.data.use_nodes = (0, 0, 0), True
+    tree = lamp.data.node_tree
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    emission.inputs["Strength"].default_value = 0.25
+    ((point,), reasons) = export()
+    assert point.power == close((25.0,) * 3) and not reasons
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], emission.inputs["Strength"])
+    lamps, reasons = export()
+    assert not lamps and "scaled to 0" in reasons["Lamp"], reasons
+
+
+def test_a_light_whose_nodes_have_no_output_is_dark(add_lamp, export):
+    lamp = add_lamp("POINT", energy=100.0)
+    lamp.data.use_nodes = True
+    lamp.data.node_tree.nodes.clear()
+    lamps, reasons = export()
+    assert not lamps and not reasons, (lamps, reasons)
 
 
 @pytest.mark.parametrize("instanced", [False, True])

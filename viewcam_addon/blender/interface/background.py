@@ -15,9 +15,9 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...errors import InputError
+from ...file_names import made_fit
 from ...jobs.folder import Outputs
 from ...jobs.job import Job
-from ...jobs.names import made_fit
 from ...jobs.plan import Plan
 from .. import datablocks, own_picture
 from . import comparing

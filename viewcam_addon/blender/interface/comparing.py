@@ -26,10 +26,10 @@ from ... import child_process
 from ...comparison.answer import DIFFERENT, SAME_BUT, but_for, percent_of
 from ...comparison.statistics import plain
 from ...errors import InputError, operator_reason
+from ...file_names import made_fit
 from ...files import written_whole
 from ...jobs import plan as orders
 from ...jobs.job import Job
-from ...jobs.names import made_fit
 from ...jobs.plan import Plan
 from ...jobs.tracing import SIDES
 from ...pinhole import Pinhole

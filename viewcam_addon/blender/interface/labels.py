@@ -13,8 +13,8 @@ from typing import Any
 import bpy
 
 from ...errors import InputError
+from ...file_names import made_fit
 from ...jobs.folder import Outputs
-from ...jobs.names import made_fit
 from ...labels import DEPTH_STEPS, KINDS, PASSES, endings
 from .. import datablocks
 from . import panel_rows

@@ -11,9 +11,9 @@ from pathlib import Path
 import bpy
 
 from ...errors import InputError
+from ...file_names import made_fit, one_file
 from ...jobs.folder import Outputs
 from ...jobs.job import Job
-from ...jobs.names import made_fit, one_file
 from .. import own_picture
 from . import scene_cameras
 from .background import Background, BackgroundBatch, Cancels, shot

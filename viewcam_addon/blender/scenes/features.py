@@ -207,9 +207,10 @@ def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: 
 def note_hair(instance: bpy.types.DepsgraphObjectInstance, ledger: Ledger) -> None:
     """Hair of a particle system, which grows beside the object itself."""
     evaluated = instance.object
-    if instance.show_particles and any(
-        system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in evaluated.particle_systems
-    ):
+    if not instance.show_particles or not evaluated.particle_systems:
+        return
+    systems = (each.particle_system for each in evaluated.modifiers if each.type == "PARTICLE_SYSTEM" and each.show_render)
+    if any(system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in systems):
         ledger.note(evaluated.original.name, "skipped", "particle hair is not modeled")
 
 

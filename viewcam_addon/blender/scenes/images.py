@@ -54,21 +54,34 @@ def obstacle(image: bpy.types.Image) -> str | None:
     return None
 
 
+def _is_encoded(image: bpy.types.Image) -> bool:
+    """True if Cycles has an image's colors as sRGB encodes them."""
+    return image.colorspace_settings.name == "sRGB" and (_is_read_by_cycles(image) or not image.is_float)
+
+
 def _is_read_by_cycles(image: bpy.types.Image) -> bool:
     return image.source == "FILE" and not image.packed_file and not image.is_dirty
 
 
 def alpha_obstacle(image: bpy.types.Image) -> str | None:
     """The reason that the alpha of an image without another obstacle can't be a picture's, one clause, or None where it can."""
-    if image.channels != 4 or image.alpha_mode == "NONE" or image.colorspace_settings.is_data or is_multiplied(image):
+    if image.channels != 4 or not is_divided(image) or is_multiplied(image):
+        return None
+    if image.is_float and not _is_encoded(image):
         return None
     return f"shows the alpha of {image.name!r}, which is kept as {image.alpha_mode.lower().replace('_', ' ')}"
+
+
+def is_divided(image: bpy.types.Image) -> bool:
+    """True if Cycles divides an image's colors by its alpha where that is asked for."""
+    return image.alpha_mode not in ("NONE", "CHANNEL_PACKED") and not image.colorspace_settings.is_data
 
 
 def is_multiplied(image: bpy.types.Image) -> bool:
     """True if Cycles multiplies an image's encoded colors by its alpha, in bytes."""
     encoded = not image.is_float and image.colorspace_settings.name == "sRGB"
-    return image.channels == 4 and image.alpha_mode == "STRAIGHT" and encoded
+    is_straight = image.alpha_mode == "STRAIGHT" and "STRAIGHT" in _multiplied_modes(image, _is_read_by_cycles(image))
+    return image.channels == 4 and is_straight and encoded
 
 
 def picture_of(image: bpy.types.Image, alpha: bool = False) -> Picture:
@@ -79,13 +92,15 @@ def picture_of(image: bpy.types.Image, alpha: bool = False) -> Picture:
     # Blender decodes floats, and multiplies or divides by the alpha of files. Cycles reads a file for itself; what Blender
     # hands it stays as it is.
     by_itself = _is_read_by_cycles(image)
-    srgb = image.colorspace_settings.name == "sRGB" and (by_itself or not image.is_float)
+    srgb = _is_encoded(image)
     has_alpha = image.channels == 4 and not image.colorspace_settings.is_data
     done_by_blender = has_alpha and image.alpha_mode == ("STRAIGHT" if image.is_float else "PREMUL")
     pixels = _encoded(image) if by_itself and ((image.is_float and srgb) or done_by_blender) else _pixels(image)
     rgb = pixels[..., :3] if image.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
     if alpha and image.channels == 4 and image.alpha_mode != "NONE":
         rgb = pixels
+        if image.is_float and has_alpha and image.alpha_mode in _multiplied_modes(image, by_itself):
+            rgb[..., :3] *= rgb[..., 3:]
     elif has_alpha and image.alpha_mode in _multiplied_modes(image, by_itself):
         if not image.is_float:
             return Picture(_multiplied(pixels, np.uint8), srgb)

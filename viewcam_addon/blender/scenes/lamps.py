@@ -36,6 +36,7 @@ _LARGE_SHEAR = 1e-3
 # them differ by what seems more than chance. Measured at 0.5°.
 _LEAST_SPREAD = 0.0174
 _SHEARED = "is sheared, which Cycles takes for one shape here and another there"
+_FLAT = "is scaled to 0, which leaves no space to its direction or its nodes"
 
 
 class _Kind:
@@ -67,6 +68,10 @@ class _Kind:
         """The largest cosine between two of its axes, where that counts; 0 else."""
         return 0.0
 
+    def is_flat(self, light: bpy.types.Light, matrix: np.ndarray) -> bool:
+        """True if a scale of 0 leaves it no direction, and light all the same."""
+        return False
+
     def area(self, light: bpy.types.Light, matrix: np.ndarray) -> float:
         """The area that a strength by area is multiplied by."""
         radius = light.shadow_soft_size
@@ -86,6 +91,9 @@ class _Sun(_Kind):
 
     def values(self, light: bpy.types.Light, matrix: np.ndarray, strength: RGB) -> dict[str, Any]:
         return {"irradiance": strength, "towards": tuple(matrix[:3, 2]), "angle": light.angle}
+
+    def is_flat(self, light: bpy.types.Light, matrix: np.ndarray) -> bool:
+        return not matrix[:3, 2].any()
 
     def area(self, light: bpy.types.Light, matrix: np.ndarray) -> float:
         return math.pi * math.sin(light.angle / 2) ** 2 if light.angle > 0 else 1.0
@@ -114,6 +122,9 @@ class _Spot(_Kind):
     lamp = Spot
     settings = _Point.settings | {"angle": "spot_size", "blend": "spot_blend"}
 
+    def is_flat(self, light: bpy.types.Light, matrix: np.ndarray) -> bool:
+        return not np.linalg.det(matrix[:3, :3])
+
     def settings_shown(self, light: bpy.types.Light) -> tuple[str, ...]:
         return (*super().settings_shown(light), "show_cone")
 
@@ -139,6 +150,9 @@ class _Area(_Kind):
     def area(self, light: bpy.types.Light, matrix: np.ndarray) -> float:
         across, along = np.linalg.norm(matrix[:3, :2], axis=0) * self.sides(light)
         return across * along * (math.pi / 4 if light.shape in ("DISK", "ELLIPSE") else 1.0)
+
+    def is_flat(self, light: bpy.types.Light, matrix: np.ndarray) -> bool:
+        return not matrix[:3, 2].any() and not light.cycles.is_portal and self.area(light, matrix) > 0
 
     def shear(self, light: bpy.types.Light, matrix: np.ndarray) -> float:
         if light.cycles.is_portal or not self.area(light, matrix) > 0:
@@ -208,7 +222,7 @@ def lamps_in(
 
     pictures : receives the images of their nodes.
 
-    A light that is sheared in one place is off in all of its places.
+    A light that is sheared or flat in one place is off in all of its places.
     """
     links = linking.Links(depsgraph)
     lamps: list[tuple[bpy.types.Object, Lamp]] = []
@@ -225,9 +239,11 @@ def lamps_in(
             strength = _strength(name, light, factor, ledger)
             if strength is None or not any(strength):
                 continue
-            shear = KINDS[light.type].shear(light, matrix)
-            if shear > _LARGE_SHEAR:
-                ledger.note(name, "skipped", f"{_SHEARED}: off on both sides")
+            kind = KINDS[light.type]
+            shear = kind.shear(light, matrix)
+            is_flat = kind.is_flat(light, matrix) or (emission is not None and not np.linalg.det(matrix[:3, :3]))
+            if is_flat or shear > _LARGE_SHEAR:
+                ledger.note(name, "skipped", f"{_FLAT if is_flat else _SHEARED}: off on both sides")
                 for ray in (*RAYS[:-1], "volume_scatter"):
                     ledger.set_for_cycles(block, f"visible_{ray}", False)
                 off.add(block)
@@ -236,7 +252,7 @@ def lamps_in(
                 ledger.note(name, "approximated", _SHEARED)
             common = {"hidden_from": hidden_from, "casts_shadow": light.use_shadow}
             common["multiple_importance"] = light.cycles.use_multiple_importance_sampling
-            lamp = KINDS[light.type].exported(name, light, matrix, strength, common, ledger)
+            lamp = kind.exported(name, light, matrix, strength, common, ledger)
             if lamp is not None:
                 receivers, blockers = links.of(placed, ledger, lamp.is_sized and lamp.multiple_importance)
                 if pictures is not None and reading:
@@ -264,9 +280,13 @@ def _emission(
 ) -> tuple[RGB, Node | None, shaders.Reading | None]:
     """The factor that a light's nodes are everywhere, or the node that makes it, with what that asks for."""
     tree = versions.light_tree(light)
-    output = tree and tree.get_output_node("CYCLES")
-    if not output or not np.linalg.det(matrix[:3, :3]):
+    if not tree:
         return _WHITE, None, None
+    output = tree.get_output_node("CYCLES")
+    if not output:
+        return _BLACK, None, None
+    if not np.linalg.det(matrix[:3, :3]):  # then only what is the same everywhere counts
+        matrix = np.eye(4)
     nodes.leave_out_circles(tree, ledger, name, "has")
     for missing in images.missing(tree):
         ledger.note(name, "exported", missing)

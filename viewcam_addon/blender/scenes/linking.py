@@ -31,15 +31,19 @@ class Links:
 
     def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
         self._objects: dict[str, set[bpy.types.Object]] = {}  # shown objects, and those that place them
-        self._instances: set[str] = set()  # and what places them
+        self._asked: dict[str, set[str]] = {}  # shown objects → those whose links count, by name
         self._shadowless: set[str] = set()  # hidden from shadow rays
-        if any(is_linked(block) for block in depsgraph.objects):
-            for placed, is_instance in ((placed_by(each), each.is_instance) for each in depsgraph.object_instances):
+        lights = [block for block in depsgraph.objects if is_linked(block)]
+        if lights:
+            collections = (getattr(light.light_linking, each) for light in lights for each in _COLLECTIONS)
+            members = {member.name for each in collections if each for member in each.all_objects}
+            members |= {light.name for light in lights}
+            for placed in map(placed_by, depsgraph.object_instances):
+                parent = placed.parent.original.name
+                self._asked.setdefault(placed.name, set()).add(parent if parent in members else placed.name)
                 self._objects.setdefault(placed.name, set()).update((placed.real.original, placed.parent.original))
                 if "shadow" in hidden_from(placed, depsgraph.view_layer_eval):
                     self._shadowless.add(placed.name)
-                if is_instance:
-                    self._instances |= {placed.name, placed.parent.original.name}
 
     def of(self, placed: Placed, ledger: Ledger, is_found: bool) -> tuple[_Names, _Names]:
         """The names of a light's receivers and of its blockers, whether or not they are surfaces; None is all.
@@ -50,9 +54,9 @@ class Links:
         if not is_linked(block):
             return None, None
         collections = [getattr(block.light_linking, each) for each in _COLLECTIONS]
-        if any(each and not self._instances.isdisjoint(member.name for member in each.all_objects) for each in collections):
-            ledger.note(placed.name, "approximated", "is linked to instances, which count as the objects that they show")
-        (receivers, _), (blockers, excluded) = (self._named(each) if each else (None, True) for each in collections)
+        (receivers, _), (blockers, excluded) = (
+            self._named(each, placed, ledger) if each else (None, True) for each in collections
+        )
         if is_found and blockers is not None:
             others = set(self._objects) - blockers
             if self._shadowless & blockers if excluded else others:
@@ -62,16 +66,23 @@ class Links:
                 ledger.call_for_cycles(block, _exclude, sorted(blocks, key=lambda each: each.name_full))
         return receivers, blockers
 
-    def _named(self, collection: bpy.types.Collection) -> tuple[_Names, bool]:
-        """(the objects that a collection means, true if these are all that it does not exclude)."""
+    def _named(self, collection: bpy.types.Collection, light: Placed, ledger: Ledger) -> tuple[_Names, bool]:
+        """(the objects that a light's collection means, true if these are all that it does not exclude)."""
         states: dict[str, str] = {}
         for child, child_link in zip(collection.children, collection.collection_children, strict=True):
             states |= dict.fromkeys((block.name for block in child.all_objects), child_link.light_linking.link_state)
         for block, link in zip(collection.objects, collection.collection_objects, strict=True):
             states[block.name] = link.light_linking.link_state
         included = {name for name, state in states.items() if state == "INCLUDE"}
-        names = frozenset((included or set(self._objects)) - (set(states) - included)) if states else None
-        return names, not included
+        if not states:
+            return None, True
+        meant = {
+            name: {each in included if included else each not in states for each in self._asked[name]} for name in self._asked
+        }
+        if mixed := [name for name, answers in meant.items() if len(answers) > 1]:
+            reason = "is linked to some places of what stands in several, and to all of them here"
+            ledger.note(light.name, "approximated", f"{reason}: {', '.join(sorted(mixed))}")
+        return frozenset(name for name, answers in meant.items() if True in answers), not included
 
 
 def is_linked(block: bpy.types.Object) -> bool:

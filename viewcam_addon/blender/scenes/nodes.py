@@ -6,7 +6,7 @@ links go in a circle or from a shader to a color, and those from nodes that only
 on.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import bpy
@@ -99,15 +99,18 @@ def _by_identifier(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: t
     return inner and Input(inner, groups)
 
 
-def feeding(of: Input) -> set[Output]:
-    """All outputs that an input is made of."""
+def feeding(of: Input, inputs_of: Callable[[Output], Iterable[Input]] | None = None) -> set[Output]:
+    """All outputs that an input is made of.
+
+    inputs_of : a function that says which inputs an output is made of; all of its node's where None.
+    """
     result: set[Output] = set()
     left = [of]
     while left:
         output = source(left.pop())
         if isinstance(output, Output) and output not in result:
             result.add(output)
-            left += [Input(socket, output.groups) for socket in output.node.inputs]
+            left += inputs_of(output) if inputs_of else (Input(socket, output.groups) for socket in output.node.inputs)
     return result
 
 

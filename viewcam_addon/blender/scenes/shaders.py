@@ -458,8 +458,8 @@ class Tree:
                 if why := images.alpha_obstacle(image):
                     self._reason(output, why)
                     return None
-                inputs["straight"] = images.is_multiplied(image)
-                self.reading.alphas.add(image.name_full)
+                inputs["straight"] = images.is_divided(image)
+                self._ask_for_alpha(image, inputs)
         if "table" in KINDS[ours].inputs:
             inputs |= self._curves(output)
         if ours == "ies":
@@ -499,6 +499,17 @@ class Tree:
         if result == plain and result["interpolation"] != "cubic":
             return Color(_WHITE, result["image"].image, result["interpolation"] == "closest")
         return result
+
+    def _ask_for_alpha(self, image: bpy.types.Image, inputs: dict[str, object]) -> None:
+        """Note that an image's alpha is asked for: one that is packed is a picture of its own, since a picture's colors are
+        multiplied by the alpha beside them."""
+        key = image.name_full
+        if image.alpha_mode == "CHANNEL_PACKED" and image.colorspace_settings.name == "sRGB":
+            if inputs["output"] != "alpha":
+                return
+            key += " (alpha)"
+            self.reading.images[key], inputs["image"] = image, Color(_WHITE, key)
+        self.reading.alphas.add(key)
 
     def _value_input(self, of: Input, known: object) -> Color | Node | tuple[float, ...] | None:
         """The value of an input of a node that makes values. known : its default, a number where it is one."""
@@ -590,13 +601,39 @@ class Tree:
         )
 
 
+def _left_by_folding(output: Output) -> list[Input]:
+    """The inputs that Cycles leaves to a node: none to what is 0, one to a mixture that is one of its sides (constant_fold and
+    simplify_settings of intern/cycles/scene/shader_nodes.cpp)."""
+    node, kind = output.node, output.node.type
+    inputs = [Input(socket, output.groups) for socket in node.inputs]
+    if kind in ("MIX_SHADER", "MIX_RGB", "MIX"):
+        data = getattr(node, "data_type", "RGBA").replace("RGBA", "COLOR").title()
+        theirs = {"MIX_SHADER": ("Fac", "Shader", "Shader_001"), "MIX_RGB": ("Fac", "Color1", "Color2")}
+        names = theirs.get(kind, ("Factor_Float", f"A_{data}", f"B_{data}"))
+        factor, first, second = (Input(value_nodes.input_of(node, name), output.groups) for name in names)
+        share, blend = constant_number_of(factor), getattr(node, "blend_type", "MIX") if data == "Color" else "MIX"
+        if share is not None and getattr(node, "clamp_factor", True):
+            share = min(max(share, 0.0), 1.0)
+        if share == 0.0 and blend not in ("LIGHTEN", "DODGE", "BURN"):
+            return [first]
+        return [second] if share == 1.0 and blend == "MIX" else inputs
+    if kind in ("MATH", "VECT_MATH") and node.operation == "MULTIPLY":
+        return [] if _ZERO in map(constant_color_of, inputs[:2]) else inputs
+    if kind in ("EMISSION", "BACKGROUND"):
+        return [] if _ZERO in (constant_color(output, "Color"), constant_color(output, "Strength")) else inputs
+    if kind == "BSDF_PRINCIPLED":
+        weights = {name: needed[0] for name, needed in _ONLY_WITH["principled"].items() if len(needed) == 1}
+        return [of for of in inputs if constant_number(output, weights.get(of.socket.name, "")) != 0.0]
+    return inputs
+
+
 def divided_images(output: bpy.types.Node) -> frozenset[object]:
     """The ways in which images are looked up whose alpha an output asks for: there Cycles divides their colors by it.
 
     Nodes that are alike are one to Cycles, which asks for both.
     """
     inputs = (Input(output.inputs[name]) for name in ("Surface", "Displacement") if name in output.inputs)
-    fed = set[Output]().union(*map(nodes.feeding, inputs))
+    fed = set[Output]().union(*(nodes.feeding(each, _left_by_folding) for each in inputs))
     return frozenset(_looked_up(each) for each in fed if each.node.type == "TEX_IMAGE" and each.socket.name == "Alpha")
 
 

@@ -29,7 +29,7 @@ class TangentsOfMesh {
         weld();
         group_.resize(corners_);
         std::iota(group_.begin(), group_.end(), 0u);
-        along_.resize(mesh.count), turns_.resize(mesh.count);
+        along_.resize(mesh.count), turns_.resize(mesh.count), has_area_.resize(mesh.count);
         for (size_t i = 0; i < mesh.count; i++) lay_out(i);
         join();
     }
@@ -80,7 +80,7 @@ class TangentsOfMesh {
         if (is_degenerate(triangle) || !(area != 0)) return;
         Vec3 first = place(3 * triangle);
         Vec3 along = (place(3 * triangle + 1) - first) * t2 - (place(3 * triangle + 2) - first) * t1;
-        turns_[triangle] = area > 0 ? 1 : -1;
+        turns_[triangle] = area > 0 ? 1 : -1, has_area_[triangle] = true;
         double size = length(along);
         if (size > 0 && size < INFINITE) along_[triangle] = along * (turns_[triangle] / size);
     }
@@ -119,8 +119,10 @@ class TangentsOfMesh {
             return size > 0 ? flat / size : Vec3{};
         };
         std::vector<Vec3> sum(corners_);
+        std::vector<bool> is_laid_out(corners_);  // true of a vertex where some triangle has an area in the map
         for (size_t i = 0; i < corners_; i++) {
             if (is_degenerate(i / 3)) continue;
+            if (has_area_[i / 3]) is_laid_out[root(uint32_t(i))] = true;
             auto [x, y, z] = normal(i);
             Vec3 n{x, y, z};
             Vec3 before = within(place(previous(i)) - place(i), n), after = within(place(next(i)) - place(i), n);
@@ -132,8 +134,9 @@ class TangentsOfMesh {
             Vec3 tangent = sum[root(uint32_t(i))];
             double size = length(tangent);
             if (size > 0) tangent = tangent / size;
+            if (!is_laid_out[root(uint32_t(i))]) tangent = {1, 0, 0};
             for (int axis = 0; axis < 3; axis++) tangents[4 * i + size_t(axis)] = float(tangent[axis]);
-            tangents[4 * i + 3] = turns_[i / 3] < 0 ? -1 : 1;
+            tangents[4 * i + 3] = is_laid_out[root(uint32_t(i))] && turns_[i / 3] > 0 ? 1 : -1;
         }
         return tangents;
     }
@@ -144,6 +147,7 @@ class TangentsOfMesh {
     std::vector<uint32_t> vertex_, group_;  // by corner
     std::vector<Vec3> along_;               // by triangle
     std::vector<int> turns_;
+    std::vector<bool> has_area_;  // in the map
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -1,14 +1,14 @@
-"""The names that shots may have: a name is that of its files, on Linux, Windows and macOS alike.
+"""The names that shots and their files may have, on Linux, Windows and macOS alike; and files of cameras.
 
 A batch may be listed on one system and rendered on another, so the rules of all three hold everywhere. Rejected: replacing
-what is not allowed (two shots could become one file, and nobody finds the picture by the name that he gave).
+what is not allowed in a shot's name (two could become one file, and nobody finds the picture by the name that he gave).
 """
 
 import re
 import unicodedata
 
-from .. import checks
-from ..errors import InputError
+from . import checks
+from .errors import InputError
 
 # Bytes of UTF-8. 255 is what file systems take; a temporary file beside it needs a prefix and a suffix more.
 LONGEST = 200

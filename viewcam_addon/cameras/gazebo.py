@@ -1,0 +1,120 @@
+"""Gazebo's cameras, in a world's or a model's SDF (XML): `<sensor type="camera"><pose>…</pose><camera>…</camera></sensor>`.
+
+A sensor stands in its link, this in its model, and that in the world, each by its pose: x y z roll pitch yaw, in radians about
+the fixed axes x, y and z, or in degrees or as a quaternion where its attributes say so. The camera looks along x, y to the left
+and z up. horizontal_fov is of the width, 1.047 unless given; the image 320 × 240. Where <lens> has intrinsics, these count.
+
+Poses relative to another frame, and models that are included from other files, are refused or told.
+
+Source: sdformat.org's specification of sensor, camera, pose and link; gz-sim's camera frame (x forward, z up).
+"""
+
+import itertools
+import math
+from collections.abc import Iterator
+from xml.etree import ElementTree
+
+import numpy as np
+
+from .. import checks, rotation
+from ..errors import InputError
+from . import axes, opencv, texts
+from .camera import Camera, LeftOut, Options, not_a_pinhole
+from .source import Source, flat, number, pixels
+
+TITLE = "Gazebo's SDF"
+
+_HOLDERS = ("world", "model", "link", "joint")
+_OTHERS = ("wideanglecamera", "wide_angle_camera")
+_VIEW = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # columns right, up and back, in x ahead, y left, z up
+_MOST = 4_000
+_DISTORTION = ("k1", "k2", "k3", "p1", "p2")
+_INTRINSICS = {"fx": "277", "fy": "277", "cx": "160", "cy": "120", "s": "0"}
+
+
+def recognizes(source: Source) -> bool:
+    root = source.xml
+    return root is not None and root.tag in ("sdf", "gazebo", *_HOLDERS, "sensor") and root.find(".//camera") is not None
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    root = source.xml
+    if root is None:
+        raise InputError(f"{source.name} is no XML: give Gazebo's world or model")
+    holder = ElementTree.Element("sdf")
+    holder.append(root)
+    left_out, cameras = LeftOut(), []
+    for sensor, camera, matrix in itertools.islice(_inside(holder, np.eye(4)), _MOST):
+        name = sensor.get("name") or "camera"
+        with left_out.unless_pinhole(name):
+            cameras.append(_camera(name, sensor.get("type", "camera"), camera, matrix, options))
+    included = [element.findtext("uri", "").strip() for element in root.iter("include")]
+    notes = (f"Not read, since it is of other files: {', '.join(map(checks.quoted, included[:3]))}",) if included else ()
+    return left_out.with_notes([camera.noted(*notes) for camera in cameras])
+
+
+def _inside(
+    holder: ElementTree.Element, around: np.ndarray
+) -> Iterator[tuple[ElementTree.Element, ElementTree.Element, np.ndarray]]:
+    """Each sensor, each of its cameras, and its matrix in the world."""
+    for child in holder:
+        if child.tag == "sensor":
+            matrix = around @ _pose(child)
+            for camera in child.findall("camera"):
+                yield child, camera, matrix @ _pose(camera)
+        elif child.find(".//camera") is not None:
+            yield from _inside(child, around @ _pose(child) if child.tag in _HOLDERS else around)
+
+
+def _pose(element: ElementTree.Element) -> np.ndarray:
+    """(4, 4) of the element's own pose in what holds it."""
+    result, pose = np.eye(4), element.find("pose")
+    if pose is None:
+        return result
+    what = f"the pose of {element.tag} {checks.quoted(element.get('name', ''))}"
+    if frame := pose.get("relative_to") or pose.get("frame"):
+        raise InputError(f"{what} is relative to {checks.quoted(frame)}, which is not followed: write it in what holds it")
+    numbers = flat(what, (pose.text or "").strip() or "0 0 0 0 0 0")
+    is_quaternion = pose.get("rotation_format") == "quat_xyzw"
+    if len(numbers) != (7 if is_quaternion else 6):
+        raise InputError(f"{what} has {len(numbers)} numbers: it should have {7 if is_quaternion else 6}")
+    result[:3, 3] = numbers[:3]
+    if is_quaternion:
+        x, y, z, w = numbers[3:]
+        result[:3, :3] = axes.rotation_of((w, x, y, z), what)
+    else:
+        unit = math.pi / 180 if pose.get("degrees") in ("true", "1") else 1.0
+        result[:3, :3] = rotation.from_euler([angle * unit for angle in numbers[3:]], "XYZ")
+    return result
+
+
+def _camera(name: str, kind: str, camera: ElementTree.Element, matrix: np.ndarray, options: Options) -> Camera:
+    what = f"camera {checks.quoted(name)}"
+    if kind in _OTHERS or (projection := camera.findtext("lens/type", "").strip()) not in ("", "gnomonical"):
+        not_a_pinhole(what, f"of the kind {checks.quoted(kind if kind in _OTHERS else projection)}")
+    if camera.findtext("projection_type", "perspective").strip() == "orthographic":
+        not_a_pinhole(what, "orthographic")
+    bent = camera.find("distortion")
+    if bent is not None and not options.without_distortion and any(_number(bent, key, what, "0") for key in _DISTORTION):
+        not_a_pinhole(what, "a camera with a distortion, which way it goes Gazebo does not say")
+    width, height = size = (
+        pixels(f"width of {what}", camera.findtext("image/width", "320").strip()),
+        pixels(f"height of {what}", camera.findtext("image/height", "240").strip()),
+    )
+    intrinsics = camera.find("lens/intrinsics")
+    if intrinsics is not None:
+        f_x, f_y, c_x, c_y, skew = (_number(intrinsics, key, what, usual) for key, usual in _INTRINSICS.items())
+        k = [f_x, skew, c_x, 0, f_y, c_y, 0, 0, 1]
+        plane = opencv.plane_of_k(k, size, opencv.half_pixel(options, "corner"), what)
+    else:
+        plane = texts.Film(width, height).plane(
+            _number(camera, "horizontal_fov", what, "1.047"), "x", f"horizontal_fov of {what}"
+        )
+    turned = matrix.copy()
+    turned[:3, :3] = matrix[:3, :3] @ _VIEW
+    pinhole, notes = axes.pinhole(turned, plane, what)
+    return Camera(name, pinhole, True, notes)
+
+
+def _number(element: ElementTree.Element, key: str, what: str, usual: str) -> float:
+    return number(f"{key} of {what}", element.findtext(key, usual).strip())
