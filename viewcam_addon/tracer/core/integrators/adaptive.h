@@ -54,7 +54,7 @@ class TileSampler {
     void learn(int threads, const volatile int* stop) {
         // EXPECTED: samples of a pixel where an error is wanted. SHARE: of the picture's paths are traced to learn, FEWEST to MOST. WORTH:
         // the noise, squared, that is left of what it was, times rays, where guided ones pay, which takes up to 1.4 times as long each.
-        constexpr double EXPECTED = 64, SHARE = 1.0 / 32, FEWEST = 0x1p13, MOST = 0x1p17, WORTH = 0.65;
+        constexpr double EXPECTED = 64, SHARE = 1.0 / 32, FEWEST = 0x1p13, MOST = 0x1p17, WORTH = 0.6;
         double expected = error_ > 0 ? std::min(double(samples_), EXPECTED) : samples_;
         double paths = std::min(SHARE * expected * camera_.height * camera_.width, MOST);
         if (paths < FEWEST || !integrator_.may_be_guided()) return;

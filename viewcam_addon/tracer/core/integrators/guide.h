@@ -32,9 +32,9 @@ class Guide {
         uint16_t bin;
         float squared;
     };
-    // The density over the map of each bin, and the chance that it or one before it is chosen.
+    // The density over the map of each bin; the chance that a row or one before it is chosen, and in each row a bin or one before it.
     struct Leaf {
-        float density[BINS], reached[BINS];
+        float density[BINS], rows[SIDE], columns[SIDE][SIDE];
     };
 
     explicit Guide(const std::vector<LearnedRay>& rays) : leaf_of_(SIDES * CELLS) {
@@ -125,7 +125,7 @@ class Guide {
     // Neighbors lend a bin of what they have learned: half of a bin or so is how far apart a leaf's places see the same thing.
     static Leaf leaf(Rays begin, Rays end) {
         constexpr double NEXT = 0.25;
-        double sums[BINS] = {}, roots[BINS], total = 0, reached = 0;
+        double sums[BINS] = {}, roots[BINS], total = 0;
         for (auto ray = begin; ray != end; ++ray) sums[ray->bin] += ray->squared;
         for (int bin = 0; bin < BINS; bin++) {
             double sum = 0, weights = 0;
@@ -137,9 +137,16 @@ class Guide {
             total += roots[bin] = std::sqrt(sum / weights);
         }
         Leaf leaf;
-        for (int bin = 0; bin < BINS; bin++) {
-            double share = total > 0 ? roots[bin] / total : 1.0 / BINS;
-            leaf.density[bin] = float(share * BINS), leaf.reached[bin] = float(reached += share);
+        double reached = 0;
+        for (int row = 0; row < SIDE; row++) {
+            double of_row = 0, before = 0;
+            for (int column = 0; column < SIDE; column++) of_row += roots[row * SIDE + column];
+            for (int column = 0; column < SIDE; column++) {
+                double root = roots[row * SIDE + column];
+                leaf.density[row * SIDE + column] = total > 0 ? float(root / total * BINS) : 1.0f;
+                leaf.columns[row][column] = of_row > 0 ? float((before += root) / of_row) : float(column + 1) / SIDE;
+            }
+            leaf.rows[row] = total > 0 ? float((reached += of_row) / total) : float(row + 1) / SIDE;
         }
         return leaf;
     }
@@ -194,17 +201,21 @@ template <class T> class GuideAt {
     template <class Of> static T each(const Of& of) {
         if constexpr (LANES == 1) return of(0); else return double4{double(of(0)), double(of(1)), double(of(2)), double(of(3))};
     }
-    // A place of the map.
+    // The place of a number in what is reached step by step, as the step and how far it lies in that; and whole steps of a unit.
+    static double stepped(const float* reached, double u, int& step) {
+        step = 0;
+        for (int half = Guide::SIDE / 2; half > 0; half /= 2) step += reached[step + half - 1] <= u ? half : 0;  // no branches: nobody could predict them
+        double before = step > 0 ? reached[step - 1] : 0, chance = reached[step] - before;
+        return (step + (chance > 0 ? std::clamp((u - before) / chance, 0.0, 1.0) : 0.5)) / Guide::SIDE;
+    }
+    // A place of the map: a row and then a bin in it, so that numbers that are spread evenly over a square stay so.
     Vec2Of<T> place(Vec2Of<T> u) const {
         Vec2 places[LANES];
         for (int i = 0; i < LANES; i++) {
-            const float* reached = leaves_[i]->reached;
-            Vec2 rest = lane(u, i);
-            int bin = 0;  // the first that reaches farther: without branches, which nobody could predict
-            for (int half = Guide::BINS / 2; half > 0; half /= 2) bin += reached[bin + half - 1] <= rest.x ? half : 0;
-            double before = bin > 0 ? reached[bin - 1] : 0, chance = reached[bin] - before;
-            double within = chance > 0 ? std::clamp((rest.x - before) / chance, 0.0, 1.0) : 0.5;
-            places[i] = {(bin % Guide::SIDE + within) / Guide::SIDE, (bin / Guide::SIDE + rest.y) / Guide::SIDE};
+            int row, column;
+            Vec2 numbers = lane(u, i);
+            places[i].y = stepped(leaves_[i]->rows, numbers.y, row);
+            places[i].x = stepped(leaves_[i]->columns[row], numbers.x, column);
         }
         return {each([&](int i) { return places[i].x; }), each([&](int i) { return places[i].y; })};
     }
