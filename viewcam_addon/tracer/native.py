@@ -616,7 +616,7 @@ class CoreLight:
             self._scene.core.light_free(self._handle)
 
     def learn(self, threads: int, stop: Any) -> None:
-        """Learn where light comes from, before the first tile, if rays that know it make the picture's noise so much smaller."""
+        """Learn where light comes from, before the first tile, if rays that know it make the picture's noise enough smaller."""
         self._scene.check(self._scene.core.learn_light(self._handle, threads, stop))
 
     def trace(self, passes: Passes, row: int, column: int, samples: int, stop: Any) -> None:

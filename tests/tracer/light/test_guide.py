@@ -1,8 +1,8 @@
 """The guide that diffuse rays follow: a hollow ball with a hole in it, whose light is known on paper, and what it changes.
 
-The wall of a hollow ball gets as much light from any part of it as from any other, so that where the hole takes a share f of the
-ball, shows a sky of radiance 1 and the wall reflects ρ, every point of the wall shines with ρ f / (1 − ρ (1 − f)) (the
-integrating sphere: Ulbricht, 1900). A picture whose paths are too few for lessons follows no guide.
+The wall of a hollow ball gets as much light from any part of it as from any other. So where the hole takes a share f of it and
+shows a sky of radiance 1, and the wall reflects ρ, every point of the wall shines with ρ f / (1 − ρ (1 − f)) (the integrating
+sphere: Ulbricht, 1900). A picture whose paths are too few for lessons follows no guide.
 """
 
 import time

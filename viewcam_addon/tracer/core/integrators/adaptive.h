@@ -61,7 +61,7 @@ class TileSampler {
         double noise[2], rays[2];
         for (int i = 0; i < 2; i++) {
             Lesson lesson = take_lesson(size_t(paths / 2 / PathIntegrator::MOST), threads, stop);
-            if (stop && *stop) return;
+            if ((stop && *stop) || lesson.rays.empty()) return;
             noise[i] = lesson.apart, rays[i] = paths / 2 + double(lesson.rays.size());
             guide_ = std::make_unique<Guide>(lesson.rays);
             integrator_.set_guide(guide_.get());

@@ -95,7 +95,7 @@ class Guide {
         return (bits | bits << 2) & 0x1249;
     }
     uint32_t cell(Vec3 position, uint32_t facing) const {
-        auto coordinate = [&](int axis) { return spread(uint32_t(std::clamp((position[axis] - low_[axis]) * scale_[axis], 0.0, GRID - 1.0))); };
+        auto coordinate = [&](int axis) { return spread(uint32_t(min(max((position[axis] - low_[axis]) * scale_[axis], 0.0), GRID - 1.0))); };
         return facing * CELLS + (coordinate(0) << 2 | coordinate(1) << 1 | coordinate(2));
     }
     // The side of a box that a surface shows.
