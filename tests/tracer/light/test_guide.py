@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 REFLECTED = 0.6
 RINGS = 48
 HOLE = 3
-"""Of the ball's rings of triangles, those that are left out."""
+"""The ball's rings of triangles that are left out."""
 SAMPLES = 64
 GUIDED, ALONE = (192, 128), (48, 32)
 """Pictures of enough pixels to learn from, and of too few."""
@@ -82,8 +82,8 @@ def test_a_guide_leaves_less_than_half_of_the_noise_where_light_comes_by_a_hole(
 
 def test_a_guided_picture_has_the_same_bits_for_any_number_of_threads(hollow_ball):
     scene = hollow_ball(GUIDED)
-    one, three = (render(scene, "path", SAMPLES, threads=threads)["Combined"] for threads in (1, 3))
-    assert np.array_equal(one, three)
+    single, three = (render(scene, "path", SAMPLES, threads=threads)["Combined"] for threads in (1, 3))
+    assert np.array_equal(single, three)
 
 
 def test_a_guided_picture_that_refines_before_somebodys_eyes_has_the_same_bits(hollow_ball):

@@ -55,7 +55,7 @@ class Guide {
     }
 
     const Leaf& at(Vec3 position, Vec3 normal) const { return leaves_[leaf_of_[cell(position, facing(normal))]]; }
-    // What a diffuse ray tells from whose direction comes light; pdf, mixed: the density of the lobe and that of both ways.
+    // A diffuse ray along which light has come. pdf, mixed: the density of the lobe and that of both ways.
     static LearnedRay learned(Vec3 position, Vec3 normal, Vec3 direction, double light, double pdf, double mixed) {
         double stretch;
         int bin = bin_of(to_map<double>(direction, stretch));
@@ -159,7 +159,7 @@ class Guide {
 // The guide of one point, or of four.
 template <class T> class GuideAt {
    public:
-    static constexpr double SHARE = 0.5;  // of diffuse rays follow the guide
+    static constexpr double SHARE = 0.5;  // the share of diffuse rays that follow the guide
     static constexpr int LANES = std::is_same_v<T, double> ? 1 : 4;
 
     // point(i): position and normal.
