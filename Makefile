@@ -14,13 +14,14 @@
 #   make test-zips     all zips and the libraries in them against what their platforms' loaders and Blenders' installers ask
 #   make extension     dist/virtual_pinhole-VERSION-PLATFORM.zip for artists, built by that Blender
 #   make artist-pictures  docs/images/artists anew, by a tour in that Blender's window
+#   make report-picture  docs/images/report.png anew, by a browser: Chromium
 #   make scenes        sample_scenes/*.blend anew, by Blender 4.2
 #   make charts        docs/charts anew: every method up to where it fails
 #   make bench         all benchmarks of speed and labels, some with charts in docs/charts; fails where a target is missed
 #   make bench-guard   whether the tracer has become slower than it was, as a share of bare Embree's speed; a minute or two
 #   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
 
-.PHONY: demo quick test test-fresh test-exhaustive test-sanitizers lint test-matrix test-light test-blender test-windows test-windows-smoke test-windows-suite test-arm64 test-zips extension artist-pictures scenes charts bench bench-guard clean
+.PHONY: demo quick test test-fresh test-exhaustive test-sanitizers lint test-matrix test-light test-blender test-windows test-windows-smoke test-windows-suite test-arm64 test-zips extension artist-pictures report-picture scenes charts bench bench-guard clean
 .DELETE_ON_ERROR:
 
 # bpy has wheels for these two only.
@@ -216,6 +217,12 @@ extension: .venv/extension
 artist-pictures: .venv/test
 	BLENDER=$$(.ci/find-blender) || exit 1; export BLENDER; \
 	VIEWCAM_PICTURES=docs/images .venv/bin/python -m pytest tests/real_blender/test_window.py -k tour -o faulthandler_timeout=0
+
+report-picture: .venv/test
+	@command -v chromium >/dev/null || { echo "A browser is needed: install chromium" >&2; exit 1; }
+	.venv/bin/viewcam check sample_scenes/studio.blend --size 1280x720 --report build/report
+	chromium --headless --no-sandbox --hide-scrollbars --window-size=1200,1180 --force-device-scale-factor=0.667 \
+	    --screenshot=docs/images/report.png "file://$(CURDIR)/build/report/index.html"
 
 # Blender 4.2 writes them, so that every later one opens them.
 scenes: .venvs/4.2/ready
