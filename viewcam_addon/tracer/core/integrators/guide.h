@@ -143,7 +143,7 @@ class Guide {
         add_up(of_rows, leaf.rows);
         for (int row = 0; row < SIDE; row++) {
             add_up(roots + row * SIDE, leaf.columns[row]);
-            for (int column = 0; column < SIDE; column++)  // of the chances as they are stored, by which bins are chosen
+            for (int column = 0; column < SIDE; column++)  // from the chances as they are stored, by which bins are chosen
                 leaf.density[row * SIDE + column] = float(BINS * (leaf.rows[row] - (row ? leaf.rows[row - 1] : 0.0)) * (leaf.columns[row][column] - (column ? leaf.columns[row][column - 1] : 0.0)));
         }
         return leaf;
