@@ -58,8 +58,8 @@ def off(passes, expected):
     return (picture.mean() - expected) / error, error / expected
 
 
-# Flat faces lie up to 1 − cos(π/2/RINGS), 5e-4, inside of the round ball: twice that in the areas of hole and wall, and in the squares of
-# the distances between them.
+# Flat faces lie up to 1 − cos(π/2/RINGS), 5e-4, inside of the round ball: twice that in the areas of hole and wall, and in the
+# squares of the distances between them.
 FLAT = 8 * (1 - np.cos(np.pi / 2 / RINGS))
 
 
