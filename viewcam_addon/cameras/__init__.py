@@ -292,8 +292,9 @@ def _each_of_folder(source: Source, module: ModuleType, options: Options) -> lis
 def _called(camera: Camera, file: Source, otherwise: str) -> Camera:
     """The camera by the name that its file says, if the file is called by that."""
     stated = (*(name for name, _ in own.parts(file.text)), camera.name)
-    stem = file.path.stem if file.path else None
-    return replace(camera, name=_quoted(next((name for name in stated if file_names.made_fit(name) == stem), otherwise)))
+    stem = file.path.stem if file.path else ""
+    called = (name for name in stated if re.fullmatch(rf"{re.escape(file_names.made_fit(name))}(_\d+)?", stem))
+    return replace(camera, name=_quoted(next(called, otherwise)))
 
 
 def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
