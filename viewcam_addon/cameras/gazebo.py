@@ -4,7 +4,7 @@ A sensor stands in its link, this in its model, and that in the world, each by i
 the fixed axes x, y and z, or in degrees or as a quaternion where its attributes say so. The camera looks along x, y to the left
 and z up. horizontal_fov is of the width, 1.047 unless given; the image 320 × 240. Where <lens> has intrinsics, these count.
 
-A pose relative to another link, joint, frame or model of its scope, the model or world around it, is followed there; one that is
+A pose relative to another link, joint, frame or model of its scope, the model or world around it, is followed there; one
 relative to what stands in another scope is refused. Models that are included from other files are told.
 
 Source: sdformat.org's specification of sensor, camera, pose and link; gz-sim's camera frame (x forward, z up).
