@@ -270,9 +270,9 @@ def solve_edges(
     # A step along an axis is one in the picture by V − p W, where (V, W) is its vanishing point.
     along = scaled[..., 1, :2] - scaled[..., 0, :2]
     for k, axis in enumerate(present):
-        of = axes == axis
-        towards = vanishing[..., k, None, :2] - scaled[..., of, 0, :2] * vanishing[..., k, None, 2:]
-        seen[..., k, :] *= np.where((along[..., of, :] * towards).sum(axis=(-1, -2)) < 0.0, -1.0, 1.0)[..., None]
+        is_along = axes == axis
+        towards = vanishing[..., k, None, :2] - scaled[..., is_along, 0, :2] * vanishing[..., k, None, 2:]
+        seen[..., k, :] *= np.where((along[..., is_along, :] * towards).sum(axis=(-1, -2)) < 0.0, -1.0, 1.0)[..., None]
     is_mirrored = np.linalg.det(seen) < 0.0 if len(present) == 3 else np.zeros(distance.shape, bool)
     rotation = _nearest_rotation(np.einsum("...ki,kj->...ij", seen, np.eye(3)[present]))
     directions = np.eye(3)[axes]

@@ -104,7 +104,7 @@ def carry_out(
         else:
             work = one.in_turn(folder, renderer, work_list.settings, plan.outputs)
         unknown = tuple(work_list.made_from.get("unknown", ()))
-        anew = plan.overwrite or bool(plan.resume_known and unknown)
+        overwrite = plan.overwrite or bool(plan.resume_known and unknown)
         summary = running.run(
             work_list.jobs,
             folder,
@@ -112,7 +112,7 @@ def carry_out(
             work,
             events,
             resume=plan.resume or plan.resume_known,
-            overwrite=anew,
+            overwrite=overwrite,
             outputs=plan.outputs,
             interruption=interruption,
         )

@@ -50,8 +50,8 @@ def add_of_job(added: argparse._ActionsContainer, *names: str) -> None:
     """Add the options of these fields of a job, as the fields declare them."""
     for field in _optional():
         if field.name in names:
-            how = {"action": "store_true"} if field.default is False else {"default": field.default}
-            added.add_argument(f"--{field.name.replace('_', '-')}", **how | dict(field.metadata))
+            settings = {"action": "store_true"} if field.default is False else {"default": field.default}
+            added.add_argument(f"--{field.name.replace('_', '-')}", **settings | dict(field.metadata))
 
 
 def add_scene_choices(added: argparse.ArgumentParser) -> None:

@@ -153,8 +153,8 @@ def _rig(options: argparse.Namespace) -> Rig:
     file, *names = options.distort
     if len(names) > 1:
         raise InputError(f"--distort is of a file and one camera's name, and {' '.join(names)} are more: name one or none")
-    how = dataclasses.replace(options_of(options), without_distortion=False)
-    result = calibrations.of_cameras(cameras.read(Path(file), options=how), file, *names)
+    conversion = dataclasses.replace(options_of(options), without_distortion=False)
+    result = calibrations.of_cameras(cameras.read(Path(file), options=conversion), file, *names)
     for plane in {calibration.plane for calibration in result.by_name.values()} if options.size else ():
         if options.size != (plane.width, plane.height):
             sizes = (

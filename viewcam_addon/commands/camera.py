@@ -113,14 +113,14 @@ def run(options: argparse.Namespace) -> Result:
     if options.to is None:
         say(*(_line(camera) for camera in read))
         return 0, result
-    how = Options(axes=options.out_axes, scale=options.out_scale, pixel=options.pixel)
+    conversion = Options(axes=options.out_axes, scale=options.out_scale, pixel=options.pixel)
     if options.out is None:
-        content = cameras.write(read, options.to, how)
+        content = cameras.write(read, options.to, conversion)
         if not isinstance(content, str):
             raise InputError(f"{options.to} is {len(content)} files, {', '.join([*content][:3])}: give a folder with --out")
         say(*content.removesuffix("\n").split("\n"))
         return 0, result
-    written = cameras.save(read, options.out, options.to, how)
+    written = cameras.save(read, options.out, options.to, conversion)
     count = "1 camera" if len(read) == 1 else f"{len(read)} cameras"
     say(f"{count}, as {cameras.FORMATS[options.to].TITLE}: {options.out}")
     return 0, result | {"written": [str(path) for path in written]}

@@ -365,8 +365,8 @@ def _difference(row: LightRow) -> str:
         percentile, share = noise_free.worst
         return f"{row.name} is off by {plain(share, 3)} times its tolerance at {percentile_name(percentile)}"
     place = test.worst
-    failing, of = int(test.failing.sum()), test.failing.size
-    many = f" and {failing - 1:,} more of {of:,}" if failing > 1 else ""
+    failing, total = int(test.failing.sum()), test.failing.size
+    many = f" and {failing - 1:,} more of {total:,}" if failing > 1 else ""
     channel = f" ({place.channel})" if place.channel else ""
     return (
         f"{place_text(place, test.size)}{many} {row.name}{channel} is {differs_text(test)}, "

@@ -310,7 +310,7 @@ def test_a_proof_of_each_picture_is_asked_for_by_one_box(two, stand_in, tmp_path
         comparing, "command", lambda *arguments: asked.append(plan.read(arguments[2])[1]) or stood_in(*arguments)
     )
     assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path), check=check) == {"FINISHED"}
-    assert [how.outputs.check for how in asked] == [check]
+    assert [plan_read.outputs.check for plan_read in asked] == [check]
 
 
 def test_without_a_folder_it_is_refused_and_a_child_that_dies_leaves_no_folder(two, monkeypatch, tmp_path):
