@@ -60,7 +60,7 @@ def read(source: Source, options: Options) -> list[Camera]:
 
 
 def _frames(scope: ElementTree.Element) -> _Frames:
-    """What poses inside a model or world may be relative to, by name: its own frame, and what stands there."""
+    """The frames of a model or world by their names: its own, and what stands there."""
     frames: _Frames = {each.get("name", ""): each for each in scope if each.tag in _PLACED}
     return frames | {"world" if scope.tag == "world" else "__model__": np.eye(4)}
 
