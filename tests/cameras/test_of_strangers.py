@@ -1162,7 +1162,7 @@ POSED = "cam.location = (1, 2, 3)\ncam.rotation_euler = (1, 0, 0.5)\n"
 )
 def test_what_blenders_python_leaves_open_of_a_camera_is_refused(more, sentence):
     seen = Options(view_plane=CAMERAS["plain"].plane)
-    (camera,) = cameras.read(POSED, options=seen)
+    (camera,) = cameras.read(POSED.replace("\n", f"  # {'far ' * 50}\n"), options=seen)
     assert camera.pinhole.eye == (1, 2, 3) and any("in Blender's own, XYZ" in note for note in camera.notes)
     with pytest.raises(InputError, match=sentence):
         cameras.read(POSED + more, options=seen)
@@ -1214,3 +1214,41 @@ def test_gltf_without_its_asset_is_no_sensor_of_mitsubas():
     del document["asset"]
     (camera,) = cameras.read(json.dumps(document))
     assert camera.name == "a" and camera.pinhole == CAMERAS["plain"]
+
+
+def test_a_damaged_document_is_told_of_wherever_it_stands(tmp_path):
+    """A folder, or XML without its declaration, was no camera that is understood, and why was not said."""
+    document = json.dumps(files.nerfies(files.Known("plain")))
+    for name, text, words in (
+        ("camera/a.json", document.replace("[", "[,", 1), "a.json looks like JSON and is none (line 1, column "),
+        ("a.sdf", "<sdf><model>\n<link></model></sdf>", "a.sdf looks like XML and is none (line 2, column 9: mismatched tag)"),
+        ("a.xml", "<?xml version='1.0'?><document>", "a.xml looks like XML and is none (line 1, column 32: no element found)"),
+    ):
+        file = tmp_path / name
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(text)
+        with pytest.raises(InputError) as refused:
+            cameras.read(file.parent if name.startswith("camera/") else file)
+        assert words in str(refused.value), f"{words!r} is not in {refused.value}"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "sentence"),
+    [
+        ("-3.861448e+02", "\N{MINUS SIGN}3.861448e+02", "^P1 of .* is '.*': give a number"),
+        ("-3.861448e+02 ", "", "^P1 of .* has 11 numbers: it should have 12"),
+        ("-3.861448e+02", "nan", "^P1 of .* is nan"),
+        ("P1:", "P0:", "^P0 of .* is there twice"),
+    ],
+)
+def test_a_damaged_camera_of_kittis_is_told_and_not_left_out(before, after, sentence):
+    assert before in files.KITTI and len(cameras.read("  " + files.KITTI, options=VGA)) == 3
+    with pytest.raises(InputError, match=sentence):
+        cameras.read(files.KITTI.replace(before, after), options=VGA)
+
+
+def test_a_damaged_matrix_of_neus_is_told_and_not_left_out(tmp_path):
+    matrix = np.vstack([files.projection(files.Known("plain")), [0, 0, 0, 1]])
+    np.savez(tmp_path / "cameras.npz", world_mat_0=matrix, world_mat_1=matrix * np.nan)
+    with pytest.raises(InputError, match="projection matrix of camera 1 is flat"):
+        cameras.read(tmp_path / "cameras.npz", options=VGA)

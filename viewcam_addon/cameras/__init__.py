@@ -42,6 +42,7 @@ stand first, and what takes any text last.
 """
 
 import contextlib
+import itertools
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -199,9 +200,9 @@ FORMATS: dict[str, ModuleType] = {
 _LONGEST = 1000  # characters of a name or a sentence
 _YAML = (".yaml", ".yml")
 _JSON = (".json", ".gltf", ".sfm")
-_CODE = ("blender_python", "vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
+_CODE = ("text", "blender_python", "vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
 """The formats that a damaged JSON file may look like."""
-_NO_JSON = "{} looks like JSON and is none ({}): correct it"
+_MOST_LOOKED_AT = 100
 _REMEMBERED = re.compile(rf"{own.KEY}: (axes=\w+ scale=[\d.e+-]+)")
 
 
@@ -371,8 +372,9 @@ def recognized(source: str | Path | Source) -> str:
         raise InputError(f"{source.name} {_PACKED}")
     if not source.is_folder and not source.data.strip():
         raise InputError(f"{source.name} is empty: export it again")
-    if source.json_problem:
-        raise InputError(_NO_JSON.format(source.name, source.json_problem))
+    for file in (source, *itertools.islice(source.files("*.[jx]*[nlp]"), _MOST_LOOKED_AT)):
+        if file.problem:
+            raise InputError(f"{file.name} {file.problem}")
     if source.path is None:
         place = checks.quoted(source.text.strip()[:40])
         raise InputError(

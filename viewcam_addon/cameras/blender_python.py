@@ -59,8 +59,8 @@ _VALUE = re.compile(r"(?:mathutils\s*\.\s*)?(?:Euler|Quaternion)\s*(?=\()")
 _PRINTED = re.compile(r"<(Vector|Euler|Quaternion) \(([^()\n]{0,200})\)(?:, order=('[XYZ]{3}'))?>")
 _SHOWN = re.compile(r"rotation_euler['\"]?[ \t]*[:\n]\s*(?:mathutils\.)?Euler\(\([^()]{0,200}\), '(\w{0,20})'\)")
 _COMMENT = r"#[^\n]*"
-_BEGINNING = re.compile(r"(?:\A|\n|;[ \t]*)\Z")
-_COMMA, _END = re.compile(r"[ \t]*,[ \t]*(?=[-+.\w(])"), re.compile(r"[ \t]*(?:[\n;,}\])]|\Z)")
+_BEGINNING = re.compile(r"(?:\A|\n|;[ \t]{0,8})\Z")
+_COMMA, _END = re.compile(r"(?<![ \t])[ \t]*,[ \t]*(?=[-+.\w(])"), re.compile(r"(?<![ \t])[ \t]*(?:[\n;,}\])]|\Z)")
 
 
 def recognizes(source: Source) -> bool:

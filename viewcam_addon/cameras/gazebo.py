@@ -70,7 +70,7 @@ def _inside(
 ) -> Iterator[tuple[ElementTree.Element, ElementTree.Element, np.ndarray]]:
     """Each sensor, each of its cameras, and its matrix in the world.
 
-    frames : those of the model or world around.
+    frames : the frames of the model or world around.
     around : (4, 4), the matrix of this in the world.
     held : (4, 4), the holder's matrix in this.
     """
@@ -90,7 +90,7 @@ def _inside(
 def _in_scope(element: ElementTree.Element, frames: _Frames, held: np.ndarray) -> np.ndarray:
     """(4, 4) of an element in the model or world around it.
 
-    frames : those of this; what is followed becomes its matrix.
+    frames : the frames of this, of which those that are followed become matrices.
     held : the matrix of what holds the element, to which its pose is relative unless it says otherwise.
     """
     pose = element.find("pose")

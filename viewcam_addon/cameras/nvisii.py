@@ -27,7 +27,7 @@ SUFFIX = ".json"
 SEVERAL = "a folder"
 
 _LAST = [0.0, 0.0, 0.0, 1.0]
-_CLOSE = 1e-3  # of numbers with five decimals, as some of these programs round them, with room for a distance's
+_CLOSE = 1e-3  # some of these programs write five decimals
 _TAKEN = "Nothing says which way the camera looks along its z: it was taken as NVISII's, y up, z away from the view"
 
 
@@ -67,7 +67,7 @@ def _check_again(data: Record, pose: np.ndarray, forward: float) -> None:
     """Refuse a pose that contradicts the matrix.
 
     pose : (3, 4) or (4, 4), camera to world of the matrix, as `axes.camera_to_world` has it.
-    forward : as `_forward` has it.
+    forward : the sign of the view along z, as `_forward` has it.
     """
     turn, eye = pose[:3, :3] * [1.0, -forward, -forward], pose[:3, 3]
     turns, eyes = {}, {}
