@@ -161,7 +161,7 @@ def _rig(options: argparse.Namespace) -> Rig:
                 f"{options.size[0]} × {options.size[1]} and the camera of --distort has {plane.width} × {plane.height} pixels"
             )
             raise InputError(f"--size is {sizes}: leave --size out, or give the camera of such pictures")
-    fit = {shot_names.made_fit(name): calibration for name, calibration in result.by_name.items()}
+    fit = dict(zip(shot_names.distinct(result.by_name), result.by_name.values(), strict=True))
     return dataclasses.replace(result, by_name=fit | dict(result.by_name))
 
 
