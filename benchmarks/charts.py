@@ -437,6 +437,6 @@ def redraw(earlier: dict[str, Any], folder: Path) -> tuple[int, dict[str, Any]]:
 
 def beside(earlier: dict[str, Any], measured: dict[str, Any]) -> tuple[int, dict[str, Any]]:
     """The figures of a run of some sweeps, with those that an earlier run had of the others, as `run_all` tells them."""
-    anew = tuple(f"{each['title']}: " for each in measured["charts"].values())
-    behind = [sentence for sentence in earlier["behind"] if not sentence.startswith(anew)] + measured["behind"]
+    replaced = tuple(f"{each['title']}: " for each in measured["charts"].values())
+    behind = [sentence for sentence in earlier["behind"] if not sentence.startswith(replaced)] + measured["behind"]
     return (1 if behind else 0), {"behind": behind, "charts": earlier["charts"] | measured["charts"]}

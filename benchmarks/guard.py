@@ -158,7 +158,7 @@ def _adaptive() -> float:
 
     converged = light(_CONVERGED, 1)
     few, many, adaptive = (
-        math.log(np.square(light(*how) - converged).mean()) for how in ((_FEW, 0), (_MANY, 0), (_MOST, 0, _ERROR))
+        math.log(np.square(light(*effort) - converged).mean()) for effort in ((_FEW, 0), (_MANY, 0), (_MOST, 0, _ERROR))
     )
     worth = _FEW * (_MANY / _FEW) ** ((few - adaptive) / (few - many))
     return worth / _SAMPLES * _share(Yardstick(scene).of_light(_SAMPLES), lambda: light(_MOST, 0, _ERROR))

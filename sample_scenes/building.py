@@ -133,10 +133,10 @@ def kit(name: str):
     return new
 
 
-def instance(name: str, of, location=(0, 0, 0), rotation=(0, 0, 0)):
+def instance(name: str, kit, location=(0, 0, 0), rotation=(0, 0, 0)):
     """All objects of a kit once more, by an empty that stands for them."""
     obj = place(name, None, location=location, rotation=rotation)
-    obj.instance_type, obj.instance_collection = "COLLECTION", of
+    obj.instance_type, obj.instance_collection = "COLLECTION", kit
     return obj
 
 

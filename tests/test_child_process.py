@@ -151,8 +151,8 @@ def test_a_bug_is_one_sentence_and_the_process_goes_on(echo):
 
 
 def test_a_process_that_was_killed_is_gone_and_says_how(echo):
-    how = f"status {signal.SIGTERM:d}" if sys.platform == "win32" else f"signal {signal.SIGKILL:d}"
-    with pytest.raises(ProcessEnded, match=f"the echo has ended with {how}"):
+    cause = f"status {signal.SIGTERM:d}" if sys.platform == "win32" else f"signal {signal.SIGKILL:d}"
+    with pytest.raises(ProcessEnded, match=f"the echo has ended with {cause}"):
         echo.ask({"die": True})
     with pytest.raises(ProcessEnded, match="the echo has ended"):
         echo.ask({})

@@ -28,8 +28,8 @@ def run(tmp_path):
         variables = child_process.environment()
         variables["PYTHONPATH"] = os.pathsep.join([str(tmp_path), variables["PYTHONPATH"]])
         variables.pop("VIEWCAM_BLENDER", None)
-        how = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": tmp_path, "env": variables}
-        return subprocess.Popen(child_process.viewcam(*words), start_new_session=True, preexec_fn=heeds_ctrl_c, **how)
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": tmp_path, "env": variables}
+        return subprocess.Popen(child_process.viewcam(*words), start_new_session=True, preexec_fn=heeds_ctrl_c, **options)
 
     # A shell lets what it starts in the background ignore Ctrl-C, and all that these tests start would, too.
     def heeds_ctrl_c():

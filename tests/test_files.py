@@ -172,7 +172,7 @@ def test_what_can_not_be_written_is_known_before_there_is_anything_to_write(tmp_
     if kind == "disk":  # to make a real one takes root
         disk = os.stat_result((stat.S_IFBLK | 0o660, *os.stat(tmp_path)[1:]))
         real = os.stat
-        monkeypatch.setattr(os, "stat", lambda path, **how: disk if Path(path) == target else real(path, **how))
+        monkeypatch.setattr(os, "stat", lambda path, **options: disk if Path(path) == target else real(path, **options))
     with pytest.raises(InputError, match=r"is a folder|can't be written|is a disk"):
         check_writable(target)
 

@@ -302,9 +302,9 @@ def test_what_is_stated_is_asked_for_whatever_zoom_and_resolution(distance, zoom
 @given(distances, keeps, value_frames, value_frames, value_fits)
 def test_counting_the_distance_anew_changes_no_camera(distance, keeps, earlier, frame, fit):
     values = replace(VALUES, distance=distance, keeps=keeps, counted_in=without_border(earlier))
-    anew = values.counted_anew(frame, fit)
-    before, after = (each.distance_at_full_size(frame, fit) for each in (values, anew))
-    assert after == before and anew.counted_in == without_border(frame)
+    counted = values.counted_anew(frame, fit)
+    before, after = (each.distance_at_full_size(frame, fit) for each in (values, counted))
+    assert after == before and counted.counted_in == without_border(frame)
 
 
 @given(value_frames, value_frames, value_fits)

@@ -1,13 +1,13 @@
 """The functions of `import viewcam_addon as vp`: a camera, a picture traced of a scene, and what two pictures differ by.
 
 Everything here takes what is in memory or the path of a file, and gives what is in memory; the command line is made of the same
-functions. Nothing here needs Blender. Where Blender is a module of this process,
-no picture may be read from a file in it or written (image.py says why): those in memory may be compared.
+functions. Nothing here needs Blender. Where Blender is a module of this process, no picture may be read from a file in it or
+written (image.py says why): those in memory may be compared.
 """
 
 import functools
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -141,76 +141,94 @@ def compare(
     Raises InputError if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, no
     pixel of either picture shows an object, or nearly all pixels with light had to be taken out.
     """
-    from .comparison import geometry, radiance, renderers
-    from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
-    from .comparison.coincident import CoincidentLight
+    from .comparison import geometry, radiance
     from .comparison.everything import not_modeled
     from .comparison.light_verdict import FALSE_ALARMS
-    from .comparison.sides import samples_of, seed_of
-    from .comparison.tolerances import ROUNDINGS
+    from .comparison.renderers import CYCLES
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
     if files := [each for each in (reference, *several) if not isinstance(each, Image)]:
         images.check_same_frames(files)
-    of = reference if isinstance(reference, Image) else images.read(reference)
+    traced, *pictures = (each if isinstance(each, Image) else images.read(each) for each in (reference, *several))
     whole = everything if everything is None or isinstance(everything, Image) else images.read(everything)
-    pictures = [each if isinstance(each, Image) else images.read(each) for each in several]
     scene = scene if scene is None or isinstance(scene, Scene) else read_scene(scene)
-    camera = of.camera or (scene.camera if scene else None)
+    camera = traced.camera or (scene.camera if scene else None)
     if camera is None:
-        raise InputError(f"{of.source} does not tell its camera: give its scene with --scene, or trace it with viewcam render")
+        raise InputError(
+            f"{traced.source} does not tell its camera: give its scene with --scene, or trace it with viewcam render"
+        )
     # The picture may be of another size than the scene says, or of the stated camera.
     framed = scene and replace(scene, camera=camera)
     stated = scene.stated_camera if scene and camera == scene.camera else None
-    if radiance.carries_light(of):
+    comparison: GeometryComparison | RadianceComparison
+    if radiance.carries_light(traced):
         alarms = false_alarms or FALSE_ALARMS
         if framed is None:
-            return radiance.compare(of, pictures, camera, test_samples, false_alarms=alarms)
-        if not framed.bounces.parts_diffuse:  # a picture of another renderer may have the pass all the same
-            kept = ({name: passes for name, passes in each.passes.items() if name != "Diffuse Indirect"} for each in pictures)
-            pictures = [replace(each, passes=passes) for each, passes in zip(pictures, kept, strict=True)]
+            return radiance.compare(traced, pictures, camera, test_samples, false_alarms=alarms)
         makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(framed, threads))
-        level, samples, seed = of.attributes.get("level", "path"), samples_of(of) or 0, seed_of(of)
-
-        def coincident() -> CoincidentLight:
-            spent = (level, SAMPLES_OF_COINCIDENT, seed + _OTHER_SEEDS)
-            light, pairs, seen_otherwise = makes_tracer().coincident_light(*spent, ROUNDINGS[-1])
-            total = makes_tracer().render_light(*spent)["Combined"][..., :3]
-            return CoincidentLight(Image(light), total, pairs, seen_otherwise)
-
-        def anew() -> list[Image]:
-            others = (seed + _OTHER_SEEDS + 1 + number for number in range(radiance.SEEDS))
-            return [Image(makes_tracer().render_light(level, samples, other), camera, of.attributes) for other in others]
-
-        trace_anew = anew if 0 < samples <= MOST_SAMPLES and "Sample Count" not in of.passes else None
-        lit = radiance.compare(of, pictures, camera, test_samples, coincident, trace_anew, alarms)
-        lit = replace(lit, stated=stated)
-        _check_not_empty(lit, may_be_empty)
-        names = tuple(dict.fromkeys((*framed.not_modeled, *lit.taken_out.names)))
-        if not names:
-            return lit
-        surfaces = makes_tracer().pixels_of(framed.not_modeled)
-        surfaces |= {name: surfaces.get(name, False) | lit.taken_out.pixels for name in lit.taken_out.names}
-        parts = not_modeled(names, surfaces, of, pictures, whole, camera)
-        one_place, otherwise = (
-            [name for name in group if name not in framed.not_modeled]
-            for group in (lit.taken_out.in_one_place, lit.taken_out.seen_otherwise)
-        )
-        return replace(lit, not_modeled=parts.sorted_by(one_place, otherwise))
-    if len(pictures) != 1:
-        raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
-    by = renderer or renderers.CYCLES
-    if framed is None:
-        comparison = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
+        comparison = _compare_light(traced, pictures, framed, makes_tracer, whole, test_samples, alarms)
+        comparison = replace(comparison, stated=stated)
+    elif len(pictures) != 1:
+        raise InputError(f"{traced.source} has no noise that several pictures could tell: compare it with one")
+    elif framed is None:
+        comparison = geometry.compare(traced, pictures[0], camera, renderer=renderer or CYCLES, partial=partial)
     else:
-        tracer = (keeper or tracing.Keeper()).tracer(framed, threads)
-        comparison = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, framed.origin, by, partial)
-        names = framed.not_modeled
-        comparison = replace(comparison, not_modeled=not_modeled(names, tracer.pixels_of(names), of, pictures, whole))
-    _check_not_empty(comparison, may_be_empty)
+        tracer, by, names = (keeper or tracing.Keeper()).tracer(framed, threads), renderer or CYCLES, framed.not_modeled
+        comparison = geometry.compare(traced, pictures[0], camera, tracer.surfaces_at, stated, framed.origin, by, partial)
+        comparison = replace(comparison, not_modeled=not_modeled(names, tracer.pixels_of(names), traced, pictures, whole))
+    if comparison.is_empty and not may_be_empty:
+        raise InputError(comparison.sentence)
     return comparison
 
 
-def _check_not_empty(comparison: "GeometryComparison | RadianceComparison", may_be_empty: bool) -> None:
-    if comparison.is_empty and not may_be_empty:
-        raise InputError(comparison.sentence)
+def _compare_light(
+    traced: Image,
+    pictures: Sequence[Image],
+    scene: Scene,
+    makes_tracer: Callable[[], tracing.Tracer],
+    whole: Image | None,
+    test_samples: int | None,
+    false_alarms: float,
+) -> "RadianceComparison":
+    """The comparison of pictures of a known scene's light: what has no one answer there is traced again and taken out.
+
+    traced : the tracer's picture.
+    scene : the scene that it shows, through its camera.
+    makes_tracer : called where rays are sent, which a comparison without a doubtful pixel does not.
+    whole : see `everything` of `compare`.
+    """
+    from .comparison import radiance
+    from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
+    from .comparison.coincident import CoincidentLight
+    from .comparison.everything import not_modeled
+    from .comparison.sides import samples_of, seed_of
+    from .comparison.tolerances import ROUNDINGS
+
+    if not scene.bounces.parts_diffuse:  # a picture of another renderer may have the pass all the same
+        kept = ({name: passes for name, passes in each.passes.items() if name != "Diffuse Indirect"} for each in pictures)
+        pictures = [replace(each, passes=passes) for each, passes in zip(pictures, kept, strict=True)]
+    level, samples, seed = traced.attributes.get("level", "path"), samples_of(traced) or 0, seed_of(traced)
+
+    def coincident() -> CoincidentLight:
+        spent = (level, SAMPLES_OF_COINCIDENT, seed + _OTHER_SEEDS)
+        light, pairs, seen_otherwise = makes_tracer().coincident_light(*spent, ROUNDINGS[-1])
+        total = makes_tracer().render_light(*spent)["Combined"][..., :3]
+        return CoincidentLight(Image(light), total, pairs, seen_otherwise)
+
+    def anew() -> list[Image]:
+        others = (seed + _OTHER_SEEDS + 1 + number for number in range(radiance.SEEDS))
+        return [Image(makes_tracer().render_light(level, samples, other), scene.camera, traced.attributes) for other in others]
+
+    trace_anew = anew if 0 < samples <= MOST_SAMPLES and "Sample Count" not in traced.passes else None
+    lit = radiance.compare(traced, pictures, scene.camera, test_samples, coincident, trace_anew, false_alarms)
+    names = tuple(dict.fromkeys((*scene.not_modeled, *lit.taken_out.names)))
+    if not names:
+        return lit
+    surfaces = makes_tracer().pixels_of(scene.not_modeled)
+    surfaces |= {name: surfaces.get(name, False) | lit.taken_out.pixels for name in lit.taken_out.names}
+    parts = not_modeled(names, surfaces, traced, pictures, whole, scene.camera)
+    one_place, otherwise = (
+        [name for name in group if name not in scene.not_modeled]
+        for group in (lit.taken_out.in_one_place, lit.taken_out.seen_otherwise)
+    )
+    return replace(lit, not_modeled=parts.sorted_by(one_place, otherwise))

@@ -1,11 +1,13 @@
 """The names that shots and their files may have, on Linux, Windows and macOS alike; and files of cameras.
 
 A batch may be listed on one system and rendered on another, so the rules of all three hold everywhere. Rejected: replacing
-what is not allowed in a shot's name (two could become one file, and nobody finds the picture by the name that he gave).
+what is not allowed in a shot's name in a list (nobody finds the picture by the name that he gave).
 """
 
 import re
 import unicodedata
+from collections import Counter
+from collections.abc import Iterable
 
 from . import checks
 from .errors import InputError
@@ -48,6 +50,20 @@ def made_fit(name: str) -> str:
     fit = "".join(letters).strip().rstrip(".") or _UNFIT
     fit = fit.encode()[: LONGEST // 2].decode(errors="ignore").strip().rstrip(".")
     return f"{_UNFIT}{fit}" if _problem(fit) else fit
+
+
+def distinct(names: Iterable[str]) -> list[str]:
+    """The names made fit, each for a file of its own: what would be one with another before it has a number, as in left_2."""
+    taken: Counter[str] = Counter()
+    result = []
+    for name in names:
+        fit = unique = made_fit(name)
+        while one_file(unique) in taken:
+            taken[one_file(fit)] += 1
+            unique = f"{fit}_{taken[one_file(fit)]}"
+        taken[one_file(unique)] += 1
+        result.append(unique)
+    return result
 
 
 def one_file(name: str) -> str:

@@ -39,8 +39,8 @@ def filled(template: str, macro: str = "", **values: Any) -> "Markup":
         raise InputError(sentence)
     from markupsafe import Markup
 
-    of = _environment().get_template(template)
-    return getattr(of.module, macro)(**values) if macro else Markup(of.render(values))
+    loaded = _environment().get_template(template)
+    return getattr(loaded.module, macro)(**values) if macro else Markup(loaded.render(values))
 
 
 @functools.cache

@@ -328,10 +328,10 @@ def _plain(value: Any) -> Any:
         return str(value)[:100]
 
 
-def _text(of: Callable[[], Any]) -> str:
+def _text(read: Callable[[], Any]) -> str:
     """A text of the file, which may be none in any encoding."""
     try:
-        value = of()
+        value = read()
     except Exception:
         return ""
     return value if isinstance(value, str) else ""

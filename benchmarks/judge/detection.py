@@ -68,7 +68,7 @@ def drawn(blocks: Iterable[Judged]) -> tuple[Chart, ...]:
     of_faults = (itertools.chain(*record) for record in zip(*filter(None, bad), strict=True))
     actual = dict(zip(FAULTS, map(_by_judge, of_faults), strict=True))
     return tuple(
-        _chart(family, {fault: of for fault, of in actual.items() if family in ("all", fault.family)}, clean)
+        _chart(family, {fault: errors for fault, errors in actual.items() if family in ("all", fault.family)}, clean)
         for family in ("all", *FAMILIES)
     )
 
@@ -100,7 +100,7 @@ def _chart(family: str, errors_by_fault: dict[Fault, dict[str, np.ndarray]], cle
         at_own_threshold.append(f"{judge} {np.mean(of_faults > 1):.1%} at {np.mean(record > 1):.2%}")
     share = together(clean[rivals.OURS])
     beside = f" Where a pair is in ours' highest hundredth, so are {share:.1%} of those that share a side."
-    trials, seen = ([len(of[judge]) for of in (*errors_by_fault.values(), clean)] for judge in (rivals.OURS, "FLIP"))
+    trials, seen = ([len(errors[judge]) for errors in (*errors_by_fault.values(), clean)] for judge in (rivals.OURS, "FLIP"))
     return Chart(
         family,
         {"all": "All faults", "camera": "The camera", "geometry": "What stands in the scene", "light": "Light"}.get(

@@ -457,34 +457,34 @@ def other_scene(posed_camera):
     return add
 
 
-def hidden_in(collected, how):
-    if how == "excluded":
+def hidden_in(collected, state):
+    if state == "excluded":
         collected.exclude = True
-    elif how == "disabled":
+    elif state == "disabled":
         collected.collection.hide_viewport = True
-    elif how == "hidden":
+    elif state == "hidden":
         collected.hide_viewport = True
     else:
         collected.collection.hide_render = True
 
 
-@pytest.mark.parametrize("how", ["excluded", "disabled", "hidden", "not rendered"])
-def test_the_scenes_camera_sticks_whatever_becomes_of_its_collection(posed_camera, collected, odd, how):
-    hidden_in(collected, how)
+@pytest.mark.parametrize("state", ["excluded", "disabled", "hidden", "not rendered"])
+def test_the_scenes_camera_sticks_whatever_becomes_of_its_collection(posed_camera, collected, odd, state):
+    hidden_in(collected, state)
     odd.check(posed_camera)
 
 
-@pytest.mark.parametrize("how", ["excluded", "disabled"])
-def test_another_camera_in_an_excluded_or_disabled_collection_takes_no_part(posed_camera, collected, add_camera, odd, how):
+@pytest.mark.parametrize("state", ["excluded", "disabled"])
+def test_another_camera_in_an_excluded_or_disabled_collection_takes_no_part(posed_camera, collected, add_camera, odd, state):
     add_camera("Other")
-    hidden_in(collected, how)
+    hidden_in(collected, state)
     odd.check(posed_camera)
 
 
-@pytest.mark.parametrize("how", ["hidden", "not rendered"])
-def test_another_camera_in_a_hidden_collection_sticks(posed_camera, collected, add_camera, odd, how):
+@pytest.mark.parametrize("state", ["hidden", "not rendered"])
+def test_another_camera_in_a_hidden_collection_sticks(posed_camera, collected, add_camera, odd, state):
     add_camera("Other")
-    hidden_in(collected, how)
+    hidden_in(collected, state)
     odd.check(posed_camera)
 
 
@@ -497,11 +497,11 @@ def test_a_camera_that_takes_no_part_stands_right_as_soon_as_it_does(posed_camer
     assert cameras.check(posed_camera, cameras.stated(posed_camera, scene), scene) == []
 
 
-@pytest.mark.parametrize("how", ["in the view layer", "in viewports", "in renders"])
-def test_a_hidden_camera_that_is_the_scenes_sticks(posed_camera, odd, how):
-    if how == "in the view layer":
+@pytest.mark.parametrize("hidden", ["in the view layer", "in viewports", "in renders"])
+def test_a_hidden_camera_that_is_the_scenes_sticks(posed_camera, odd, hidden):
+    if hidden == "in the view layer":
         posed_camera.hide_set(True)
-    elif how == "in viewports":
+    elif hidden == "in viewports":
         posed_camera.hide_viewport = True
     else:
         posed_camera.hide_render = True
@@ -1095,18 +1095,18 @@ def aimed_camera(posed_camera, empty):
 def carried_over(tmp_path):
     """A function that saves the file, opens an empty one and brings objects over: by "copy", "append" or "link"; the camera."""
 
-    def carry(how, *names):
+    def carry(way, *names):
         path = str(tmp_path / "other.blend")
-        if how == "copy":
+        if way == "copy":
             pick(*names)
             bpy.ops.view3d.copybuffer()
         bpy.ops.wm.save_as_mainfile(filepath=path)
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        if how == "copy":
+        if way == "copy":
             bpy.ops.view3d.pastebuffer()
         else:
             directory = f"{path}/Object/"
-            bring = bpy.ops.wm.append if how == "append" else bpy.ops.wm.link
+            bring = bpy.ops.wm.append if way == "append" else bpy.ops.wm.link
             bring(directory=directory, files=[{"name": name} for name in names])
         bpy.context.scene.camera = bpy.data.objects["Camera"]
         bpy.context.view_layer.update()
@@ -1168,16 +1168,16 @@ def test_duplicated_along_with_its_target_it_looks_at_the_new_one(aimed_camera, 
     odd.check(twin)
 
 
-@pytest.mark.parametrize("how", ["copy", "append"])
-def test_a_camera_that_is_copied_or_appended_brings_its_values_along(posed_camera, carried_over, odd, how):
-    camera_object = carried_over(how, "Camera")
+@pytest.mark.parametrize("way", ["copy", "append"])
+def test_a_camera_that_is_copied_or_appended_brings_its_values_along(posed_camera, carried_over, odd, way):
+    camera_object = carried_over(way, "Camera")
     assert camera_object.virtual_pinhole.numbers() == ((7, -6, 5), (0, 0, 1), (0, 0, 1), 1500)
     odd.check(camera_object)
 
 
-@pytest.mark.parametrize("how", ["copy", "append"])
-def test_a_camera_that_is_copied_or_appended_brings_its_target_along(aimed_camera, carried_over, odd, how):
-    camera_object = carried_over(how, "Camera")
+@pytest.mark.parametrize("way", ["copy", "append"])
+def test_a_camera_that_is_copied_or_appended_brings_its_target_along(aimed_camera, carried_over, odd, way):
+    camera_object = carried_over(way, "Camera")
     move("Target", (1, 1, 1))
     assert camera_object.virtual_pinhole.numbers()[1] == (1, 1, 1)
     odd.check(camera_object)

@@ -283,7 +283,7 @@ def test_trusted_it_does_so_that_the_test_above_can_fail(fresh_blender, temporar
 @pytest.mark.parametrize("way", FLUIDS, ids=lambda way: way.__name__)
 @pytest.mark.parametrize("trust", [False, True])
 def test_no_fluid_is_simulated_into_a_folder_of_the_files_choice(tmp_path, way, trust):
-    how = {
+    options = {
         "env": child_process.environment(apart_from=bpy.utils.system_resource("SCRIPTS")),
         "capture_output": True,
         "text": True,
@@ -291,8 +291,8 @@ def test_no_fluid_is_simulated_into_a_folder_of_the_files_choice(tmp_path, way, 
     program = [sys.executable, __file__]
     if bpy.app.binary_path:
         program = [bpy.app.binary_path, "-b", "--factory-startup", "--python-use-system-env", "--python", __file__, "--"]
-    subprocess.run([*program, str(tmp_path), way.__name__], check=True, **how)
-    child = subprocess.run([*program, str(tmp_path), "trusted" if trust else "untrusted"], check=False, **how)
+    subprocess.run([*program, str(tmp_path), way.__name__], check=True, **options)
+    child = subprocess.run([*program, str(tmp_path), "trusted" if trust else "untrusted"], check=False, **options)
     left = [str(path.relative_to(tmp_path)) for path in (tmp_path / "hostile" / "marks").rglob("*")]
     if trust:
         assert left, f"the other test could not fail: {child.stderr}"
@@ -340,9 +340,9 @@ os._exit(0)
 def test_smoke_that_is_off_is_told_and_makes_amber_what_blender_may_show(tmp_path, cache, words, reason, answer):
     """Blender ended with SIGABRT as it evaluated a cache that is missing, and Cycles with SIGSEGV as it asked for the smoke."""
     environment = child_process.environment(apart_from=bpy.utils.system_resource("SCRIPTS"))
-    blend, how = tmp_path / "smoke.blend", {"env": environment, "capture_output": True, "text": True}
-    subprocess.run([sys.executable, "-c", SMOKE, cache, str(blend)], check=True, **how)
-    child = subprocess.run([*child_process.viewcam("check"), str(blend), "--size", "48x27", *words], check=False, **how)
+    blend, options = tmp_path / "smoke.blend", {"env": environment, "capture_output": True, "text": True}
+    subprocess.run([sys.executable, "-c", SMOKE, cache, str(blend)], check=True, **options)
+    child = subprocess.run([*child_process.viewcam("check"), str(blend), "--size", "48x27", *words], check=False, **options)
     assert child.returncode == 0, child.stderr
     assert f"the modifier 'Fluid' of 'Cube.001' is off: {reason}" in child.stdout, child.stdout
     assert child.stdout.splitlines()[-1].startswith(answer), child.stdout

@@ -42,6 +42,9 @@ SCRIPTS = {
     + "obj.rotation_mode = 'AXIS_ANGLE'\nobj.rotation_axis_angle = (1.2, 2, 0, 1)\nobj.location = (0, -5, 1)",
     "shifted and stretched": NEW + SIZE + "obj.location = (0, -9, 1)\nobj.rotation_euler = (1.5, 0, 0)\ndata.shift_x = 0.1\n"
     "data.shift_y = -0.2\ndata.sensor_width = 24\nscene.render.pixel_aspect_y = 2\nscene.render.resolution_percentage = 50",
+    "without brackets": NEW
+    + SIZE
+    + "place = 7.36, -6.93, 4.96\nobj.location = place\nobj.rotation_euler[:] = 1.109, 0.1, 0.815\ndata.lens = 35",
     "something else, too": NEW + SIZE + "cube = bpy.data.objects.new('Cube', None)\ncube.location = (9, 9, 9)\n"
     "obj.location = (1, 2, 3)\nobj.rotation_euler = (1, 0, 0)  # down\ncube.rotation_euler = (2, 2, 2)",
 }

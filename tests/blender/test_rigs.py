@@ -323,8 +323,8 @@ def test_an_animated_camera_that_blender_imports_is_followed(camera_object, scen
     for each in scene.objects:
         each.select_set(each == camera_object)
 
-    def matrices(of):
-        return np.array([(scene.frame_set(frame), np.array(of.matrix_world))[1] for frame in frames])
+    def matrices(followed):
+        return np.array([(scene.frame_set(frame), np.array(followed.matrix_world))[1] for frame in frames])
 
     before = matrices(camera_object)
     addon_utils.enable("io_scene_fbx")

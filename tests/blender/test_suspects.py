@@ -45,12 +45,12 @@ def test_a_constraint_is_named(posed_camera, scene):
     assert finding.startswith("The constraint 'Watch the target' moves 'Camera', the view is turned by ")
 
 
-@pytest.mark.parametrize("how", ["muted", "no influence", "no effect"])
-def test_a_constraint_that_does_nothing_is_not_accused(posed_camera, scene, how):
-    constraint = posed_camera.constraints.new("LIMIT_LOCATION" if how == "no effect" else "TRACK_TO")
-    if how != "no effect":
+@pytest.mark.parametrize("state", ["muted", "no influence", "no effect"])
+def test_a_constraint_that_does_nothing_is_not_accused(posed_camera, scene, state):
+    constraint = posed_camera.constraints.new("LIMIT_LOCATION" if state == "no effect" else "TRACK_TO")
+    if state != "no effect":
         constraint.target = add_empty(scene, "Target", (5, 5, 5))
-    constraint.mute, constraint.influence = how == "muted", 0 if how == "no influence" else 1
+    constraint.mute, constraint.influence = state == "muted", 0 if state == "no influence" else 1
     assert findings_after_setting(posed_camera, scene) == []
 
 

@@ -1037,10 +1037,13 @@ def test_a_camera_that_no_file_can_be_called_by_is_read_again_by_its_name(tmp_pa
     assert back == {"front", name or ("_" if form == "ros" else "#1")}, f"{back} of {[file.name for file in files]}"
 
 
-@pytest.mark.parametrize("form", ["opencv", "sidecar"])
-def test_cameras_whose_files_would_be_one_are_refused_by_their_names(form):
-    with pytest.raises(InputError, match=r"^'a/b', 'A_b' would be one file for several cameras"):
-        cameras.write([Camera(name, CAMERAS["plain"]) for name in ("a/b", "A_b")], form)
+@pytest.mark.parametrize("form", ["opencv", "ros", "sidecar"])
+def test_cameras_whose_files_would_be_one_have_files_with_numbers_and_their_own_names(form, tmp_path):
+    """Both were refused, and who has a model of somebody else can't rename its pictures."""
+    names = ["a/b", "A_b", "a_b_2", "a:b"]
+    files = cameras.save([Camera(name, CAMERAS["plain"]) for name in names], tmp_path, form)
+    assert [file.stem for file in files] == ["a_b", "A_b_2", "a_b_2_2", "a_b_3"]
+    assert sorted(camera.name for camera in cameras.read(tmp_path)) == sorted(names)
 
 
 def test_a_copy_of_a_cameras_file_is_called_by_its_own(tmp_path):
@@ -1148,6 +1151,9 @@ POSED = "cam.location = (1, 2, 3)\ncam.rotation_euler = (1, 0, 0.5)\n"
         ("cam.rotation_euler.z += 0.1", "from where it was"),
         ("cam.location = (1, 2, 4)", "location is something else before"),
         ("cam.location[2] = height", "give location in plain numbers"),
+        ("cam.location = (1, 2, 3) if near else (4, 5, 6)", "give location in plain numbers"),
+        ("cam.rotation_euler = (1, 0, 0.5)[::-1]", "give rotation_euler in plain numbers"),
+        ("cam.scale = (-1, 1, 1)", "by other means"),
         ("camera2.location = (1, 2, 3)", "this is another camera"),
         ("cam.data.type = 'ORTHO'", "of the type ORTHO"),
         ("cam.rotation_mode = 'QUATERNION'", "turns by its rotation_quaternion, which the text does not say"),
@@ -1156,10 +1162,27 @@ POSED = "cam.location = (1, 2, 3)\ncam.rotation_euler = (1, 0, 0.5)\n"
 )
 def test_what_blenders_python_leaves_open_of_a_camera_is_refused(more, sentence):
     seen = Options(view_plane=CAMERAS["plain"].plane)
-    (camera,) = cameras.read(POSED, options=seen)
+    (camera,) = cameras.read(POSED.replace("\n", f"  # {'far ' * 50}\n"), options=seen)
     assert camera.pinhole.eye == (1, 2, 3) and any("in Blender's own, XYZ" in note for note in camera.notes)
     with pytest.raises(InputError, match=sentence):
         cameras.read(POSED + more, options=seen)
+
+
+@pytest.mark.parametrize("between", ["\n", "; "])
+def test_blenders_python_may_leave_out_the_object_and_the_brackets(between):
+    """Both were refused. What another statement calls the location stays a name."""
+    seen = Options(view_plane=CAMERAS["plain"].plane)
+    (bare,) = cameras.read(between.join(("location = 1, 2, 3", "rotation_euler = 1, 0, 0.5")), options=seen)
+    assert bare.pinhole == cameras.read(POSED, options=seen)[0].pinhole
+    (named,) = cameras.read(between.join(("location = 9, 9, 9", POSED)), options=seen)
+    assert named.pinhole.eye == (1, 2, 3)
+    with pytest.raises(InputError, match="location is something else before"):
+        cameras.read(between.join(("location = 1, 2, 3", "location = 4, 5, 6", "rotation_euler = 1, 0, 0.5")), options=seen)
+
+
+def test_angles_of_blenders_python_that_look_like_degrees_are_told():
+    (camera,) = cameras.read(POSED.replace("(1, 0, 0.5)", "(63, 0, 46)"), options=Options(view_plane=CAMERAS["plain"].plane))
+    assert any("more than a whole turn: are they degrees?" in note for note in camera.notes), camera.notes
 
 
 def test_a_list_of_blenders_values_in_json_is_that_camera():
@@ -1191,3 +1214,41 @@ def test_gltf_without_its_asset_is_no_sensor_of_mitsubas():
     del document["asset"]
     (camera,) = cameras.read(json.dumps(document))
     assert camera.name == "a" and camera.pinhole == CAMERAS["plain"]
+
+
+def test_a_damaged_document_is_told_of_wherever_it_stands(tmp_path):
+    """A folder, or XML without its declaration, was no camera that is understood, and why was not said."""
+    document = json.dumps(files.nerfies(files.Known("plain")))
+    for name, text, words in (
+        ("camera/a.json", document.replace("[", "[,", 1), "a.json looks like JSON and is none (line 1, column "),
+        ("a.sdf", "<sdf><model>\n<link></model></sdf>", "a.sdf looks like XML and is none (line 2, column 9: mismatched tag)"),
+        ("a.xml", "<?xml version='1.0'?><document>", "a.xml looks like XML and is none (line 1, column 32: no element found)"),
+    ):
+        file = tmp_path / name
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(text)
+        with pytest.raises(InputError) as refused:
+            cameras.read(file.parent if name.startswith("camera/") else file)
+        assert words in str(refused.value), f"{words!r} is not in {refused.value}"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "sentence"),
+    [
+        ("-3.861448e+02", "\N{MINUS SIGN}3.861448e+02", "^P1 of .* is '.*': give a number"),
+        ("-3.861448e+02 ", "", "^P1 of .* has 11 numbers: it should have 12"),
+        ("-3.861448e+02", "nan", "^P1 of .* is nan"),
+        ("P1:", "P0:", "^P0 of .* is there twice"),
+    ],
+)
+def test_a_damaged_camera_of_kittis_is_told_and_not_left_out(before, after, sentence):
+    assert before in files.KITTI and len(cameras.read("  " + files.KITTI, options=VGA)) == 3
+    with pytest.raises(InputError, match=sentence):
+        cameras.read(files.KITTI.replace(before, after), options=VGA)
+
+
+def test_a_damaged_matrix_of_neus_is_told_and_not_left_out(tmp_path):
+    matrix = np.vstack([files.projection(files.Known("plain")), [0, 0, 0, 1]])
+    np.savez(tmp_path / "cameras.npz", world_mat_0=matrix, world_mat_1=matrix * np.nan)
+    with pytest.raises(InputError, match="projection matrix of camera 1 is flat"):
+        cameras.read(tmp_path / "cameras.npz", options=VGA)

@@ -317,7 +317,7 @@ def test_bundler_looks_along_minus_z(name):
     rows = [[known.f_x, 0, 0], *turn, -turn @ known.e]
     text = "# Bundle file v0.3\n2 0\n" + "\n".join(map(text_of, rows)) + "\n0 0 0\n" + "0 0 0\n" * 4
     read = the_same(cameras.read(text, options=Options(size=(known.width, known.height))), known)
-    assert not read.size_stated and any("1 cameras that were not placed" in note for note in read.notes)
+    assert not read.size_stated and any("1 camera not placed" in note for note in read.notes)
 
 
 @pytest.mark.parametrize("name", CENTERED)
@@ -681,6 +681,32 @@ def test_dopes_camera_looks_along_its_z_and_its_file_tells(told_by):
     x, y, z = DOPE_PUBLISHED["objects"][0]["location"]
     f = document["camera_data"]["intrinsics"]["fx"]
     assert (column[0], 500 - row[0], depth[0]) == pytest.approx((250 + f * x / z, 250 + f * y / z, z), rel=1e-12)
+
+
+def test_a_pose_of_nvisii_that_contradicts_the_matrix_is_refused():
+    """It was passed over, whichever of the two was meant."""
+    known = Known("rolled")
+    scipy = pytest.importorskip("scipy.spatial.transform")
+    c2w = np.vstack([np.column_stack([known.opengl[:, :3], known.e]), [0, 0, 0, 1]])
+    again = {
+        "cam2world": c2w.T.tolist(),
+        "location_world": known.e.tolist(),
+        "quaternion_world_xyzw": scipy.Rotation.from_matrix(known.opengl[:, :3]).as_quat().tolist(),
+        "camera_look_at": {"eye": known.e.tolist(), "at": (known.e - 3 * known.w).tolist(), "up": [0, 0, 1]},
+    }
+    the_same(cameras.read(json.dumps(nvisii(known, **again))), known)
+    untold = {"eye": [0, 0, 0], "at": [0, 0, 0], "up": [0, 0, 0]}
+    the_same(cameras.read(json.dumps(nvisii(known, **again | {"camera_look_at": untold}))), known)
+    turned = scipy.Rotation.from_euler("y", 1, degrees=True).as_matrix()
+    wrong = {
+        "cam2world": np.linalg.inv(c2w).T.tolist(),
+        "location_world": np.add(known.e, [0, 0, 0.1]).tolist(),
+        "quaternion_world_xyzw": np.roll(again["quaternion_world_xyzw"], 1).tolist(),
+        "camera_look_at": again["camera_look_at"] | {"at": (known.e - turned @ known.w).tolist()},
+    }
+    for key, value in wrong.items():
+        with pytest.raises(InputError, match=f"^{key} of camera_data says another pose than its camera_view_matrix"):
+            cameras.read(json.dumps(nvisii(known, **again | {key: value})))
 
 
 def infinigen(path, known, **other):
@@ -1270,9 +1296,7 @@ def test_scannets_folder_has_its_intrinsics_and_pictures(tmp_path):
     for place in (tmp_path, tmp_path / "pose"):
         read = cameras.read(place)
         assert [(camera.name, camera.image) for camera in read] == [(f"{i}", f"{i}.jpg") for i in (0, 2, 10)]
-        assert the_same(read[2:], known).size_stated and any(
-            "1 pictures that were not placed" in note for note in read[0].notes
-        )
+        assert the_same(read[2:], known).size_stated and any("1 picture not placed" in note for note in read[0].notes)
     the_same(cameras.read(tmp_path / "pose" / "2.txt", options=Options(size=(known.width, known.height))), known)
 
 
@@ -1571,10 +1595,43 @@ def test_gazebos_camera_that_nothing_turns_looks_along_the_models_x():
     for more, attributes, problem in (
         ("<distortion><k1>-0.1</k1></distortion>", "", "a distortion"),
         ("<lens><type>equidistant</type></lens>", "", "equidistant"),
-        ("", 'relative_to="arm"', "relative to 'arm'"),
+        ("", 'relative_to="arm"', "relative to 'arm', which does not stand beside it"),
+        ("", 'relative_to="a::b"', "relative to 'a::b', which does not stand beside it"),
     ):
         with pytest.raises(InputError, match=problem):
             cameras.read(gazebo(Known("plain"), "0 0 0 0 0 0", more, attributes))
+
+
+@pytest.mark.parametrize(
+    ("frames", "relative_to"),
+    [
+        ('<frame name="f"><pose>0 0 1 0 0 0</pose></frame>', "f"),
+        (
+            '<frame name="f" attached_to="o"><pose>0 0 0.5 0 0 0</pose></frame><link name="o"><pose>0 0 .5 0 0 0</pose></link>',
+            "f",
+        ),
+        ('<joint name="j"><child>o</child></joint><link name="o"><pose relative_to="__model__">0 0 1 0 0 0</pose></link>', "j"),
+        (
+            '<model name="n"><pose relative_to="f">0 0 1 0 0 0</pose></model><frame name="f"/>',
+            "n",
+        ),
+    ],
+)
+def test_gazebos_poses_are_followed_through_the_frames_of_their_model(frames, relative_to):
+    """The link stands 5 aside, which does not count: its sensor's pose is relative to what is 1 above the model."""
+    text = gazebo(Known("plain"), "0.5 0 0 0 0 0", attributes=f'relative_to="{relative_to}"')
+    text = text.replace('<link name="l">', f'{frames}<link name="l"><pose>0 5 0 0 0 0</pose>')
+    (camera,) = cameras.read(text)
+    assert np.allclose(camera.pinhole.eye, (1, 2.5, 4)), f"{camera.pinhole.eye} for 1, 2.5, 4"
+
+
+def test_gazebos_poses_that_lead_to_themselves_or_stand_for_another_are_refused():
+    text = gazebo(Known("plain"), "0.5 0 0 0 0 0", attributes='relative_to="f"')
+    circle = '<frame name="f"><pose relative_to="g"/></frame><frame name="g" attached_to="f"/>'
+    with pytest.raises(InputError, match="'f', which leads back to it"):
+        cameras.read(text.replace('<link name="l">', f'{circle}<link name="l">'))
+    with pytest.raises(InputError, match="placement_frame"):
+        cameras.read(text.replace('<model name="m">', '<model name="m" placement_frame="l">'))
 
 
 def nerfies(known, **more):

@@ -56,13 +56,13 @@ def with_rare_light(rng):
 def test_rare_light_that_the_reference_has_missed_is_no_difference_and_hides_none(seed):
     """In one pixel of forty neither it nor any beside it has met that light: there it looks dark and quiet."""
 
-    def compared(factor, anew=True):
+    def compared(factor, is_traced_anew=True):
         rng = np.random.default_rng(seed)
         tests = [picture(rng, 50, np.full_like(TRUTH, factor), "cycles.ViewLayer.samples") for _ in range(SEEDS)]
         references = [with_rare_light(rng) for _ in range(1 + radiance.SEEDS)]
-        return radiance.compare(references[0], tests, PINHOLE, trace_anew=(lambda: references[1:]) if anew else None)
+        return radiance.compare(references[0], tests, PINHOLE, trace_anew=(lambda: references[1:]) if is_traced_anew else None)
 
-    assert not compared(1.0, anew=False).passed, "else the test proves nothing"
+    assert not compared(1.0, is_traced_anew=False).passed, "else the test proves nothing"
     comparison = compared(1.0)
     assert comparison.passed and comparison.samples[0] == SAMPLES * radiance.SEEDS, "\n".join(comparison.lines())
     assert not compared(1.1).passed

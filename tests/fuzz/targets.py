@@ -505,10 +505,10 @@ COMMANDS = (
 
 def command(folder: Path) -> None:
     """Give a mutant to every command as a user does, and raise Failure unless all is well or told in a sentence."""
-    how = {"cwd": folder, "env": os.environ | {"PYTHONPATH": str(TESTS.parent)}, "timeout": 120}
+    options = {"cwd": folder, "env": os.environ | {"PYTHONPATH": str(TESTS.parent)}, "timeout": 120}
     for words in COMMANDS:
         program = [sys.executable, "-m", "viewcam_addon", *words]
-        ran = subprocess.run(program, capture_output=True, text=True, errors="replace", check=False, **how)
+        ran = subprocess.run(program, capture_output=True, text=True, errors="replace", check=False, **options)
         if ran.returncode < 0 or (ran.returncode > 1) != bool(ran.stderr.strip()) or "Traceback" in ran.stdout:
             raise Failure(f"viewcam {words[0]} ended with status {ran.returncode}: {ran.stderr[-LONGEST:]!r}")
         judge(ran.stderr.strip())

@@ -96,7 +96,7 @@ def hashes(listed, seed=0):
     return {shot.name: settings_hash(shot, {"seed": seed}) for shot in listed}
 
 
-def paint(path, count=5, painter=None, events=None, check=False, labels=(), picture=True, part="", **how):
+def paint(path, count=5, painter=None, events=None, check=False, labels=(), picture=True, part="", **options):
     """Run a batch of `count` shots, or of those listed, in the folder of that path."""
     listed = shots(count) if isinstance(count, int) else count
     outputs = Outputs(picture, check, labels)
@@ -104,7 +104,7 @@ def paint(path, count=5, painter=None, events=None, check=False, labels=(), pict
     settings = hashes(listed, painter.seed)
     work, events = one.in_turn(folder, painter, settings, outputs), events or Listener()
     with Interruption(functools.partial(events.tell, "stopping")) as interruption:
-        return run_batch(listed, folder, settings, work, events, outputs=outputs, interruption=interruption, **how)
+        return run_batch(listed, folder, settings, work, events, outputs=outputs, interruption=interruption, **options)
 
 
 def die_before(step):

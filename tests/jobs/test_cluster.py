@@ -64,8 +64,8 @@ def run_on(machines, blend, folder, listed, ear=None, check=False, made_from=MAD
     """The summary of a batch on these workers."""
     folder = Folder(folder)
     work = machines.work(blend, folder, settings_of(listed), made_from, outputs=Outputs(check=check))
-    how = {"resume": True, "outputs": Outputs(check=check), "interruption": interruption}
-    return run.run(listed, folder, settings_of(listed), work, ear or Ear(), **how)
+    options = {"resume": True, "outputs": Outputs(check=check), "interruption": interruption}
+    return run.run(listed, folder, settings_of(listed), work, ear or Ear(), **options)
 
 
 def contents(folder):
@@ -563,12 +563,12 @@ def test_a_script_that_has_workers_is_not_run_again_by_them(stand_in, blend, tmp
 
 @needs_posix
 @pytest.mark.parametrize(
-    "how", ["SIGKILL", *(pytest.param(how, marks=pytest.mark.exhaustive) for how in ("finished", "SIGINT", "SIGTERM"))]
+    "end", ["SIGKILL", *(pytest.param(end, marks=pytest.mark.exhaustive) for end in ("finished", "SIGINT", "SIGTERM"))]
 )
-def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, processes, how):
+def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, processes, end):
     """Also when the coordinator is killed, or when Ctrl-C reaches the whole group."""
     command = [sys.executable, "-c", COORDINATOR, str(Path(__file__).parent), str(blend), str(tmp_path / "out"), "a", "b"]
-    slow = [] if how == "finished" else ["slow_one", "c", "d"]
+    slow = [] if end == "finished" else ["slow_one", "c", "d"]
     before = set(os.listdir(os.getcwd()))
     batch = subprocess.Popen(
         [*command, *slow],
@@ -583,10 +583,10 @@ def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, 
             assert processes.until(lambda: stand_in.diary("waits")), "the slow shot was never begun"
             family = offspring(batch.pid)
             assert len(family) >= 4, "two workers and two Blenders"
-            if how == "SIGKILL":
+            if end == "SIGKILL":
                 batch.kill()
             else:
-                os.killpg(batch.pid, getattr(signal, how))
+                os.killpg(batch.pid, getattr(signal, end))
                 os.kill(int(stand_in.diary("waits")[0][-1]), signal.SIGKILL)  # the slow shot shall not take a minute
         output, _ = batch.communicate(timeout=60)
         status = batch.returncode
@@ -598,6 +598,6 @@ def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, 
         return [process for process in family | blenders if processes.run(process)]
 
     assert processes.until(lambda: not left()), f"still running: {left()}"
-    assert status == {"finished": 0, "SIGKILL": -9, "SIGINT": 130, "SIGTERM": 143}[how], output
+    assert status == {"finished": 0, "SIGKILL": -9, "SIGINT": 130, "SIGTERM": 143}[end], output
     assert output == b""
     assert set(os.listdir(os.getcwd())) == before, "something was left in the user's folder"

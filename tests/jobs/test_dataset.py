@@ -85,15 +85,15 @@ def test_the_same_shots_give_the_same_bytes(folder, finish):
     assert [(folder.path / name).read_bytes() for name in FILES] == before
 
 
-@pytest.mark.parametrize("how", ["no sidecar", "no picture", "other settings", "half a sidecar"])
-def test_with_a_shot_missing_there_is_none_and_it_is_named(folder, finish, how):
+@pytest.mark.parametrize("fault", ["no sidecar", "no picture", "other settings", "half a sidecar"])
+def test_with_a_shot_missing_there_is_none_and_it_is_named(folder, finish, fault):
     for name in ("a", "b", "c"):
-        finish(name, settings="of before" if how == "other settings" and name == "b" else "of now")
-    if how == "no sidecar":
+        finish(name, settings="of before" if fault == "other settings" and name == "b" else "of now")
+    if fault == "no sidecar":
         folder.sidecar("b").unlink()
-    elif how == "no picture":
+    elif fault == "no picture":
         folder.preview("b").unlink()
-    elif how == "half a sidecar":
+    elif fault == "half a sidecar":
         folder.sidecar("b").write_text(folder.sidecar("b").read_text()[:-40])
     sentence = write(folder, shots("a", "b", "c"))
     assert sentence == "no dataset is written, since 1 of 3 shots are missing: b"

@@ -102,13 +102,13 @@ def test_a_sidecar_of_what_no_summary_can_hold_is_rendered_again(tmp_path, paint
 @pytest.mark.parametrize(
     "name", ["summary.json", "contact-sheet.html", "shot_001.json", "shot_001.exr", "shot_001.png", "shot_001.labels.json"]
 )
-@pytest.mark.parametrize("how", [{}, {"resume": True}, {"overwrite": True}], ids=lambda how: next(iter(how), "new"))
-def test_a_folder_where_a_file_belongs_is_refused_before_anything_is_rendered(tmp_path, painting, name, how):
+@pytest.mark.parametrize("options", [{}, {"resume": True}, {"overwrite": True}], ids=lambda options: next(iter(options), "new"))
+def test_a_folder_where_a_file_belongs_is_refused_before_anything_is_rendered(tmp_path, painting, name, options):
     """A folder called summary.json was found when all was rendered."""
     (tmp_path / name).mkdir()
     painter = painting.Painter()
     with pytest.raises(InputError, match=rf"{name} is a folder, and a file is to be written there"):
-        painting.paint(tmp_path, 3, painter=painter, labels=("depth",), **how)
+        painting.paint(tmp_path, 3, painter=painter, labels=("depth",), **options)
     assert not painter.painted and (tmp_path / name).is_dir()
 
 

@@ -18,9 +18,9 @@ SIGNALS = [signal.SIGINT, signal.SIGTERM]
 class Batch:
     """painting.py as a process."""
 
-    def __init__(self, painting, folder, **how):
+    def __init__(self, painting, folder, **options):
         self.process = subprocess.Popen(
-            [sys.executable, painting.__file__, folder, json.dumps(how)], stdout=subprocess.PIPE, text=True
+            [sys.executable, painting.__file__, folder, json.dumps(options)], stdout=subprocess.PIPE, text=True
         )
 
     def until(self, event):

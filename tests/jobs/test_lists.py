@@ -298,6 +298,12 @@ def test_names_without_spaces_are_made_of_those_with_some_and_the_camera_is_stil
         makers.from_cameras("*", [" a"], spaces=True)
 
 
+def test_pinholes_whose_names_would_be_one_file_are_shots_with_numbers():
+    pinhole = Pinhole((5, 0, 0), (0, 0, 0), (0, 0, 1), 400, 320, 180)
+    shots = makers.from_pinholes((name, pinhole) for name in ("left/1", "left_1", "LEFT:1", "b"))
+    assert [shot.name for shot in shots] == ["left_1", "left_1_2", "LEFT_1_3", "b"]
+
+
 def test_an_orbit_keeps_the_principal_point_and_the_mirroring():
     pinhole = Pinhole((5, 0, 0), (0, 0, 0), (0, 0, 1), 400, 320, 180, (100, 120), mirrored=True)
     for shot in makers.orbit(pinhole, 3):

@@ -103,7 +103,7 @@ def test_there_is_a_sidecar_only_while_both_files_are_those_it_was_written_for(f
 
     replace, unlink = os.replace, Path.unlink
     monkeypatch.setattr(os, "replace", lambda *paths: (look(), replace(*paths), look()))
-    monkeypatch.setattr(Path, "unlink", lambda path, **how: (look(), unlink(path, **how), look()))
+    monkeypatch.setattr(Path, "unlink", lambda path, **options: (look(), unlink(path, **options), look()))
     render_one(SHOT, folder, painting.Painter(seed=2), "newer", Outputs())
     look()
     assert seen[0] == "older" and None in seen and seen[-1] == "newer", seen

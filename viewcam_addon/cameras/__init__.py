@@ -42,6 +42,7 @@ stand first, and what takes any text last.
 """
 
 import contextlib
+import itertools
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -199,9 +200,9 @@ FORMATS: dict[str, ModuleType] = {
 _LONGEST = 1000  # characters of a name or a sentence
 _YAML = (".yaml", ".yml")
 _JSON = (".json", ".gltf", ".sfm")
-_CODE = ("blender_python", "vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
+_CODE = ("text", "blender_python", "vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
 """The formats that a damaged JSON file may look like."""
-_NO_JSON = "{} looks like JSON and is none ({}): correct it"
+_MOST_LOOKED_AT = 100
 _REMEMBERED = re.compile(rf"{own.KEY}: (axes=\w+ scale=[\d.e+-]+)")
 
 
@@ -292,8 +293,9 @@ def _each_of_folder(source: Source, module: ModuleType, options: Options) -> lis
 def _called(camera: Camera, file: Source, otherwise: str) -> Camera:
     """The camera by the name that its file says, if the file is called by that."""
     stated = (*(name for name, _ in own.parts(file.text)), camera.name)
-    stem = file.path.stem if file.path else None
-    return replace(camera, name=_quoted(next((name for name in stated if file_names.made_fit(name) == stem), otherwise)))
+    stem = file.path.stem if file.path else ""
+    called = (name for name in stated if re.fullmatch(rf"{re.escape(file_names.made_fit(name))}(_\d+)?", stem))
+    return replace(camera, name=_quoted(next(called, otherwise)))
 
 
 def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
@@ -370,8 +372,9 @@ def recognized(source: str | Path | Source) -> str:
         raise InputError(f"{source.name} {_PACKED}")
     if not source.is_folder and not source.data.strip():
         raise InputError(f"{source.name} is empty: export it again")
-    if source.json_problem:
-        raise InputError(_NO_JSON.format(source.name, source.json_problem))
+    for file in (source, *itertools.islice(source.files("*.[jx]*[nlp]"), _MOST_LOOKED_AT)):
+        if file.problem:
+            raise InputError(f"{file.name} {file.problem}")
     if source.path is None:
         place = checks.quoted(source.text.strip()[:40])
         raise InputError(

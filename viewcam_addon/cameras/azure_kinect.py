@@ -5,7 +5,8 @@ center of distortion (0) and p2, p1: OpenCV's, of the Brown-Conrady model. `Rt` 
 right, y down, z into the view. The picture is that of the whole sensor, of which the SDK's modes show parts: 16:9 is the middle
 of the color camera's 4:3.
 
-Source: the Azure Kinect Sensor SDK's calibration.c, mode_specific_calibration.c and intrinsic_transformation.c.
+Source: the Azure Kinect Sensor SDK's calibration.c, mode_specific_calibration.c, intrinsic_transformation.c and
+extrinsic_transformation.c (world to camera, row after row, the depth camera's that of the world).
 """
 
 import numpy as np

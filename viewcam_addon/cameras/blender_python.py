@@ -28,7 +28,7 @@ from ..errors import InputError
 from ..intrinsics import CameraData, Frame, view_plane
 from . import axes, texts
 from .camera import Camera, Options, not_a_pinhole
-from .expressions import Expressions, numbers
+from .expressions import Expressions, Unknown, numbers
 from .source import Source
 
 TITLE = "Blender's Python (location, rotation_euler …)"
@@ -40,12 +40,15 @@ _POSE = {"location": 3, **_ROTATIONS}
 _LENS = ("lens", "angle", "sensor_width", "sensor_height", "sensor_fit", "shift_x", "shift_y", "type", "rotation_mode")
 _RENDER = ("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y")
 _SET = re.compile(
-    rf"(?<!\w)({'|'.join((*_POSE, *_LENS, *_RENDER))})['\"]?(?:\.([wxyz])|\[([0-3])\])?[ \t]*([-+*/]?=(?!=)|:|\n)[ \t]*"
+    rf"(?<!\w)({'|'.join((*_POSE, *_LENS, *_RENDER))})"
+    r"['\"]?(?:\.xyz\b|\[:\])?(?:\.([wxyz])|\[([0-3])\])?[ \t]*([-+*/]?=(?!=)|:|\n)[ \t]*"
 )
 _ADDED = re.compile(r"\bcamera_add\s*(?=\()")
 _MADE = re.compile(r"\bcameras\.new\s*\(|\bcamera_add\s*\(")
 _NAMED = re.compile(r"^[ \t]*(?:>>> )?([A-Za-z_]\w{0,60})[ \t]*=(?!=)[ \t]*(.*)$", re.MULTILINE)
-_OTHERWISE = re.compile(r"TRACK_TO|to_track_quat|DAMPED_TRACK|constraints\.new|\.parent\s*=(?!=)|delta_(?:location|rotation)")
+_OTHERWISE = re.compile(
+    r"TRACK_TO|to_track_quat|DAMPED_TRACK|constraints\.new|\.parent\s*=(?!=)|delta_(?:location|rotation)|(?i:\bcam\w*)\.scale\b[^\n]*-"
+)
 _MATRIX = re.compile(r"\bmatrix_(?:world|basis|local)\s*=(?!=)")
 _ANY_ADDED = re.compile(r"\b(\w+_add)\s*\(")
 _ACTIVE = re.compile(r"(?:\bcontext|\bC)\.(?:active_)?object\b")
@@ -56,6 +59,8 @@ _VALUE = re.compile(r"(?:mathutils\s*\.\s*)?(?:Euler|Quaternion)\s*(?=\()")
 _PRINTED = re.compile(r"<(Vector|Euler|Quaternion) \(([^()\n]{0,200})\)(?:, order=('[XYZ]{3}'))?>")
 _SHOWN = re.compile(r"rotation_euler['\"]?[ \t]*[:\n]\s*(?:mathutils\.)?Euler\(\([^()]{0,200}\), '(\w{0,20})'\)")
 _COMMENT = r"#[^\n]*"
+_BEGINNING = re.compile(r"(?:\A|\n|;[ \t]{0,8})\Z")
+_COMMA, _END = re.compile(r"(?<![ \t])[ \t]*,[ \t]*(?=[-+.\w(])"), re.compile(r"(?<![ \t])[ \t]*(?:[\n;,}\])]|\Z)")
 
 
 def recognizes(source: Source) -> bool:
@@ -128,8 +133,11 @@ class _Script:
         statements = [*itertools.islice(_SET.finditer(self.text), _MOST_STATEMENTS)]
         if len(statements) == _MOST_STATEMENTS:
             self.problems.append((statements[-1].start(), "the text says too many things of cameras, copy one camera"))
+        bare = []
         for match in statements:
             path = self._path(match)
+            if path is None and match[4] == "=" and _BEGINNING.search(self.text, max(0, match.start() - 9), match.start()):
+                bare.append(match)
             if match[1] in _RENDER or (path is not None and self._is_camera(path, match.start())):
                 self._take(match, path or "")
         for match in itertools.islice(_ADDED.finditer(self.text), _MOST_STATEMENTS):
@@ -137,6 +145,8 @@ class _Script:
             for name, key in (("location", "location"), ("rotation", "rotation_euler")):
                 if name in named and (at := re.compile(rf"\b{name}\s*=\s*").search(self.text, match.end())):
                     self.set_at.setdefault(key, []).insert(0, (None, at.end()))
+        for match in bare if "location" not in self.set_at else ():  # else these are names of what a camera is then set to
+            self._take(match, "")
 
     def _path(self, match: re.Match) -> str | None:
         """The text before a key, whose attribute it is; None where it is no statement."""
@@ -185,22 +195,33 @@ class _Script:
         if len(stated) != 1 or path in self._following or len(self._following) > 8:
             return None
         self._following.add(path)
-        value = self._value(stated[0].start(2))
+        value = self._value(stated[0].start(2), listed=True)
         self._following.discard(path)
         return value
 
-    def _value(self, at: int) -> object:
+    def _value(self, at: int, listed: bool = False) -> object:
+        """The value at a place, an `Unknown` where something more is done with it.
+
+        listed : true if numbers with commas between them are one value.
+        """
         constructor = _VALUE.match(self.text, at)
-        if not constructor:
-            return self._reader.value(at)[0]
-        values, _, _ = self._reader.arguments(constructor.end())
-        return values[0] if values else None
+        if constructor:
+            values, _, end = self._reader.arguments(constructor.end())
+            value = values[0] if values else None
+        else:
+            value, end = self._reader.value(at)
+            parts = [value]
+            while listed and isinstance(value, float) and (comma := _COMMA.match(self.text, end)):
+                part, end = self._reader.value(comma.end())
+                parts.append(part)
+            value = tuple(parts) if len(parts) > 1 else value
+        return value if _END.match(self.text, end) else Unknown(at)
 
     def vector(self, key: str) -> tuple[float, ...]:
         count = _POSE[key]
         result: list[float | None] = [None] * count
         for which, at in self.set_at[key]:
-            value = self._value(at)
+            value = self._value(at, listed=which is None)
             parts = numbers(value, count) if which is None else numbers((value,), 1)
             if parts is None or (which or 0) >= count or not all(map(math.isfinite, parts)):
                 texts.fail(self.text, at, f"give {key} in plain numbers")
@@ -244,6 +265,8 @@ class _Script:
             raise InputError(f"the text's camera turns by its {key}, which the text does not say: write it")
         others = ", ".join(each for each in stated if each != key)
         notes: tuple[str, ...] = (f"The camera turns by its {key}: {others} was left out",) if others else ()
+        if key == "rotation_euler" and max(map(abs, self.vector(key))) > 2 * math.pi:
+            notes += ("Its angles are radians, as Blender takes them, and more than a whole turn: are they degrees?",)
         if key == "rotation_euler" and not mode:
             notes += ("The text does not say in which order its camera turns: in Blender's own, XYZ",)
         return key, mode or "XYZ", notes

@@ -131,26 +131,21 @@ def checked(cameras: Iterable[Camera], written: str) -> tuple[Camera, ...]:
     return cameras
 
 
-def files(cameras: Sequence[Camera], suffix: str) -> list[str]:
-    """The names of the files that have a camera each. Raises InputError if two cameras would be one file."""
-    names = [file_names.made_fit(camera.name) for camera in cameras]
-    counts = Counter(map(file_names.one_file, names))
-    alike = [camera.name for camera, name in zip(cameras, names, strict=True) if counts[file_names.one_file(name)] > 1]
-    if alike:
-        raise InputError(f"{several([*map(checks.quoted, alike)])} would be one file for several cameras: rename them")
-    return [name + suffix for name in names]
-
-
 def a_file_each(cameras: Sequence[Camera], suffix: str, text: Callable[[Camera], str]) -> str | dict[str, str]:
     """The result of `write` in a format whose files have one camera: its text, or of several the files, called as the cameras.
 
     text : the function that makes it. It says the camera's name, which the file's need not be.
-
-    Raises InputError as `files` does.
     """
     if len(cameras) == 1:
         return text(cameras[0])
-    return dict(zip(files(cameras, suffix), map(text, cameras), strict=True))
+    return files(cameras, suffix, text)
+
+
+def files(cameras: Sequence[Camera], suffix: str, text: Callable[[Camera], str]) -> dict[str, str]:
+    """The files of a camera each, called as these, by their names. text : as `a_file_each` has it."""
+    return {
+        f"{name}{suffix}": text(each) for name, each in zip(file_names.distinct(c.name for c in cameras), cameras, strict=True)
+    }
 
 
 def refuse_mirrored(cameras: Iterable[Camera], written: str) -> None:

@@ -38,21 +38,22 @@ SEVERAL = "a folder"
 _OF_NEUS = ("cameras_sphere.npz", "cameras.npz")
 _MOST_BYTES = 2**12  # for a 4 × 4
 _PICTURES = ("image", "images", "rgb")
-_KITTI = re.compile(r"^(P(?:\d|_rect_\d\d)):[ \t]([-+\d.eE \t]+)$", re.MULTILINE)
+_KITTI = re.compile(r"^[ \t]*(P(?:\d|_rect_\d\d)):[ \t]+(\S.*)$", re.MULTILINE)
+_MOST_CHARACTERS = 2**16
 _KITTI_SIZE = re.compile(r"^S_rect_(\d\d):[ \t]([-+\d.eE]+)[ \t]+([-+\d.eE]+)[ \t]*$", re.MULTILINE)
 _CONTOUR = "CONTOUR"
 _ORTHOGONAL = 1e-3
 
 
 def recognizes(source: Source) -> bool:
-    return bool(_of_neus(source)) or (not source.is_folder and (bool(_of_kitti(source)) or _alone(source) is not None))
+    return bool(_of_neus(source)) or (not source.is_folder and (_is_kittis(source) or _alone(source) is not None))
 
 
 def read(source: Source, options: Options) -> list[Camera]:
     if matrices := _of_neus(source):
         return _neus(source, matrices, options)
-    if matrices := _of_kitti(source):
-        return [_kitti(source, key, matrix, options) for key, matrix in matrices.items()]
+    if _is_kittis(source):
+        return [_kitti(source, key, matrix, options) for key, matrix in _of_kitti(source).items()]
     matrix = _alone(source)
     if matrix is None:
         raise InputError(f"{source.name} has no projection matrix of three lines with four numbers each: correct it")
@@ -135,21 +136,30 @@ def _of_neus(source: Source) -> dict[str, np.ndarray]:
                 if re.fullmatch(r"(?:world|scale)_mat_\d{1,6}", name) and member.file_size < _MOST_BYTES:
                     with contextlib.suppress(ValueError), archive.open(member) as packed:
                         matrix = npy.read(packed.read(member.file_size)).astype(np.float64)
-                        if matrix.shape in ((4, 4), (3, 4)) and np.isfinite(matrix).all():
+                        if matrix.shape in ((4, 4), (3, 4)):
                             result[name] = matrix
     except (ValueError, OSError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error):
         return {}
     return result if any(name.startswith("world") for name in result) else {}
 
 
+def _is_kittis(source: Source) -> bool:
+    text = source.text if len(source.data) < _MOST_CHARACTERS else ""
+    return any(len(match[2].split()) == 12 for match in _KITTI.finditer(text))
+
+
 def _of_kitti(source: Source) -> dict[str, np.ndarray]:
-    """KITTI's P by their names."""
-    matrices = {match[1]: match[2].split() for match in _KITTI.finditer(source.text[:10_000])}
-    return {
-        key: np.array(flat(f"{key} of {source.name}", words)).reshape(3, 4)
-        for key, words in matrices.items()
-        if len(words) == 12
-    }
+    """KITTI's P by their names. Raises InputError if one is damaged or there twice."""
+    matrices: dict[str, np.ndarray] = {}
+    for match in _KITTI.finditer(source.text):
+        numbers = flat(what := f"{match[1]} of {source.name}", match[2].split())
+        if len(numbers) != 12 or match[1] in matrices:
+            problem = (
+                "is there twice: leave one out" if match[1] in matrices else f"has {len(numbers)} numbers: it should have 12"
+            )
+            raise InputError(f"{what} {problem}")
+        matrices[match[1]] = np.array(numbers).reshape(3, 4)
+    return matrices
 
 
 def _alone(source: Source) -> np.ndarray | None:

@@ -65,9 +65,12 @@ def read(source: Source, options: Options) -> list[Camera]:
 
 
 def write(cameras: Sequence[Camera], _options: Options) -> dict[str, str]:
-    records = [{"name": each.name, "image": each.image} | record(each.pinhole, lens=each.lens) for each in cameras]
-    texts = (json.dumps(each, indent=1) + "\n" for each in records)
-    return dict(zip(naming.files(cameras, SUFFIX), texts, strict=True))
+    return naming.files(cameras, SUFFIX, _text)
+
+
+def _text(camera: Camera) -> str:
+    document = {"name": camera.name, "image": camera.image} | record(camera.pinhole, lens=camera.lens)
+    return json.dumps(document, indent=1) + "\n"
 
 
 def _is_ours(source: Source) -> bool:

@@ -24,7 +24,7 @@ from xml.parsers import expat
 import numpy as np
 
 from .. import checks, npy
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..files import read_bytes
 from . import yaml
 
@@ -33,6 +33,7 @@ _DEEPEST = 100
 _MOST_BYTES_OF_ARRAY, _MOST_ARRAYS = 2**16, 1000
 _STRING = r'"[^"\\]*(?:\\.[^"\\]*)*"?'
 _COMMENT = re.compile(rf"{_STRING}|//[^\n]*|/\*.*?(?P<end>\*/|\Z)", re.DOTALL)
+_LIKE_XML = re.compile(r"\s*<[?!A-Za-z]")
 _TRAILING_COMMA = re.compile(rf"{_STRING}|,(?=\s*[\]}}])", re.DOTALL)
 _XML_DECLARATION = re.compile(rb"\s*<\?xml\s[^>]{0,200}\bencoding\s*=\s*[\"']([^\"'>]{0,40})[\"']")
 _ENCODINGS = {  # as Python calls them
@@ -155,6 +156,15 @@ class Source:
         """The reason that something that looks like JSON is none, or nothing."""
         return self._json[1]
 
+    @property
+    def problem(self) -> str:
+        """The sentence on a text that looks like JSON or XML by how it begins, and is none; nothing if it is all right."""
+        if self.json_problem:
+            return f"looks like JSON and is none ({self.json_problem}): correct it"
+        if _LIKE_XML.match(self.text) and self.xml is None:
+            return f"looks like XML and is none ({self._xml[1]}): correct it"
+        return ""
+
     @cached_property
     def document(self) -> Mapping[str, Any]:
         """The JSON object; empty if this is none."""
@@ -170,6 +180,10 @@ class Source:
             return None
         if self._encoding[1]:
             raise InputError(self._encoding[1])
+        return self._xml[0]
+
+    @cached_property
+    def _xml(self) -> tuple[ElementTree.Element | None, str]:
         return _parsed_xml(self.text.strip())
 
     @cached_property
@@ -353,7 +367,8 @@ def table(name: str, lines: Sequence[tuple[int, str]]) -> np.ndarray:
     for number, line in lines:
         rows.append(flat(f"line {number} of {name}", line.rstrip(",")))
         if len(rows[-1]) != len(rows[0]):
-            raise InputError(f"line {number} of {name} has {len(rows[-1])} numbers and others have {len(rows[0])}: correct it")
+            has = counted(len(rows[-1]), "number")
+            raise InputError(f"line {number} of {name} has {has} and others have {len(rows[0])}: correct it")
     return np.array(rows)
 
 
@@ -398,7 +413,8 @@ def _not_finite(name: str) -> float:
     return float(name.replace("Infinity", "inf"))  # refused where a number is wanted
 
 
-def _parsed_xml(text: str) -> ElementTree.Element | None:
+def _parsed_xml(text: str) -> tuple[ElementTree.Element | None, str]:
+    """The first element, or None and the reason."""
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate("utf-8", namespace_separator="}")
     depth = 0
 
@@ -422,9 +438,11 @@ def _parsed_xml(text: str) -> ElementTree.Element | None:
     parser.buffer_text = True
     try:
         parser.Parse(text.encode("utf-8", errors="replace"), True)  # whatever its declaration says
-        return builder.close()
-    except (expat.ExpatError, AssertionError):
-        return None
+        return builder.close(), ""
+    except expat.ExpatError as error:
+        return None, f"line {error.lineno}, column {error.offset + 1}: {expat.ErrorString(error.code)}"
+    except AssertionError:
+        return None, "it ends too early"
 
 
 def _local(tag: str) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import argument_types as types
 from .. import crashes
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..events import Events
 from ..file_names import one_file
 from ..jobs import cluster, dataset, one, served_renderer
@@ -104,7 +104,7 @@ def carry_out(
         else:
             work = one.in_turn(folder, renderer, work_list.settings, plan.outputs)
         unknown = tuple(work_list.made_from.get("unknown", ()))
-        anew = plan.overwrite or bool(plan.resume_known and unknown)
+        overwrite = plan.overwrite or bool(plan.resume_known and unknown)
         summary = running.run(
             work_list.jobs,
             folder,
@@ -112,7 +112,7 @@ def carry_out(
             work,
             events,
             resume=plan.resume or plan.resume_known,
-            overwrite=anew,
+            overwrite=overwrite,
             outputs=plan.outputs,
             interruption=interruption,
         )
@@ -175,7 +175,7 @@ def _tell(plan: Plan, events: Events, summary: Summary, folder: Folder, unknown:
     unknown : sentences on what may have changed in the pictures that were kept.
     """
     counts = summary.counts
-    shots = "1 shot" if counts["shots"] == 1 else f"{counts['shots']} shots"
+    shots = counted(counts["shots"], "shot")
     if counts["failed"] or counts["left"]:
         what = f"of {shots}, {counts['failed']} failed and {counts['left']} are left"
         events.tell("error", command=plan.command, text=f"{what}: the same command with --resume renders them")

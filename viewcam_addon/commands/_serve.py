@@ -22,9 +22,9 @@ def run(options: argparse.Namespace) -> Result:
     if options.what.isdecimal():
         served_renderer.serve(options.what, blender_room("jobs.renderer").BlenderRenderer)
         return 0, {}
-    jobs, how, files = plan.read(Path(options.what))
-    if how is None:
+    jobs, wanted, files = plan.read(Path(options.what))
+    if wanted is None:
         options.json = plan.result_of(Path(options.what))
         return check.check_one(jobs[0], options, **files)
-    summary = carry_out(how, lambda _: jobs, options.events)
+    summary = carry_out(wanted, lambda _: jobs, options.events)
     return summary.exit_status, summary.to_json()

@@ -153,15 +153,15 @@ def _rig(options: argparse.Namespace) -> Rig:
     file, *names = options.distort
     if len(names) > 1:
         raise InputError(f"--distort is of a file and one camera's name, and {' '.join(names)} are more: name one or none")
-    how = dataclasses.replace(options_of(options), without_distortion=False)
-    result = calibrations.of_cameras(cameras.read(Path(file), options=how), file, *names)
+    conversion = dataclasses.replace(options_of(options), without_distortion=False)
+    result = calibrations.of_cameras(cameras.read(Path(file), options=conversion), file, *names)
     for plane in {calibration.plane for calibration in result.by_name.values()} if options.size else ():
         if options.size != (plane.width, plane.height):
             sizes = (
                 f"{options.size[0]} × {options.size[1]} and the camera of --distort has {plane.width} × {plane.height} pixels"
             )
             raise InputError(f"--size is {sizes}: leave --size out, or give the camera of such pictures")
-    fit = {shot_names.made_fit(name): calibration for name, calibration in result.by_name.items()}
+    fit = dict(zip(shot_names.distinct(result.by_name), result.by_name.values(), strict=True))
     return dataclasses.replace(result, by_name=fit | dict(result.by_name))
 
 

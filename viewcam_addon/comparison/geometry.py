@@ -15,7 +15,7 @@ from ..errors import InputError, listed
 from ..image import BACKGROUND_DEPTH, Image
 from ..pinhole import Pinhole
 from . import tolerances
-from .cameras import conversion_error, systematic_error
+from .cameras import Systematic, conversion_error, systematic_error
 from .mismatches import (
     KINDS,
     NOWHERE,
@@ -97,24 +97,8 @@ def compare(
     reach = reach_of(shift.reshape(size)).ravel() + renderer.edges
     mismatches = _mismatches(kinds, seen, reach, around, surfaces_at)
 
-    compared = hit & np.isin(kinds, (-1, KINDS.index("material index"), KINDS.index("surface")))
-    # Pixels that are explained, or few enough to be let pass, are no error of the passes; all others show in their figures.
-    settled = mismatches.explained | (mismatches.unexplained_count <= allowed_unexplained(pinhole))
-    compared[mismatches.rows[settled] * pinhole.width + mismatches.columns[settled]] = False
-    chosen = np.flatnonzero(compared)
-    errors = agreement.at(chosen).errors(at(expected, chosen), at(seen, chosen))
-    depth = expected["Depth"][chosen, 0].astype(np.float64)
-    systematic = None
-    if "Position" in measured:
-        along_errors = (np.abs(along[chosen] - depth) / depth, *errors["Depth"][1:])
-        errors = {"Position": errors["Position"], "Position depth": along_errors} | errors
-        if len(chosen):
-            off = off_x[chosen], off_y[chosen]
-            systematic = systematic_error(pinhole, chosen, *off, errors["Position"][1], renderer.center)
-    else:
-        del errors["Position"]
-    if "Depth" not in measured:
-        del errors["Depth"]
+    chosen = np.flatnonzero(_compared(hit, kinds, mismatches, pinhole))
+    errors, systematic = _errors(chosen, expected, seen, agreement, (off_x, off_y, along), measured)
     rows, maps = _measure(errors, chosen, size)
 
     depths = expected["Depth"][hit, 0]
@@ -251,6 +235,48 @@ def _mismatches(
             columns[numbers], rows[numbers], at(seen, traced), reach[traced], agreement.at(traced), surfaces_at
         )
     return Mismatches(columns, rows, kinds[pixels], shifts, reach[pixels], retraced)
+
+
+def _compared(hit: NDArray, kinds: NDArray, mismatches: Mismatches, pinhole: Pinhole) -> NDArray[np.bool_]:
+    """True where a pixel's difference is an error of the passes.
+
+    Pixels that are explained, or few enough to be let pass, are none; all others show in the passes' figures.
+    """
+    compared = hit & np.isin(kinds, (-1, KINDS.index("material index"), KINDS.index("surface")))
+    settled = mismatches.explained | (mismatches.unexplained_count <= allowed_unexplained(pinhole))
+    compared[mismatches.rows[settled] * pinhole.width + mismatches.columns[settled]] = False
+    return compared
+
+
+def _errors(
+    chosen: NDArray,
+    expected: Seen,
+    seen: Seen,
+    agreement: SurfaceAgreement,
+    displacement: tuple[Array, Array, Array],
+    measured: set[str],
+) -> tuple[dict[str, Errors], Systematic | None]:
+    """The errors of the chosen pixels in each pass that the test has, and what Position's have in common.
+
+    displacement : see `_displacement`.
+    """
+    off_x, off_y, along = (offsets[chosen] for offsets in displacement)
+    errors = agreement.at(chosen).errors(at(expected, chosen), at(seen, chosen))
+    systematic = None
+    if "Position" in measured:
+        depth = expected["Depth"][chosen, 0].astype(np.float64)
+        errors = {
+            "Position": errors["Position"],
+            "Position depth": (np.abs(along - depth) / depth, *errors["Depth"][1:]),
+        } | errors
+        if len(chosen):
+            center = agreement.renderer.center
+            systematic = systematic_error(agreement.pinhole, chosen, off_x, off_y, errors["Position"][1], center)
+    else:
+        del errors["Position"]
+    if "Depth" not in measured:
+        del errors["Depth"]
+    return errors, systematic
 
 
 def _check_figures(source: str, expected: Seen, pinhole: Pinhole) -> None:

@@ -131,15 +131,15 @@ def compare_quantities(
     pinhole: Pinhole,
     test_samples: int | None = None,
     rest: Rest | None = None,
-    anew: Sequence[Image] = (),
+    other_seeds: Sequence[Image] = (),
     false_alarms: float = FALSE_ALARMS,
 ) -> QuantityComparison:
     """`compare` without what decides nothing.
 
     rest : the rest that is compared where light is a renderer's choice.
-    anew : the reference with several other seeds.
+    other_seeds : the reference with several other seeds.
     """
-    quantities = list(all_sides(reference, tests, anew))
+    quantities = list(all_sides(reference, tests, other_seeds))
     if rest is not None:
         quantities = [rest.of(sides) for sides in quantities]
     combined, equal = quantities[0], tuple(sides.name for sides in quantities[1:] if sides.are_equal)
@@ -148,9 +148,9 @@ def compare_quantities(
     is_noisy = not quiet(combined.reference, combined.variance).all()
     # Where things shine as brightly as what is behind them, only the other passes have any.
     is_noisy |= seeds > 1 and any(not quiet(sides.test, sides.test_variance).all() for sides in (combined, *unequal))
-    freedom = (len(anew) - 1 if anew else max(min(samples[0] or 2, VARIANCE_BATCHES) - 1, 1), max(seeds - 1, 1))
-    if anew and samples[0]:
-        samples = samples[0] * len(anew), samples[1]
+    freedom = (len(other_seeds) - 1 if other_seeds else max(min(samples[0] or 2, VARIANCE_BATCHES) - 1, 1), max(seeds - 1, 1))
+    if other_seeds and samples[0]:
+        samples = samples[0] * len(other_seeds), samples[1]
     rounding = noise_free.Rounding(pinhole, reference, tests[0], max(filter(None, samples), default=1), rest)
 
     rows: list[LightRow] = []

@@ -111,11 +111,11 @@ def _pooled(before: Image, now: Image, share: float) -> Image:
     if "Diffuse Color" in passes:
         for name in _PER_COLOR:
             if name in passes:
-                earlier, later = (of.passes[name] * of.passes["Diffuse Color"].astype(float) for of in (before, now))
+                earlier, later = (image.passes[name] * image.passes["Diffuse Color"].astype(float) for image in (before, now))
                 color, mean = passes["Diffuse Color"].astype(float), _mixed(earlier, later, share)
                 passes[name] = np.divide(mean, color, out=np.zeros(color.shape), where=color > 0.0).astype(np.float32)
     if "Variance" in passes:  # the variance of a mean of two that are independent
-        earlier, later = (of.passes["Variance"].astype(float) for of in (before, now))
+        earlier, later = (image.passes["Variance"].astype(float) for image in (before, now))
         passes["Variance"] = ((1.0 - share) ** 2 * earlier + share**2 * later).astype(np.float32)
     counts = {
         name: str(int(text) + int(now.attributes[name]))

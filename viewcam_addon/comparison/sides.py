@@ -88,10 +88,10 @@ def _whole(text: str) -> int | None:
     return int(text) if text.isdecimal() and len(text) <= _MOST_DIGITS else None
 
 
-def all_sides(reference: Image, tests: Sequence[Image], anew: Sequence[Image] = ()) -> Iterator[Sides]:
+def all_sides(reference: Image, tests: Sequence[Image], other_seeds: Sequence[Image] = ()) -> Iterator[Sides]:
     """Every quantity that all pictures have, Combined first.
 
-    anew : the reference with several other seeds, whose mean and spread count in place of its own.
+    other_seeds : the reference with several other seeds, whose mean and spread count in place of its own.
 
     Raises InputError if there is no test picture, if their sizes differ, or if one has no Combined.
     """
@@ -106,9 +106,9 @@ def all_sides(reference: Image, tests: Sequence[Image], anew: Sequence[Image] = 
     variance = _variance(reference)
     # Where there are as many samples as a wanted error takes, neighbors' noise is not independent, but adds up to what it was.
     shared = np.where(np.isfinite(variance), variance, 0.0) if "Sample Count" in reference.passes else 0.0
-    references = anew or [reference]
-    combined = replace(_sides("Combined", references, tests, None if anew else variance), shared=shared)
-    unknown = None if anew else np.array(np.inf)
+    references = other_seeds or [reference]
+    combined = replace(_sides("Combined", references, tests, None if other_seeds else variance), shared=shared)
+    unknown = None if other_seeds else np.array(np.inf)
     parts = [
         _sides(name, references, tests, unknown)
         for name in QUANTITIES[1:]
@@ -128,8 +128,8 @@ def all_sides(reference: Image, tests: Sequence[Image], anew: Sequence[Image] = 
 def _is_all(part: Sides, combined: Sides) -> NDArray[np.bool_]:
     """(height, width, 1) bool: where all light of both sides is that of one pass, but for rounding."""
     rest = [
-        np.abs(of - all_of).max(axis=-1) <= _QUIET * FLOAT32 * np.abs(all_of).max(axis=-1)
-        for of, all_of in ((part.reference, combined.reference), (part.test, combined.test))
+        np.abs(share - all_of).max(axis=-1) <= _QUIET * FLOAT32 * np.abs(all_of).max(axis=-1)
+        for share, all_of in ((part.reference, combined.reference), (part.test, combined.test))
     ]
     return (rest[0] & rest[1])[..., None]
 

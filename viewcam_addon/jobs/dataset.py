@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..cameras import Camera, check_no_other_model, colmap, save, transforms
 from ..cameras.distortion import Lens
-from ..errors import InputError, several
+from ..errors import InputError, counted, several
 from ..files import check_writable, written_whole
 from ..labels import colmap as labels
 from ..labels import files as label_files
@@ -87,7 +87,7 @@ def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suf
     records = {name: record for name, record in finished.items() if record is not None}
     missing = [name for name in finished if name not in records]
     if missing:
-        return f"no dataset is written, since {len(missing)} of {len(shots)} shots are missing: {several(missing)}"
+        return f"no dataset is written, since {len(missing):,} of {counted(len(shots), 'shot')} are missing: {several(missing)}"
     cameras = [replace(_camera(folder, name, record), image=f"{name}.{suffix}") for name, record in records.items()]
     top, frames = _labeled(records)
     model, points = folder.path.joinpath(*MODEL), 0

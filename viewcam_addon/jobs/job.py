@@ -50,13 +50,13 @@ FOUR_VALUES = ("eye", "look_at", "up", "d")
 BESIDE_THEM = ("principal_point", "pixel_aspect", "mirrored")
 
 
-def _option(words: str, default: Any = None, **how: Any) -> Any:
+def _option(words: str, default: Any = None, **arguments: Any) -> Any:
     """A field that commands have an option for.
 
     words : the option's help.
-    how : further arguments of argparse's add_argument.
+    arguments : further arguments of argparse's add_argument.
     """
-    return dataclasses.field(default=default, metadata={"help": words, **how})
+    return dataclasses.field(default=default, metadata={"help": words, **arguments})
 
 
 @dataclass(frozen=True)
@@ -133,8 +133,8 @@ class Job:
             if getattr(self, field) is not None and (field, getattr(self, field)) != ("name", ""):
                 object.__setattr__(self, field, check(field, getattr(self, field)))
         for fields, sentence in conflicts({field: value for field in FIELDS if (value := getattr(self, field)) is not None}):
-            of = f" of the shot {checks.quoted(self.name)}" if self.name else ""
-            raise InputError(f"{', '.join(fields)}{of}: {sentence}")
+            shot = f" of the shot {checks.quoted(self.name)}" if self.name else ""
+            raise InputError(f"{', '.join(fields)}{shot}: {sentence}")
 
     @property
     def size(self) -> tuple[int, int] | None:

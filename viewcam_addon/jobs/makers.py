@@ -116,19 +116,14 @@ def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> l
 def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Job]:
     """A shot of each named pinhole, with its size, principal point, pixel aspect and mirroring.
 
-    Names that can't be a file's are made so: what may not stand in them is an underscore.
+    Names that can't be a file's are made so: what may not stand in them is an underscore, and a number tells two apart.
 
-    Raises ShotsError if two would be one file, or a camera is beyond Blender's limits; it has all of them.
+    Raises ShotsError if a camera is beyond Blender's limits; it has all of them.
     """
     problems = Problems("the cameras")
-    files: dict[str, str] = {}
+    pinholes = [*pinholes]
     shots: list[Job] = []
-    for camera, pinhole in pinholes:
-        name = names.made_fit(camera)
-        other = files.setdefault(names.one_file(name), camera)
-        if other != camera or len(files) <= len(shots):
-            problems.add(f"the cameras {checks.quoted(other)} and {checks.quoted(camera)} would have one file: rename one")
-            continue
+    for name, (_, pinhole) in zip(names.distinct(camera for camera, _ in pinholes), pinholes, strict=True):
         d_x, d_y = pinhole.distance
         pose = pinhole.eye, pinhole.look_at, pinhole.up, d_x
         with problems.caught():

@@ -292,8 +292,8 @@ class _Server:
             rounds.add(samples, reference, pictures, whole)
             samples, reference, pictures, whole = rounds.samples, rounds.reference, rounds.tests, rounds.everything
         share = max(samples // len(tests), 1)  # Cycles' file counts one that is left out
-        how = (seen, wanted.threads, share, renderer, partial, whole, self._keeper, may_be_empty, alarms)
-        comparison = api.compare(reference, pictures, *how)
+        arguments = (seen, wanted.threads, share, renderer, partial, whole, self._keeper, may_be_empty, alarms)
+        comparison = api.compare(reference, pictures, *arguments)
         if wanted.bias and isinstance(comparison, RadianceComparison):
             search = sequential.search(comparison, wanted.bias, rounds)
             if not search.is_decided:
@@ -329,8 +329,8 @@ class _Server:
             for name, frame in frames.items()
         }
         bent = Lens.from_json(lens) if lens else None
-        here, how = scenes.pop("here"), (threads, self._keepers, bent, annotations)
-        labels = label(here, kinds, scenes.get("previous"), scenes.get("next"), *how)
+        here, options = scenes.pop("here"), (threads, self._keepers, bent, annotations)
+        labels = label(here, kinds, scenes.get("previous"), scenes.get("next"), *options)
         return [path.name for path in files.write(Path(picture), labels, depth_steps)]
 
     def _scene(self, path: str) -> "Scene":
@@ -348,9 +348,9 @@ def _distort(image: str, preview: str, calibration: dict[str, Any], cut: dict[st
     from .. import image as images
     from .. import png
 
-    of, plane = Calibration.from_json(calibration), ViewPlane(**cut)
-    images.rewrite(image, lambda pixels, is_data: of.distorted(pixels, plane, nearest=is_data), of.plane)
-    pixels = of.distorted(png.decoded(Path(preview).read_bytes()), plane)
+    lens, plane = Calibration.from_json(calibration), ViewPlane(**cut)
+    images.rewrite(image, lambda pixels, is_data: lens.distorted(pixels, plane, nearest=is_data), lens.plane)
+    pixels = lens.distorted(png.decoded(Path(preview).read_bytes()), plane)
     with written_whole(preview) as temporary:
         temporary.write_bytes(png.encoded(pixels if pixels.shape[2] > 2 else pixels[..., 0]))
 

@@ -236,7 +236,7 @@ def test_an_animation_has_each_camera_s_own_frames(two):
 def test_names_that_are_one_file_are_kept_apart_and_hidden_cameras_left_out(add_camera, scene):
     for name in ("a:b", "A?b", "hidden"):
         add_camera(name).hide_render = name == "hidden"
-    assert [job.name for job in render_all.shots(scene, False)] == ["A_b", "a_b_"]
+    assert [job.name for job in render_all.shots(scene, False)] == ["A_b", "a_b_2"]
     for each in scene.objects:
         each.hide_render = True
     with pytest.raises(InputError, match="has no camera that is rendered"):
@@ -310,7 +310,7 @@ def test_a_proof_of_each_picture_is_asked_for_by_one_box(two, stand_in, tmp_path
         comparing, "command", lambda *arguments: asked.append(plan.read(arguments[2])[1]) or stood_in(*arguments)
     )
     assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path), check=check) == {"FINISHED"}
-    assert [how.outputs.check for how in asked] == [check]
+    assert [plan_read.outputs.check for plan_read in asked] == [check]
 
 
 def test_without_a_folder_it_is_refused_and_a_child_that_dies_leaves_no_folder(two, monkeypatch, tmp_path):

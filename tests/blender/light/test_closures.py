@@ -193,12 +193,12 @@ def test_sheen_is_cycles_to_float32(patches):
     check(patches(of_sheen()), of_sheen(), SHEEN)
 
 
-@pytest.mark.parametrize("of", [of_sheen, of_layers_below_sheen])
-def test_sheen_is_cycles_where_a_smooth_normal_is_turned_away(pictures, painted, mesh_from, of):
+@pytest.mark.parametrize("lobes", [of_sheen, of_layers_below_sheen])
+def test_sheen_is_cycles_where_a_smooth_normal_is_turned_away(pictures, painted, mesh_from, lobes):
     ball = mesh_from("ico_sphere", subdivisions=1, radius=2.0)
     ball.shade_smooth()
     bpy.data.objects["Monkey"].data = ball
-    for shader in list(of())[:4:2]:
+    for shader in list(lobes())[:4:2]:
         ball.materials.clear()
         ball.materials.append(painted(*shader))
         (sides,) = pictures(scenes=1)

@@ -466,8 +466,8 @@ def test_light_that_the_smooth_surface_has_before_it_counts_where_the_true_one_h
 def test_a_smooth_normal_that_is_a_little_wrong_is_found(tilted, monkeypatch):
     from viewcam_addon.blender.scenes import export_geometry
 
-    def turned(*of):
-        normals = right(*of) + np.float32((0.01, 0, 0))
+    def turned(*arguments):
+        normals = right(*arguments) + np.float32((0.01, 0, 0))
         return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
     right = export_geometry._corner_normals

@@ -351,13 +351,13 @@ ODD_TREES = {
 @pytest.mark.parametrize("odd", ODD_TREES)
 def test_what_cycles_makes_of_odd_nodes(pictures, floor, odd):
     """Nothing of what it can't use; light of a color in place of a shader."""
-    how, kind, output = ODD_TREES[odd]
+    linked_to, kind, output = ODD_TREES[odd]
     tree, shader = floor.node_tree, floor.node_tree.nodes["Shader"]
     node = tree.nodes.new(kind)
     if "Color" in node.inputs:
         node.inputs["Color"].default_value = GIVEN
     output_socket = node.outputs[output or 0]
-    if how == "color":
+    if linked_to == "color":
         if kind == "ShaderNodeShaderToRGB":
             tree.links.new(tree.nodes.new("ShaderNodeBsdfDiffuse").outputs[0], node.inputs[0])
         mixed = tree.nodes.new("ShaderNodeGamma")
@@ -365,7 +365,7 @@ def test_what_cycles_makes_of_odd_nodes(pictures, floor, odd):
         tree.links.new(output_socket, mixed.inputs["Color"])
         tree.links.new(mixed.outputs[0], shader.inputs["Color"])
     else:
-        mixed = tree.nodes.new(f"ShaderNode{how.title()}Shader")
+        mixed = tree.nodes.new(f"ShaderNode{linked_to.title()}Shader")
         first, second = [socket for socket in mixed.inputs if socket.type == "SHADER"]
         tree.links.new(shader.outputs[0], first)
         tree.links.new(output_socket, second)
@@ -375,7 +375,7 @@ def test_what_cycles_makes_of_odd_nodes(pictures, floor, odd):
     for name in ("Diffuse Color", "Emission"):
         cycles = sides[0].cycles[0][name]
         assert np.abs(sides[0].traced[name] - cycles).max() <= FLAT
-    shines = how == "mix" and kind in ("ShaderNodeBackground", "ShaderNodeGamma", "ShaderNodeNewGeometry")
+    shines = linked_to == "mix" and kind in ("ShaderNodeBackground", "ShaderNodeGamma", "ShaderNodeNewGeometry")
     assert sides[0].cycles[0]["Emission"].any() == (shines and output is None)
 
 

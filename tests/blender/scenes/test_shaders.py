@@ -252,7 +252,9 @@ def test_a_normal_node_is_its_direction_and_how_far_another_goes_along_it(diffus
     added = link(diffuse, "ShaderNodeNormal", "Dot", "Color")
     added.outputs["Normal"].default_value = (0.0, 3.0, 4.0)
     diffuse.node_tree.links.new(diffuse.node_tree.nodes.new("ShaderNodeNewGeometry").outputs["Normal"], added.inputs[0])
-    unit = {name: node("vector_math", operation="normalize", a=of) for name, of in (("a", (0.0, 3.0, 4.0)), ("b", NORMAL))}
+    unit = {
+        name: node("vector_math", operation="normalize", a=vector) for name, vector in (("a", (0.0, 3.0, 4.0)), ("b", NORMAL))
+    }
     assert exactly(diffuse).surface["color"] == node("vector_math", operation="dot_product", **unit)
 
 

@@ -244,8 +244,8 @@ def test_each_of_many_renders_shows_the_camera_its_own_image(tree, camera_object
     tree.color(add.outputs[0])
     addresses = []
 
-    def watched(*arguments, **how):
-        image = image_of(*arguments, **how)
+    def watched(*arguments, **options):
+        image = image_of(*arguments, **options)
         addresses.append(image.as_pointer())
         return image
 

@@ -83,9 +83,9 @@ def test_samples_fall_as_often_as_their_density_says(name, behind):
     if name not in OPAQUE:  # beside the density of samples it has one of light that no facet refracts
         there.pdf *= (directions[2] > 0) | can_be_refracted(came, directions, 1 / GLASSY["ior"] if behind else GLASSY["ior"])
 
-    def cells(of):
-        turn = np.arctan2(of[1], of[0]) / (2 * np.pi) % 1
-        return np.minimum(((of[2] + 1) * 4).astype(int), 7) * 16 + np.minimum((turn * 16).astype(int), 15)
+    def cells(vectors):
+        turn = np.arctan2(vectors[1], vectors[0]) / (2 * np.pi) % 1
+        return np.minimum(((vectors[2] + 1) * 4).astype(int), 7) * 16 + np.minimum((turn * 16).astype(int), 15)
 
     kept = drawn.sampled_pdf > 0
     kept &= drawn.sampled_pdf < np.inf

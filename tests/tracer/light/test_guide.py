@@ -86,9 +86,9 @@ def test_a_guide_leaves_less_than_half_of_the_noise_where_light_comes_by_a_hole(
     assert guided < 0.5 * alone, f"variance {guided:.2e}, {guided / alone:.2f} of {alone:.2e}"
 
 
-@pytest.mark.parametrize("how", [{"threads": 1}, {"threads": 3, "steps": (1, 4, SAMPLES)}])
-def test_a_guided_picture_has_the_same_bits_on_any_number_of_threads_and_in_any_steps(hollow_ball, pictures, how):
-    again = render(hollow_ball(GUIDED), "path", SAMPLES, **how)
+@pytest.mark.parametrize("options", [{"threads": 1}, {"threads": 3, "steps": (1, 4, SAMPLES)}])
+def test_a_guided_picture_has_the_same_bits_on_any_number_of_threads_and_in_any_steps(hollow_ball, pictures, options):
+    again = render(hollow_ball(GUIDED), "path", SAMPLES, **options)
     assert np.array_equal(again["Combined"], pictures[GUIDED]["Combined"])
 
 

@@ -63,8 +63,8 @@ class VIEWCAM_OT_copy_camera(WorldOptions, CameraOperator, bpy.types.Operator):
         own = self.format == OWN
         text = text_of(camera_object, scene, self.format, formats.Options() if own and not self.ask else self.chosen())
         bpy.context.window_manager.clipboard = text
-        how = "" if self.axes == "as_is" and self.scale == 1 else f", axes {self.axes}, scale {self.scale:.7g}"
-        self.report({"INFO"}, f"Copied {text}" if own else f"Copied {camera_object.name} as {self._title()}{how}")
+        conversion = "" if self.axes == "as_is" and self.scale == 1 else f", axes {self.axes}, scale {self.scale:.7g}"
+        self.report({"INFO"}, f"Copied {text}" if own else f"Copied {camera_object.name} as {self._title()}{conversion}")
 
     def _title(self) -> str:
         return formats.FORMATS[self.format].TITLE

@@ -25,7 +25,7 @@ import bpy
 from ... import child_process
 from ...comparison.answer import DIFFERENT, SAME_BUT, but_for, percent_of
 from ...comparison.statistics import plain
-from ...errors import InputError, operator_reason
+from ...errors import InputError, counted, operator_reason
 from ...file_names import made_fit
 from ...files import written_whole
 from ...jobs import plan as orders
@@ -205,10 +205,10 @@ class RunningComparison:
         _remove(self.folder)
 
     def _outcome(self, status: int) -> Outcome:
-        of = (self._what, self._camera, self._seen)
+        subject = (self._what, self._camera, self._seen)
         result = _read(self.folder / _RESULT)
         if "answer" not in result:
-            return Outcome(*of, None, failure(self._output(), status))
+            return Outcome(*subject, None, failure(self._output(), status))
         folder = self.folder / _REPORT
         temporary: Path | None = self.folder
         if self._keep_in:
@@ -216,10 +216,10 @@ class RunningComparison:
                 shutil.copytree(folder, self._keep_in, copy_function=_copy_whole, dirs_exist_ok=True)
                 folder, temporary = self._keep_in, None
             except (OSError, InputError) as error:
-                return Outcome(*of, None, f"The report can't be kept in {self._keep_in} ({error}): choose another folder")
+                return Outcome(*subject, None, f"The report can't be kept in {self._keep_in} ({error}): choose another folder")
         drawn = result.get("difference", {})
         return Outcome(
-            *of,
+            *subject,
             result["answer"],
             result["sentence"],
             headline(result),
@@ -328,7 +328,7 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
             rows.append(("Light, to Tracer's", ratio))
     ledger = result["ledger"]
     whole = sum(entry["status"] == "exported" for entry in ledger)
-    return [*rows, ("Modeled", f"{whole} of {len(ledger)} objects")]
+    return [*rows, ("Modeled", f"{whole} of {counted(len(ledger), 'object')}")]
 
 
 def failure(printed: str, status: int) -> str:
@@ -341,9 +341,9 @@ def failure(printed: str, status: int) -> str:
     if errors:
         sentence, *more = errors[-1].get("problems") or [errors[-1]["text"]]
         return sentence[:1].upper() + sentence[1:] + (f" (and {len(more)} more problems)" if more else "")
-    how = f"was ended by signal {-status}" if status < 0 else f"ended with status {status}"
+    ending = f"was ended by signal {-status}" if status < 0 else f"ended with status {status}"
     words = [line.strip() for line in lines if line.strip() and not line.startswith('{"event"')]
-    return f"The process that compares {how}" + (f" after saying: {words[-1]}" if words else "")
+    return f"The process that compares {ending}" + (f" after saying: {words[-1]}" if words else "")
 
 
 def _check_possible(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:

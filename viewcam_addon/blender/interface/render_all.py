@@ -10,8 +10,8 @@ from pathlib import Path
 
 import bpy
 
-from ...errors import InputError
-from ...file_names import made_fit, one_file
+from ...errors import InputError, counted
+from ...file_names import distinct
 from ...jobs.folder import Outputs
 from ...jobs.job import Job
 from .. import own_picture
@@ -47,14 +47,9 @@ def shots(scene: bpy.types.Scene, animation: bool) -> list[Job]:
 
     Raises InputError if there is none, or one has pixels of another shape than the scene, which a batch can't give it.
     """
-    rows, names = [], set()
-    for camera_object in scene_cameras.of_scene(scene):
-        if camera_object.hide_render:
-            continue
-        name = made_fit(camera_object.name)
-        while one_file(name) in names:
-            name += "_"
-        names.add(one_file(name))
+    rows = []
+    rendered = [each for each in scene_cameras.of_scene(scene) if not each.hide_render]
+    for camera_object, name in zip(rendered, distinct(each.name for each in rendered), strict=True):
         picture = own_picture.of_camera(camera_object, scene)
         frames = range(int(picture["frame_start"]), int(picture["frame_end"]) + 1) if animation else (scene.frame_current,)
         rows += [shot(camera_object, scene, f"{name}_{frame:04d}" if animation else name, frame) for frame in frames]
@@ -85,10 +80,14 @@ class Rendering(BackgroundBatch):
             return None
         _sheet = self.sheet if self.sheet.is_file() else None
         status, sentence = ended
+        pictures = counted(self.count, "picture")
         if status == 0:
-            return True, f"{self.count} picture{'s' if self.count > 1 else ''} in {self.folder}"
+            return True, f"{pictures} in {self.folder}"
         if self.sheet.is_file():
-            return False, f"{self.done} of {self.count} pictures in {self.folder}: the contact sheet says what went wrong"
+            return (
+                False,
+                f"{self.done} of {pictures} in {self.folder}: the contact sheet says what went wrong",
+            )
         return False, sentence
 
 

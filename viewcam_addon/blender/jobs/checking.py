@@ -72,11 +72,11 @@ class Checker:
 
         Raises InputError if the scene can't be exported or rendered by Cycles, or if the two can't be compared.
         """
-        of = dataclasses.replace(
+        geometry_job = dataclasses.replace(
             job, engine="CYCLES", level=LEVELS[0], recenter=False, clay=False, device="CPU", error=None, **_AS_THE_SCENE_STANDS
         )
         image = self._files.folder / "cycles.exr"
-        with numbered_indices(), staged(of, scene, camera_object, whole=True) as stage:
+        with numbered_indices(), staged(geometry_job, scene, camera_object, whole=True) as stage:
             export = self._files.exported(stage)
             camera = None if job.is_of_scenes_camera else camera_object
             ledger, render = export.ledger, functools.partial(cycles.render, scene, stage.view_layer, camera)
@@ -89,7 +89,7 @@ class Checker:
         clip = data.clip_start, data.clip_end
         entries, path = export.scene.ledger, self._files.file_of(export.scene)
         comparison = self._tracing.compare(
-            path, [image], of, pinhole, clip, stated, entries, everything=everything, may_be_empty=True
+            path, [image], geometry_job, pinhole, clip, stated, entries, everything=everything, may_be_empty=True
         )
         return _brief(comparison, entries)
 
@@ -132,16 +132,16 @@ class Checker:
             if keep:
                 scene_file.write(exported, keep / "scene.json")
             approved = scene_file.read(path) if job.scene else None
-            of, ledger = dataclasses.replace(job, level=level), (approved or exported).ledger
+            leveled, ledger = dataclasses.replace(job, level=level), (approved or exported).ledger
             if level == LEVELS[0]:
-                of = dataclasses.replace(of, find=None)
+                leveled = dataclasses.replace(leveled, find=None)
             camera, clip, stated = (None, None, None) if approved else (exported.camera, exported.clip, exported.stated_camera)
-            if of.find:  # the check before ended with more samples than this one begins with
+            if leveled.find:  # the check before ended with more samples than this one begins with
                 persistent_data.drop(scene)
             rendered = traced = 0.0
             taken, total = 0, TOTALS[0]
             for number in itertools.count():
-                part = _round(of, number, total - taken)
+                part = _round(leveled, number, total - taken)
                 begun = time.perf_counter() if number else started
                 self._render(stage, exported, part, tests, everything)
                 if not keep:  # the page has to be the same bytes each time

@@ -95,11 +95,11 @@ class Stage:
                     bounces = light.bounces.none if self.level == "direct" else light.bounces
                     settings = cycles.LightSettings(light.film, bounces, share, (job.seed or 0) + seed)
                 remedies = self.ledger.remedies_of_everything if is_of_everything else self.ledger.remedies.values()
-                of = self.scene, self.view_layer, camera, path
+                target = self.scene, self.view_layer, camera, path
                 if job.engine in ("EEVEE", "WORKBENCH"):
-                    rasters.render(*of, job.engine, remedies, job.threads)
+                    rasters.render(*target, job.engine, remedies, job.threads)
                 else:
-                    cycles.render(*of, remedies, job.threads, settings, kept, job.device, is_of_everything, lasting)
+                    cycles.render(*target, remedies, job.threads, settings, kept, job.device, is_of_everything, lasting)
             if keep and lasting.is_shared:  # Cycles must not know it when it is gone
                 persistent_data.drop(self.scene)
 

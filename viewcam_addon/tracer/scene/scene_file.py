@@ -305,14 +305,14 @@ def _values(kind: type, keys: dict[str, Field]) -> dict[str, Any]:
     return {name: _value(field, *read[name]) for name, field in keys.items()}
 
 
-def _value(field: Field, how: str, *arguments: Any) -> Any:
-    if how == "node":
+def _value(field: Field, reader: str, *arguments: Any) -> Any:
+    if reader == "node":
         return _node(field)
-    if how == "names":
+    if reader == "names":
         return names(field, *arguments)
-    if how == "backdrop":
+    if reader == "backdrop":
         return _simple(World, field, without=("hidden_from", "backdrop"))
-    return getattr(field, how)(*arguments)
+    return getattr(field, reader)(*arguments)
 
 
 FORMAT = "virtual-pinhole-scene"

@@ -48,12 +48,12 @@ def light(default: float = 1.0) -> Any:
     return value((default,) * 3, radiance, "vector", 3)
 
 
-def check(owner: Any, of: str = "") -> None:
+def check(owner: Any, owner_name: str = "") -> None:
     """Let all declared values of a frozen dataclass be what they may be.
 
-    of : the owner of the values, as a sentence names it.
+    owner_name : the owner of the values, as a sentence names it.
     """
     for each in fields(owner):
         if check := each.metadata.get("check"):
-            name = f"{each.name} of {of}" if of else each.name
+            name = f"{each.name} of {owner_name}" if owner_name else each.name
             object.__setattr__(owner, each.name, check(name, getattr(owner, each.name)))
