@@ -245,7 +245,7 @@ def test_heights_of_all_that_varies_and_all_ways_to_bump_are_cycles(patches):
 
 @pytest.mark.parametrize("value", [(0.0, 0.0, 0.0), (0.3, 0.3, 0.3), (0.4, 0.3, 0.8)])
 def test_a_normal_that_is_given_as_a_value_counts_as_in_cycles(patches, value):
-    """Of a group it does since 5.0; bumps of a normal of 0 are none."""
+    """A normal of a group does since 5.0; bumps of a normal of 0 are none."""
 
     def give(material, mapped, by, bumped):
         tree = material.node_tree

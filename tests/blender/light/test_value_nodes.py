@@ -75,10 +75,10 @@ class Constant(N):
 
 
 class InGroup(N):
-    """A node in a group; one of its inputs is the group's, which is given a value, or a node outside."""
+    """A node in a group; one of its inputs is the group's, which has a value, or is fed by a node outside."""
 
-    def __init__(self, node, name, given, kind="Vector"):
-        self.node, self.name, self.given, self.kind = node, name, given, kind
+    def __init__(self, node, name, fed, kind="Vector"):
+        self.node, self.name, self.fed, self.kind = node, name, fed, kind
 
     def add(self, tree):
         inside = bpy.data.node_groups.new("Group", "ShaderNodeTree")
@@ -90,15 +90,15 @@ class InGroup(N):
         inside.links.new(output, inside.nodes.new("NodeGroupOutput").inputs[0])
         group = tree.nodes.new("ShaderNodeGroup")
         group.node_tree = inside
-        if isinstance(self.given, N):
-            tree.links.new(self.given.add(tree), group.inputs[0])
+        if isinstance(self.fed, N):
+            tree.links.new(self.fed.add(tree), group.inputs[0])
         else:
-            group.inputs[0].default_value = self.given
+            group.inputs[0].default_value = self.fed
         return group.outputs[0]
 
 
 class Chosen(N):
-    """What a menu chooses of nodes, by name."""
+    """The one of several nodes that a menu chooses, by name."""
 
     def __init__(self, name, **among):
         self.name, self.among = name, among
@@ -473,7 +473,7 @@ def test_a_constant_that_is_given_counts_where_else_the_surface_has_a_value_of_i
 
 def test_a_vector_that_is_the_same_everywhere_is_its_mean_as_a_number(floor):
     plus = N("Math", {"Value_001": N("TexCoord", output="Object")}, operation="ADD")
-    check(floor({kind: InGroup(plus, "Value", given, kind) for kind, given in (("Vector", CORNER), ("Color", (*CORNER, 1.0)))}))
+    check(floor({kind: InGroup(plus, "Value", value, kind) for kind, value in (("Vector", CORNER), ("Color", (*CORNER, 1.0)))}))
 
 
 @pytest.mark.skipif(bpy.app.version < (5, 0), reason="shaders have had menus since 5.0")

@@ -452,10 +452,10 @@ def test_a_mapping_turns_the_image(sky, export_world):
     assert exported.world == World((2.0, 2.0, 2.0), image="Sky", closest=True, rotation=(0.25, 0.5, 1.0)) and not reasons
 
 
-@pytest.mark.parametrize("given_by", ["a mapping of nothing", "a group"])
-def test_an_image_that_is_looked_up_in_one_place_is_one_color(sky, export_world, given_by):
+@pytest.mark.parametrize("by", ["a mapping of nothing", "a group"])
+def test_an_image_that_is_looked_up_in_one_place_is_one_color(sky, export_world, by):
     world, texture, feed = sky
-    if given_by == "a mapping of nothing":
+    if by == "a mapping of nothing":
         feed("ShaderNodeMapping").inputs["Location"].default_value = (1.0, 0.5, -0.5)
     else:
         group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
@@ -467,7 +467,7 @@ def test_an_image_that_is_looked_up_in_one_place_is_one_color(sky, export_world,
         node.inputs[0].default_value = (1.0, 0.5, -0.5)
         world.node_tree.links.new(node.outputs[0], texture.inputs["Vector"])
     exported, reasons = export_world()
-    is_one = given_by == "a mapping of nothing" or bpy.app.version >= (5, 0)  # before, groups gave images no place
+    is_one = by == "a mapping of nothing" or bpy.app.version >= (5, 0)  # before, groups gave images no place
     assert (exported.world.image != "Sky") == is_one, (exported.world, reasons)
 
 
