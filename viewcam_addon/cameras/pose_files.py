@@ -131,7 +131,7 @@ def _intrinsics(file: Source) -> Mapping[str, Any]:
                 numbers = flat(f"K in {k_file.name}", text)
                 side = {9: 3, 16: 4}.get(len(numbers))
                 if side is None:
-                    raise InputError(f"{k_file.name} has {len(numbers)} numbers: K has 3 × 3, or 4 × 4")
+                    raise InputError(f"{k_file.name} has {counted(len(numbers), 'number')}: K has 3 × 3, or 4 × 4")
                 return {**size, "k": np.array(numbers).reshape(side, side)[:3, :3].ravel().tolist()}
     return {}
 

@@ -291,7 +291,7 @@ class Record:
         """So many numbers, in whatever nesting."""
         result = flat(self.called(key), self.needed(key))
         if len(result) != count:
-            raise InputError(f"{self.called(key)} has {len(result)} numbers: it should have {count}")
+            raise InputError(f"{self.called(key)} has {counted(len(result), 'number')}: it should have {count}")
         return result
 
     def record(self, key: str) -> "Record":
