@@ -16,7 +16,7 @@ import pytest
 from viewcam_addon import api, cameras, commands, image
 from viewcam_addon.cli import main
 from viewcam_addon.commands.demo import SCENE as DEMO_SCENE
-from viewcam_addon.errors import InputError
+from viewcam_addon.errors import InputError, counted
 from viewcam_addon.jobs.folder import Folder
 from viewcam_addon.pinhole import Pinhole
 
@@ -571,3 +571,9 @@ def test_help_tells_the_first_line_of_each_module_of_a_command_and_imports_none(
         summary = importlib.import_module(f"viewcam_addon.commands.{name}").__doc__.splitlines()[0]
         assert summary.endswith(".") and f"{name} {summary}" in listed, name
     assert "serve" not in listed.partition("positional")[2], "a command for our own processes is listed"
+
+
+@pytest.mark.parametrize(("count", "sentence"), [(0, "0 lenses"), (1, "1 lens"), (2000, "2,000 lenses")])
+def test_a_sentence_counts_in_the_singular_where_there_is_one(count, sentence):
+    assert counted(count, "lens", "lenses") == sentence
+    assert counted(count, "camera") == sentence.replace("lenses", "cameras").replace("lens", "camera")

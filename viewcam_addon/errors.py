@@ -28,6 +28,14 @@ class NotModeledError(InputError):
     exit_status = 3
 
 
+def counted(count: int, singular: str, plural: str = "") -> str:
+    """A number of things in a sentence: 1 camera, 2,000 cameras.
+
+    plural : the word for several of them, where that takes more than an s.
+    """
+    return f"{count:,} {singular if count == 1 else plural or f'{singular}s'}"
+
+
 def listed(names: Sequence[str]) -> str:
     """Names in a sentence: a, b and c."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import checks
-from .errors import InputError
+from .errors import InputError, counted
 from .pinhole import Pinhole, Triple, check_distance
 
 Array = NDArray[np.float64]
@@ -192,11 +192,12 @@ def from_points(
     precision = checks.number("precision", precision, least=1e-9)
     points, pixels = checks.array("points", points), checks.array("pixels", pixels)
     if points.ndim != 2 or points.shape[1:] != (3,) or pixels.shape != (len(points), 2):
-        raise InputError(f"{len(points)} points and {len(pixels)} pixels do not belong together: give as many of both")
+        both = f"{counted(len(points), 'point')} and {counted(len(pixels), 'pixel')}"
+        raise InputError(f"{both} do not belong together: give as many of both")
     singular_values = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     is_flat = len(points) < 4 or singular_values[2] <= _FLAT * singular_values[0]
     if len(points) < (4 if is_flat else 6):
-        raise InputError(f"{len(points)} points are too few: give four in one plane, or six in space")
+        raise InputError(f"only {counted(len(points), 'point')}: give four in one plane, or six in space")
     if singular_values[1] <= _FLAT * singular_values[0]:
         raise InputError("the points lie on one line: give some beside it")
     middle = np.array(like.principal_point)

@@ -317,7 +317,7 @@ def test_bundler_looks_along_minus_z(name):
     rows = [[known.f_x, 0, 0], *turn, -turn @ known.e]
     text = "# Bundle file v0.3\n2 0\n" + "\n".join(map(text_of, rows)) + "\n0 0 0\n" + "0 0 0\n" * 4
     read = the_same(cameras.read(text, options=Options(size=(known.width, known.height))), known)
-    assert not read.size_stated and any("1 cameras that were not placed" in note for note in read.notes)
+    assert not read.size_stated and any("1 camera not placed" in note for note in read.notes)
 
 
 @pytest.mark.parametrize("name", CENTERED)
@@ -1296,9 +1296,7 @@ def test_scannets_folder_has_its_intrinsics_and_pictures(tmp_path):
     for place in (tmp_path, tmp_path / "pose"):
         read = cameras.read(place)
         assert [(camera.name, camera.image) for camera in read] == [(f"{i}", f"{i}.jpg") for i in (0, 2, 10)]
-        assert the_same(read[2:], known).size_stated and any(
-            "1 pictures that were not placed" in note for note in read[0].notes
-        )
+        assert the_same(read[2:], known).size_stated and any("1 picture not placed" in note for note in read[0].notes)
     the_same(cameras.read(tmp_path / "pose" / "2.txt", options=Options(size=(known.width, known.height))), known)
 
 

@@ -32,6 +32,9 @@ CIRCLES_ARE_BLACK = bpy.app.version >= (5, 0)
 # True if an input keeps its value where a muted node or a reroute feeds it that nothing feeds; before, Cycles made it 0.
 # Measured: 4.2, 4.5, 5.0 and 5.2.
 MUTED_NODES_HAVE_NO_VALUES = bpy.app.version >= (5, 0)
+# True if the value of a group's input counts wherever links inside lead; before, it was none where surfaces have one of their
+# own, as the UV map that images are laid out by. Measured: 4.2, 5.0 and 5.2.
+GROUPS_GIVE_ALL_VALUES = bpy.app.version >= (5, 0)
 # True if a material slot of an object that is empty is that for Cycles; before, it had the mesh's material. Measured: 4.2, 4.5,
 # 5.0 and 5.2.
 EMPTY_SLOTS_OF_OBJECTS_STAY_EMPTY = bpy.app.version >= (5, 1)

@@ -358,7 +358,7 @@ def recognized(source: str | Path | Source) -> str:
     for name in readable():
         with _told_of_damage(source, FORMATS[name].TITLE):
             if _recognizes(FORMATS[name], source):
-                if is_json and name in _CODE and source.json_problem:
+                if is_json and name in _CODE and source.json_problem and not own.lines_of(source):
                     break
                 return name
     for beginning, sentence in _OTHER_FILES.items():

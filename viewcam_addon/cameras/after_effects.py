@@ -16,7 +16,7 @@ import re
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..rotation import from_euler
 from . import axes
 from .camera import Camera, Options
@@ -62,7 +62,8 @@ def _values(what: str, arguments: str, animated: bool, count: int) -> tuple[np.n
     head, _, rest = arguments.partition("],") if animated else ("0", "", arguments)
     times, numbers = (np.array(flat(what, part.translate(_BRACKETS).strip(" ,"))) for part in (head, rest))
     if not len(times) or len(numbers) != count * len(times):
-        raise InputError(f"{what} has {len(times)} times and {len(numbers)} numbers: give {count} for each")
+        has = f"{counted(len(times), 'time')} and {counted(len(numbers), 'number')}"
+        raise InputError(f"{what} has {has}: give {count} for each")
     return times, numbers.reshape(-1, count)
 
 

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import counted
 from . import axes
 from .camera import Camera
 from .distortion import Lens, opencv
@@ -520,7 +521,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     as_is = evidence.errors(views)
     if len(as_is) < _FEWEST:
         return Verdict(
-            "unsure", f"{len(as_is)} observations are too few to tell: {_FEWEST} are needed", observations=len(as_is)
+            "unsure", f"{counted(len(as_is), 'observation')} of {_FEWEST} that are needed to tell", observations=len(as_is)
         )
     tried, errors = _explanations(views, evidence, as_is)
     # The usual error is that of the best explanation, so that it does not hide in the worse ones.

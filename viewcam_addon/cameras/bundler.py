@@ -8,7 +8,7 @@ Source: Bundler's README.md.
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming
 from .camera import Camera, Options
@@ -50,8 +50,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     ]
     lost = len(blocks) - len(placed)
     if lost and not placed:
-        raise InputError(f"none of the {lost} cameras of {source.name} was placed: let Bundler place them first")
-    lost_note = (f"{lost} cameras that were not placed were left out",) if lost else ()
+        raise InputError(f"none of {counted(lost, 'camera')} of {source.name} was placed: let Bundler place them first")
+    lost_note = (f"{counted(lost, 'camera')} not placed: left out",) if lost else ()
     return [camera.noted(*lost_note) for camera in cameras]
 
 

@@ -10,7 +10,7 @@ Source: AliceVision's src/aliceVision/sfmDataIO/jsonIO.cpp and camera/IntrinsicS
 import numpy as np
 
 from .. import checks
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming
 from .camera import Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
@@ -47,9 +47,10 @@ def read(source: Source, options: Options) -> list[Camera]:
     placed = [view for view in views if str(view.get("poseId")) in poses and str(view.get("intrinsicId")) in intrinsics]
     if not placed:
         raise InputError(
-            f"none of the {len(views)} views of {source.name} has a pose: let Meshroom run StructureFromMotion first"
+            f"none of {counted(len(views), 'view')} of {source.name} has a pose: let Meshroom run StructureFromMotion first"
         )
-    lost_note = (f"{len(views) - len(placed)} views without a pose were left out",) if len(placed) < len(views) else ()
+    lost = len(views) - len(placed)
+    lost_note = (f"{counted(lost, 'view')} without a pose: left out",) if lost else ()
     paths = [str(view.get("path") or f"view {view.get('viewId')}") for view in placed]
     planes: dict[str, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}
     left_out, cameras = LeftOut(), []

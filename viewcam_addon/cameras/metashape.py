@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from .. import checks
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming
 from .camera import Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
@@ -67,7 +67,7 @@ def read(source: Source, options: Options) -> list[Camera]:
                 plane, lens, notes = planes[sensor]
                 numbers = flat(f"the transform of {what}", own)
                 if len(numbers) != 16:
-                    raise InputError(f"the transform of {what} has {len(numbers)} numbers: it should have 16")
+                    raise InputError(f"the transform of {what} has {counted(len(numbers), 'number')}: it should have 16")
                 belongs = camera.get("component_id")
                 if components and belongs is not None and belongs not in components:
                     raise InputError(
@@ -82,8 +82,8 @@ def read(source: Source, options: Options) -> list[Camera]:
                 result.append(Camera(naming.stem(label), pinhole, True, (*notes, *more), image, lens=lens))
     result = left_out.with_notes(result)
     if lost and not result:
-        raise InputError(f"none of the {lost} cameras of {source.name} is aligned: align them in Metashape first")
-    lost_note = (f"{lost} cameras that are not aligned were left out",) if lost else ()
+        raise InputError(f"none of {counted(lost, 'camera')} of {source.name} is aligned: align them in Metashape first")
+    lost_note = (f"{counted(lost, 'camera')} not aligned: left out",) if lost else ()
     return [camera.noted(*lost_note) for camera in result]
 
 

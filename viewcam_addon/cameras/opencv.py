@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming, own
 from .camera import POSES, Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
@@ -418,7 +418,7 @@ def _numbers(name: str, value: Any) -> tuple[float, ...]:
         if rows is not None and columns is not None:
             rows, columns = pixels(f"rows of {name}", rows), pixels(f"cols of {name}", columns)
             if len(result) != rows * columns:
-                raise InputError(f"{name} has {len(result)} numbers: its rows and cols say {rows} × {columns}")
+                raise InputError(f"{name} has {counted(len(result), 'number')}: its rows and cols say {rows} × {columns}")
         return result
     return flat(name, value)
 
@@ -434,7 +434,7 @@ def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float
         if len(values) == 12:
             values = [values[i] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)]
         if len(values) != 9:
-            raise InputError(f"K of {what} has {len(values)} numbers: give nine")
+            raise InputError(f"K of {what} has {counted(len(values), 'number')}: give nine")
         f_x, skew, c_x, lower, f_y, c_y, *last = values
         if [lower, *last[:2]] != [0, 0, 0] or last[2] != 1:
             hint = "transpose it" if [values[1], values[2], values[5]] == [0, 0, 0] else "its last row should be 0 0 1"
@@ -613,7 +613,7 @@ def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple
     if (both := _first(values, _SIZE)) is not None:
         numbers = _numbers(f"the size of {what}", both)
         if len(numbers) != 2:
-            raise InputError(f"the size of {what} has {len(numbers)} numbers: give the width and the height")
+            raise InputError(f"the size of {what} has {counted(len(numbers), 'number')}: give the width and the height")
         across, up = (pixels(f"the size of {what}", number) for number in numbers)
         return (across, up), True
     return options.size_or_refuse(what), False
@@ -654,7 +654,9 @@ def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.nd
     elif len(numbers) == 3 and turn is None:
         matrix = of_rotation_vector(numbers, what)
     else:
-        raise InputError(f"R of {what} has {len(numbers)} numbers: give nine, or as rvec the three of a rotation vector")
+        raise InputError(
+            f"R of {what} has {counted(len(numbers), 'number')}: give nine, or as rvec the three of a rotation vector"
+        )
     if turn is not None and vector is not None and len(numbers) == 9:
         both = _numbers(f"rvec of {what}", vector)
         if len(both) == 3 and np.abs(of_rotation_vector(both, what) - matrix).max() > 1e-3:

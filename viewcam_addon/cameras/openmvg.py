@@ -10,7 +10,7 @@ Source: OpenMVG's src/openMVG/sfm/sfm_data_io_cereal.hpp and cameras/Camera_*_io
 import numpy as np
 
 from .. import checks
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming, opencv
 from .camera import Camera, LeftOut, Options, not_a_pinhole
@@ -50,8 +50,8 @@ def read(source: Source, options: Options) -> list[Camera]:
         path = "/".join(part for part in (str(view.get("local_path") or ""), str(view.get("filename") or "")) if part)
         result.append((path or f"view {view.get('id_view')}", poses[pose_id], *intrinsics[intrinsic_id]))
     if not result:
-        raise InputError(f"none of the {lost} views of {source.name} has a pose: let OpenMVG reconstruct it first")
-    note: tuple[str, ...] = (f"{lost} views without a pose were left out",) if lost else ()
+        raise InputError(f"none of {counted(lost, 'view')} of {source.name} has a pose: let OpenMVG reconstruct it first")
+    note: tuple[str, ...] = (f"{counted(lost, 'view')} without a pose: left out",) if lost else ()
     if not options.pixel:
         note += ("OpenMVG does not say from where it counts pixels: the principal point was taken from the picture's corner",)
     planes: dict[int, tuple[ViewPlane, distortion.Lens | None, tuple[str, ...]]] = {}

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, counted
 from . import naming, opencv
 from .camera import Camera, LeftOut, Options
 from .source import Source, flat, image_size
@@ -70,8 +70,8 @@ def read(source: Source, options: Options) -> list[Camera]:
             camera = opencv.camera(name, values, options)
             cameras.append(replace(camera, image=picture.format(name).rpartition("/")[2] if picture else None))
     if not cameras and lost:
-        raise InputError(f"none of the {lost} pictures of {source.name} was placed: give another scan")
-    note = (f"{lost} pictures that were not placed were left out",) if lost else ()
+        raise InputError(f"none of {counted(lost, 'picture')} of {source.name} was placed: give another scan")
+    note = (f"{counted(lost, 'picture')} not placed: left out",) if lost else ()
     return [camera.noted(*note) for camera in left_out.with_notes(cameras)]
 
 
@@ -131,7 +131,7 @@ def _intrinsics(file: Source) -> Mapping[str, Any]:
                 numbers = flat(f"K in {k_file.name}", text)
                 side = {9: 3, 16: 4}.get(len(numbers))
                 if side is None:
-                    raise InputError(f"{k_file.name} has {len(numbers)} numbers: K has 3 × 3, or 4 × 4")
+                    raise InputError(f"{k_file.name} has {counted(len(numbers), 'number')}: K has 3 × 3, or 4 × 4")
                 return {**size, "k": np.array(numbers).reshape(side, side)[:3, :3].ravel().tolist()}
     return {}
 

@@ -25,7 +25,7 @@ import math
 import numpy as np
 
 from .. import checks
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming, texts
 from .camera import Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
@@ -97,7 +97,8 @@ def _camera(source: Source, options: Options) -> Camera:
     lens, note = distortion.settle(_lens(model.lower(), numbers), plane, what, options.without_distortion)
     turn, eye = flat(f"Rotation of {what}", values["Rotation"]), flat(f"Position of {what}", values["Position"])
     if len(turn) != 9 or len(eye) != 3:
-        raise InputError(f"{what} has {len(turn)} numbers of a rotation and {len(eye)} of a position: it should have 9 and 3")
+        has = f"{counted(len(turn), 'number')} of a rotation and {len(eye)} of a position"
+        raise InputError(f"{what} has {has}: it should have 9 and 3")
     matrix = np.eye(4)
     matrix[:3, :3] = np.array(turn).reshape(3, 3).T
     matrix[:3, 3] = eye
@@ -150,7 +151,7 @@ def _of_table(source: Source, columns: list[str], head: int, options: Options) -
     for (index, row), name in zip(rows, names, strict=True):
         what = f"line {index} of {source.name}"
         if len(row) != len(columns):
-            raise InputError(f"{what} has {len(row)} columns and their names are {len(columns)}: export it again")
+            raise InputError(f"{what} has {counted(len(row), 'column')} and their names are {len(columns)}: export it again")
         values = {
             column: number(f"{column} of {what}", value)
             for column, value in zip(columns[1:], row[1:], strict=True)

@@ -24,7 +24,7 @@ from xml.parsers import expat
 import numpy as np
 
 from .. import checks, npy
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..files import read_bytes
 from . import yaml
 
@@ -291,7 +291,7 @@ class Record:
         """So many numbers, in whatever nesting."""
         result = flat(self.called(key), self.needed(key))
         if len(result) != count:
-            raise InputError(f"{self.called(key)} has {len(result)} numbers: it should have {count}")
+            raise InputError(f"{self.called(key)} has {counted(len(result), 'number')}: it should have {count}")
         return result
 
     def record(self, key: str) -> "Record":
@@ -367,7 +367,8 @@ def table(name: str, lines: Sequence[tuple[int, str]]) -> np.ndarray:
     for number, line in lines:
         rows.append(flat(f"line {number} of {name}", line.rstrip(",")))
         if len(rows[-1]) != len(rows[0]):
-            raise InputError(f"line {number} of {name} has {len(rows[-1])} numbers and others have {len(rows[0])}: correct it")
+            has = counted(len(rows[-1]), "number")
+            raise InputError(f"line {number} of {name} has {has} and others have {len(rows[0])}: correct it")
     return np.array(rows)
 
 

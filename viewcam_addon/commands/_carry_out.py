@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import argument_types as types
 from .. import crashes
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..events import Events
 from ..file_names import one_file
 from ..jobs import cluster, dataset, one, served_renderer
@@ -175,7 +175,7 @@ def _tell(plan: Plan, events: Events, summary: Summary, folder: Folder, unknown:
     unknown : sentences on what may have changed in the pictures that were kept.
     """
     counts = summary.counts
-    shots = "1 shot" if counts["shots"] == 1 else f"{counts['shots']} shots"
+    shots = counted(counts["shots"], "shot")
     if counts["failed"] or counts["left"]:
         what = f"of {shots}, {counts['failed']} failed and {counts['left']} are left"
         events.tell("error", command=plan.command, text=f"{what}: the same command with --resume renders them")

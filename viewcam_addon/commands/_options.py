@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import argument_types as types
-from ..errors import InputError, NotModeledError
+from ..errors import InputError, NotModeledError, counted
 from ..terminal import say
 from ..tracer.scene.film import LEVELS, SAMPLES
 
@@ -158,7 +158,7 @@ def ledger_lines(ledger: Sequence[dict[str, str]]) -> list[str]:
         for entry in ledger
         if entry["status"] != "exported" or entry["reason"].startswith("the world ")
     ]
-    return [f"{exported} of {len(ledger)} objects exported whole", *rest] if ledger else []
+    return [f"{exported} of {counted(len(ledger), 'object')} exported whole", *rest] if ledger else []
 
 
 def ledger_json(ledger: Sequence[Any]) -> list[dict[str, str]]:

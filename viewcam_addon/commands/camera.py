@@ -12,7 +12,7 @@ from .. import argument_types as types
 from .. import cameras
 from ..cameras import Camera, Options, transforms, undistortion
 from ..cameras.distortion import Lens
-from ..errors import InputError, several
+from ..errors import InputError, counted, several
 from ..files import folder_written_whole
 from ..jobs import makers
 from ..pinhole import ViewPlane
@@ -121,8 +121,7 @@ def run(options: argparse.Namespace) -> Result:
         say(*content.removesuffix("\n").split("\n"))
         return 0, result
     written = cameras.save(read, options.out, options.to, conversion)
-    count = "1 camera" if len(read) == 1 else f"{len(read)} cameras"
-    say(f"{count}, as {cameras.FORMATS[options.to].TITLE}: {options.out}")
+    say(f"{counted(len(read), 'camera')}, as {cameras.FORMATS[options.to].TITLE}: {options.out}")
     return 0, result | {"written": [str(path) for path in written]}
 
 
@@ -182,7 +181,7 @@ def _st_maps(options: argparse.Namespace) -> Result:
             sizes = f"{plane.width} × {plane.height} with the lens, {cut.width} × {cut.height} without"
             lines.append(f"lens_{number}: {sizes}, of {several(names)}")
         cameras.save(undistortion.straight(read, options.blank), temporary / transforms.FILE, "transforms")
-    say(*lines, f"{len(of_lenses)} lenses and {len(read)} pinholes: {options.st_maps}")
+    say(*lines, f"{counted(len(of_lenses), 'lens', 'lenses')} and {counted(len(read), 'pinhole')}: {options.st_maps}")
     return 0, {"lenses": [{"name": f"lens_{i}", "cameras": names} for i, names in enumerate(of_lenses.values(), start=1)]}
 
 

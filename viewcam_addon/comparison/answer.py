@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import several
+from ..errors import counted, several
 
 SAME, SAME_BUT, DIFFERENT = "same", "same_but", "different"
 ANSWERS = (SAME, SAME_BUT, DIFFERENT)
@@ -163,9 +163,7 @@ def but_for(not_modeled: Mapping[str, Any]) -> str:
         (one_place, "object", "objects", " with surfaces in one place"),
         (otherwise, "light or shadow", "lights or shadows", " that not all rays see"),
     ]
-    parts = [
-        f"{len(names):,} {singular if len(names) == 1 else plural}{rest}" for names, singular, plural, rest in kinds if names
-    ]
+    parts = [f"{counted(len(names), singular, plural)}{rest}" for names, singular, plural, rest in kinds if names]
     return f"but for {' and '.join(parts)}"
 
 

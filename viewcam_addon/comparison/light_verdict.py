@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import listed
+from ..errors import counted, listed
 from ..pinhole import Pinhole
 from .answer import NOTHING, Answer, NotModeled, answered, percent_of
 from .coincident import TakenOut
@@ -344,7 +344,7 @@ def _noise_free_lines(comparison: RadianceComparison) -> list[str]:
 
 def edge_text(edges: Edges) -> str:
     """12 pixels differ at edges (63 may) and 1 elsewhere (2 may)."""
-    at_edges = f"{edges.count:,} pixels differ at edges ({edges.allowed:,} may)"
+    at_edges = f"{counted(edges.count, 'pixel differs', 'pixels differ')} at edges ({edges.allowed:,} may)"
     return f"{at_edges} and {edges.leaks:,} elsewhere ({edges.allowed_leaks:,} may)"
 
 
@@ -356,7 +356,7 @@ def _edges(row: LightRow) -> str:
 def _difference(row: LightRow) -> str:
     if row.broken:
         whose = {(True, False): "the reference", (False, True): RadianceComparison.renderer}.get(row.breaks, "both pictures")
-        return f"{row.name} has {row.broken:,} pixel{'s' if row.broken > 1 else ''} without a number, in {whose}"
+        return f"{row.name} has {counted(row.broken, 'pixel')} without a number, in {whose}"
     test = worst_test(row)
     if test is None:
         noise_free, edges = row.without_noise

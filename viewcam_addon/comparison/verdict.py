@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import counted
 from ..pinhole import Pinhole
 from . import tolerances
 from .answer import NOTHING, Answer, NotModeled, answered
@@ -286,7 +287,8 @@ def _faults(comparison: GeometryComparison) -> list[str]:
         kinds = ", ".join(
             f"{count - explained:,} of {kind}" for kind, (count, explained) in mismatches.counts().items() if count > explained
         )
-        faults.append(f"{mismatches.unexplained_count:,} pixels see another surface ({kinds}), {_why_unexplained(comparison)}")
+        seen = counted(mismatches.unexplained_count, "pixel sees", "pixels see")
+        faults.append(f"{seen} another surface ({kinds}), {_why_unexplained(comparison)}")
     for row in rest:
         if row.count and not row.ok:
             percentile, share = row.worst

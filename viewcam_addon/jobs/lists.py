@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 from .. import checks
 from .. import file_names as names
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..files import read_bytes
 from ..terminal import plain
 from .job import BESIDE_THEM, FIELDS, Job, conflicts
@@ -50,7 +50,7 @@ class ShotsError(InputError):
 
     def __str__(self) -> str:
         count = len(self.problems)
-        lines = [f"{plain(self.source)}: {'one problem' if count == 1 else f'{count} problems'}, nothing is rendered"]
+        lines = [f"{plain(self.source)}: {counted(count, 'problem')}, nothing is rendered"]
         lines += [f"  {plain(problem)}" for problem in self.problems[:MOST_SHOWN]]
         if count > MOST_SHOWN:
             lines.append(f"  … and {count - MOST_SHOWN} more")
@@ -265,9 +265,8 @@ def read_table(text: str, problems: Problems) -> Iterator[Row]:
         if cells is None or not any(cells):
             continue
         if len(cells) != len(columns):
-            problems.add(
-                f"{line.place} has {len(cells)} cells under {len(columns)} columns: quote a cell that holds {separator!r}"
-            )
+            has = f"{counted(len(cells), 'cell')} under {counted(len(columns), 'column')}"
+            problems.add(f"{line.place} has {has}: quote a cell that holds {separator!r}")
             continue
         if any(cell and not column for column, cell in zip(columns, cells, strict=True)):
             problems.add(f"{line.place} has a cell under no column: take it out, or name its column")

@@ -17,6 +17,7 @@ from urllib.parse import quote
 from .. import html_page
 from ..comparison.answer import DIFFERENT, NOTHING, SAME, SAME_BUT, but_for
 from ..comparison.statistics import plain
+from ..errors import counted
 from ..files import written_whole
 from .summary import Result
 
@@ -94,7 +95,7 @@ def write(path: Path, pictures: Sequence[str], counts: Mapping[str, int]) -> Non
         "jobs/sheet.html",
         answer=_answer(counts),
         about="batch",
-        title=(title := "1 shot" if counts["shots"] == 1 else f"{counts['shots']:,} shots"),
+        title=(title := counted(counts["shots"], "shot")),
         headline=title,
         intro=_intro(counts),
         pictures=pictures,

@@ -141,7 +141,7 @@ def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
     assert [share for share, _ in lines] == sorted(share for share, _ in lines) and lines[0][0] == 0
     assert lines[0][1] == "Rendering with Cycles" and lines[-1][1] == "Comparing"
     rows = dict(outcome.rows)
-    assert rows["Median"].endswith(" px") and "Mismatches" in rows and rows["Modeled"] == "1 of 1 objects"
+    assert rows["Median"].endswith(" px") and "Mismatches" in rows and rows["Modeled"] == "1 of 1 object"
     assert outcome.report.is_file() and all(path.is_file() for path in outcome.pictures.values()) and outcome.colors
     assert "check untitled.blend --camera Camera --level geometry" in outcome.report.read_text()
     exported = json.loads((outcome.folder / "scene.json").read_text())

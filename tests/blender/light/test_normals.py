@@ -243,6 +243,58 @@ def test_heights_of_all_that_varies_and_all_ways_to_bump_are_cycles(patches):
     check(patches(cases, bump), cases, **HEIGHTS)
 
 
+@pytest.mark.parametrize("value", [(0.0, 0.0, 0.0), (0.3, 0.3, 0.3), (0.4, 0.3, 0.8)])
+def test_a_normal_that_is_given_as_a_value_counts_as_in_cycles(patches, value):
+    """A normal of a group does since 5.0; bumps of a normal of 0 are none."""
+
+    def give(material, mapped, by, bumped):
+        tree = material.node_tree
+        if by == "a group":
+            inside = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+            inside.interface.new_socket("In", in_out="INPUT", socket_type="NodeSocketVector")
+            inside.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketVector")
+            inside.links.new(inside.nodes.new("NodeGroupInput").outputs[0], inside.nodes.new("NodeGroupOutput").inputs[0])
+            node = tree.nodes.new("ShaderNodeGroup")
+            node.node_tree, node.inputs[0].default_value = inside, value
+        else:
+            node = tree.nodes.new("ShaderNodeRGB")
+            node.outputs[0].default_value = (*value, 1.0)
+        normal = node.outputs[0]
+        if bumped:
+            bump(material, mapped)
+            normal_input = next(each for each in tree.nodes if each.type == "BUMP").inputs["Normal"]
+            tree.links.new(normal, normal_input)
+        for name in () if bumped else mapped:
+            tree.links.new(normal, tree.nodes["Shader"].inputs[name])
+
+    shaders = [(DIFFUSE, {"Color": COLOR}, {}, ("Normal",)), (GLOSSY, {"Color": COLOR, "Roughness": 0.5}, {}, ("Normal",))]
+    if any(value):  # else black: see below
+        shaders.append((GLOSSY, {"Color": COLOR, "Roughness": 0.5, "Anisotropy": 0.7}, {}, ("Tangent",)))
+    cases = [
+        (shader, {"by": by, "bumped": bumped})
+        for shader in shaders
+        for by in ("a group", "a color")
+        for bumped in ((False, True) if shader[3] == ("Normal",) else (False,))
+    ]
+    check(patches(cases, give), cases, p50=3e-5, p99=2e-4)
+
+
+@pytest.mark.parametrize("of, words", [("a tangent of 0", "a Tangent of 0"), ("bumps of a width below 0", "Width below 0")])
+def test_normals_that_cycles_makes_no_number_of_are_told(scene, bare_body, of, words):
+    material = bare_body[1]
+    if of == "a tangent of 0":
+        material.node_tree.nodes["Shader"].inputs["Anisotropic"].default_value = 0.8
+        node = material.node_tree.nodes.new("ShaderNodeRGB")
+        node.outputs[0].default_value = (0.0, 0.0, 0.0, 1.0)
+        material.node_tree.links.new(node.outputs[0], material.node_tree.nodes["Shader"].inputs["Tangent"])
+    else:
+        if bpy.app.version < (4, 5):
+            pytest.skip("nodes say a width since 4.5")
+        bump(material, ("Normal",), filter_width=-0.5)
+    noted = [entry.reason for entry in jobs.export(Job(level="direct")).ledger if entry.status == "approximated"]
+    assert len(noted) == 1 and words in noted[0], noted
+
+
 def test_a_narrow_filter_shows_what_float32_leaves_of_it(patches):
     """Cycles' heights are rounded by 2⁻²⁴ of up to 2; places a tenth of a pixel of 1/36 away make 4e-5 of that in a slope."""
     lambert = (DIFFUSE, {"Color": COLOR}, {}, ("Normal",))

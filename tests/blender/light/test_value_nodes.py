@@ -62,6 +62,62 @@ class N:
         return next(socket for socket in node.outputs if socket.enabled)
 
 
+class Constant(N):
+    """A node whose output is its value."""
+
+    def __init__(self, kind, value):
+        self.kind, self.value = kind, value
+
+    def add(self, tree):
+        output = tree.nodes.new("ShaderNode" + self.kind).outputs[0]
+        output.default_value = self.value
+        return output
+
+
+class InGroup(N):
+    """A node in a group; one of its inputs is the group's, which has a value, or is fed by a node outside."""
+
+    def __init__(self, node, name, fed, kind="Vector"):
+        self.node, self.name, self.fed, self.kind = node, name, fed, kind
+
+    def add(self, tree):
+        inside = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+        inside.interface.new_socket("In", in_out="INPUT", socket_type="NodeSocket" + self.kind)
+        inside.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketColor")
+        output = self.node.add(inside)
+        socket = next(each for each in output.node.inputs if each.identifier == self.name)
+        inside.links.new(inside.nodes.new("NodeGroupInput").outputs[0], socket)
+        inside.links.new(output, inside.nodes.new("NodeGroupOutput").inputs[0])
+        group = tree.nodes.new("ShaderNodeGroup")
+        group.node_tree = inside
+        if isinstance(self.fed, N):
+            tree.links.new(self.fed.add(tree), group.inputs[0])
+        else:
+            group.inputs[0].default_value = self.fed
+        return group.outputs[0]
+
+
+class Chosen(N):
+    """The one of several nodes that a menu chooses, by name."""
+
+    def __init__(self, name, **among):
+        self.name, self.among = name, among
+
+    def add(self, tree):
+        node = tree.nodes.new("GeometryNodeMenuSwitch")
+        node.data_type = "VECTOR"
+        node.enum_items.clear()
+        for name, each in self.among.items():
+            node.enum_items.new(name)
+            socket = next(socket for socket in node.inputs if socket.name == name)
+            if isinstance(each, N):
+                tree.links.new(each.add(tree), socket)
+            else:
+                socket.default_value = each
+        node.inputs[0].default_value = self.name
+        return node.outputs[0]
+
+
 UV = N("TexCoord", output="UV")
 U, V = N("SeparateXYZ", {"Vector": UV}, "X"), N("SeparateXYZ", {"Vector": UV}, "Y")
 OBJECT = N("TexCoord", output="Object")
@@ -384,6 +440,87 @@ def test_attributes_of_edges_are_mixed_as_in_cycles(floor):
 @pytest.mark.parametrize("part", range(PARTS))
 def test_every_node_makes_what_cycles_makes(floor, images, part):
     check(floor(dict(list(graphs(*images).items())[part::PARTS])))
+
+
+CORNER = (0.3, 0.4, 0.9)
+
+
+def with_places(images):
+    """name → (a node that looks at a place or a normal of the surface unless one is given, its input)."""
+    return {
+        "image": (N("TexImage", output="Color", image=images[0]), "Vector"),
+        "environment": (N("TexEnvironment", output="Color", image=images[0]), "Vector"),
+        "ball": (N("TexEnvironment", output="Color", image=images[0], projection="MIRROR_BALL"), "Vector"),
+        "noise": (N("TexNoise", output="Color"), "Vector"),
+        "checker": (N("TexChecker", output="Color"), "Vector"),
+        "fresnel": (N("Fresnel"), "Normal"),
+        "facing": (N("LayerWeight", output="Facing"), "Normal"),
+    }
+
+
+@pytest.mark.parametrize("value", [CORNER, (0.3, 0.3, 0.3), (0.0, 0.0, 0.0)])
+def test_a_constant_that_is_given_counts_where_else_the_surface_has_a_value_of_its_own(floor, images, value):
+    graphs = {}
+    for name, (node, socket) in with_places(images).items():
+        linked = (Constant("RGB", (*value, 1.0)), *([Constant("Value", value[0])] if len(set(value)) == 1 else []))
+        for each in (*linked, N("CombineXYZ", dict(zip("XYZ", value, strict=True)))):
+            graphs[f"{name} by {each.kind}"] = N(node.kind, {socket: each}, node.output, **node.properties)
+        graphs[f"{name} by a node outside of its group"] = InGroup(node, socket, linked[0])
+        graphs[f"{name} by its group"] = InGroup(node, socket, value)
+        graphs[f"{name} by a color of its group"] = InGroup(node, socket, (*value, 1.0), "Color")
+    check(floor(graphs))
+
+
+def test_a_vector_that_is_the_same_everywhere_is_its_mean_as_a_number(floor):
+    plus = N("Math", {"Value_001": N("TexCoord", output="Object")}, operation="ADD")
+    check(floor({kind: InGroup(plus, "Value", value, kind) for kind, value in (("Vector", CORNER), ("Color", (*CORNER, 1.0)))}))
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 0), reason="shaders have had menus since 5.0")
+def test_what_a_menu_chooses_is_shown(floor):
+    a, b = N("TexCoord", output="Object"), N("TexNoise", output="Color")
+    graphs = {f"the {name}": Chosen(name, first=a, second=b, third=CORNER) for name in ("first", "second", "third")}
+    graphs["of a value that images are laid out by"] = N("TexChecker", {"Vector": Chosen("third", first=a, third=CORNER)})
+    check(floor(graphs))
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 2), reason="shaders have had these nodes since 5.2")
+def test_nodes_that_are_a_constant_are_that(floor):
+    class Input(Constant):
+        def add(self, tree):
+            node = tree.nodes.new("FunctionNodeInput" + self.kind)
+            setattr(node, {"Vector": "vector", "Int": "integer", "Bool": "boolean"}[self.kind], self.value)
+            return node.outputs[0]
+
+    check(floor({kind: Input(kind, value) for kind, value in (("Vector", CORNER), ("Int", 2), ("Bool", True))}))
+
+
+@pytest.mark.parametrize(
+    "kind, operation, name, by",
+    [
+        ("Math", "MULTIPLY", "Value", N("Math", {"Value": 0.0, "Value_001": 0.5}, operation="MULTIPLY")),
+        ("Math", "POWER", "Value", 0.0),
+        ("Math", "DIVIDE", "Value_001", 0.0),
+        ("VectorMath", "SCALE", "Vector", 0.0),
+        ("VectorMath", "CROSS_PRODUCT", "Vector", (0.0, 0.0, 0.0)),
+        ("VectorMath", "DOT_PRODUCT", "Vector", (0.0, 0.0, 0.0)),
+    ],
+)
+def test_a_color_whose_alpha_counts_for_nothing_is_not_divided_by_it(floor, images, kind, operation, name, by):
+    other = {"Value": "Value_001", "Value_001": "Value", "Vector": "Scale" if operation == "SCALE" else "Vector_001"}[name]
+
+    class Both(N):
+        def add(self, tree):
+            image = tree.nodes.new("ShaderNodeTexImage")
+            image.image = images[1]
+            output = N(kind, {other: by}, operation=operation).add(tree)
+            tree.links.new(image.outputs["Alpha"], next(each for each in output.node.inputs if each.identifier == name))
+            plus = tree.nodes.new("ShaderNodeVectorMath")
+            tree.links.new(image.outputs["Color"], plus.inputs[0])
+            tree.links.new(output, plus.inputs[1])
+            return plus.outputs[0]
+
+    check(floor({"both": Both("")}))
 
 
 def test_bricks_without_a_width_have_the_mortar_that_they_have_in_cycles(floor):

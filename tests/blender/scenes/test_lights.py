@@ -444,9 +444,31 @@ def test_an_image_is_wrapped_around_the_world(sky, export_world):
 def test_a_mapping_turns_the_image(sky, export_world):
     _, texture, feed = sky
     texture.interpolation = "Closest"
-    feed("ShaderNodeMapping").inputs["Rotation"].default_value = (0.25, 0.5, 1.0)
+    mapping = feed("ShaderNodeMapping")
+    mapping.inputs["Rotation"].default_value = (0.25, 0.5, 1.0)
+    place = mapping.id_data.nodes.new("ShaderNodeTexCoord")
+    mapping.id_data.links.new(place.outputs["Generated"], mapping.inputs["Vector"])
     exported, reasons = export_world()
     assert exported.world == World((2.0, 2.0, 2.0), image="Sky", closest=True, rotation=(0.25, 0.5, 1.0)) and not reasons
+
+
+@pytest.mark.parametrize("by", ["a mapping of nothing", "a group"])
+def test_an_image_that_is_looked_up_in_one_place_is_one_color(sky, export_world, by):
+    world, texture, feed = sky
+    if by == "a mapping of nothing":
+        feed("ShaderNodeMapping").inputs["Location"].default_value = (1.0, 0.5, -0.5)
+    else:
+        group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+        group.interface.new_socket("Vector", in_out="INPUT", socket_type="NodeSocketVector")
+        group.interface.new_socket("Vector", in_out="OUTPUT", socket_type="NodeSocketVector")
+        group.links.new(group.nodes.new("NodeGroupInput").outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
+        node = world.node_tree.nodes.new("ShaderNodeGroup")
+        node.node_tree = group
+        node.inputs[0].default_value = (1.0, 0.5, -0.5)
+        world.node_tree.links.new(node.outputs[0], texture.inputs["Vector"])
+    exported, reasons = export_world()
+    is_one = by == "a mapping of nothing" or bpy.app.version >= (5, 0)  # before, groups gave images no place
+    assert (exported.world.image != "Sky") == is_one, (exported.world, reasons)
 
 
 def ask_for_camera(tree, kind, name, *sides):

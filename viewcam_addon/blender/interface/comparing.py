@@ -25,7 +25,7 @@ import bpy
 from ... import child_process
 from ...comparison.answer import DIFFERENT, SAME_BUT, but_for, percent_of
 from ...comparison.statistics import plain
-from ...errors import InputError, operator_reason
+from ...errors import InputError, counted, operator_reason
 from ...file_names import made_fit
 from ...files import written_whole
 from ...jobs import plan as orders
@@ -328,7 +328,7 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
             rows.append(("Light, to Tracer's", ratio))
     ledger = result["ledger"]
     whole = sum(entry["status"] == "exported" for entry in ledger)
-    return [*rows, ("Modeled", f"{whole} of {len(ledger)} objects")]
+    return [*rows, ("Modeled", f"{whole} of {counted(len(ledger), 'object')}")]
 
 
 def failure(printed: str, status: int) -> str:

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import bpy
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import causes, datablocks, findings, pose, preferences, storage, targets, versions
@@ -48,7 +48,7 @@ def convert_keyframes(camera_object: bpy.types.Object, scene: bpy.types.Scene, f
     finally:
         scene.frame_set(before[0], subframe=before[1])
     what = f"the camera differs at {len(off)} of them, first at {off[0]}" if off else "the camera stands the same at each"
-    return f"{len(frames)} frames of {camera_object.name} are keyframes of the values: {what}"
+    return f"{camera_object.name} has its values' keyframes at {counted(len(frames), 'frame')}: {what}"
 
 
 class _Seen:

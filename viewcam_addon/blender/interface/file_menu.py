@@ -17,7 +17,7 @@ import bpy
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ... import cameras as formats
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...jobs import makers
 from ...pinhole import ViewPlane
 from ...tracer.scene import LedgerEntry
@@ -110,9 +110,9 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, ReportsErrors, ImportHelper, bpy
             select(imported.objects, imported.objects[0], context)
         notes = list(dict.fromkeys((*notes, *imported.notes)))
         title = ", ".join(formats.FORMATS[kind].TITLE for kind in sorted(kinds))
-        what = f"a flight of {len(read_cameras)} poses" if as_flight else _counted(read_cameras)
+        what = f"a flight of {len(read_cameras)} poses" if as_flight else counted(len(read_cameras), "camera")
         pictures = f", {imported.pictures} with pictures" if imported.pictures else ""
-        noted = f"; {len(notes)} notes" if len(notes) > 1 else "; 1 note" if notes else ""
+        noted = f"; {counted(len(notes), 'note')}" if notes else ""
         for note in notes[:_MOST_NOTES]:
             self.report({"WARNING"}, text(note))
         self.report({"INFO"}, text(f"{paths[0].name}: {what}{pictures} ({title}){noted}"))
@@ -202,7 +202,8 @@ class VIEWCAM_OT_export_cameras(WorldOptions, ReportsErrors, ExportHelper, bpy.t
         exported = self._at_each_frame(context.scene) if self.which == "FRAMES" else self._cameras(context)
         written = formats.save(exported, path, self.format, self.chosen())
         files = "" if len(written) == 1 else f", {len(written)} files"
-        self.report({"INFO"}, text(f"{path.name}: {_counted(exported)} ({formats.FORMATS[self.format].TITLE}{files})"))
+        count = counted(len(exported), "camera")
+        self.report({"INFO"}, text(f"{path.name}: {count} ({formats.FORMATS[self.format].TITLE}{files})"))
 
     def _at_each_frame(self, scene: bpy.types.Scene) -> list[formats.Camera]:
         frames = makers.frames(f"{scene.frame_start}..{scene.frame_end}")[:: scene.frame_step]
@@ -269,10 +270,6 @@ class VIEWCAM_OT_export_scene(ReportsErrors, ExportHelper, bpy.types.Operator):
         _tell(self, scene.ledger, path, context)
 
 
-def _counted(read_cameras: Sequence[formats.Camera]) -> str:
-    return "1 camera" if len(read_cameras) == 1 else f"{len(read_cameras)} cameras"
-
-
 def select(objects: Sequence[bpy.types.Object], active: bpy.types.Object, context: bpy.types.Context) -> None:
     for block in context.selected_objects:
         block.select_set(False)
@@ -298,7 +295,7 @@ def summary(ledger: Sequence[LedgerEntry]) -> str:
     """The number of objects that came along: one line for the status bar."""
     counts = {status: sum(entry.status == status for entry in ledger) for status in ("exported", "approximated", "skipped")}
     total = len(ledger)
-    parts = [f"{counts['exported']} of {total} object{'' if total == 1 else 's'} exported whole"]
+    parts = [f"{counts['exported']} of {counted(total, 'object')} exported whole"]
     parts += [f"{count} {status}" for status, count in counts.items() if count and status != "exported"]
     return ", ".join(parts)
 

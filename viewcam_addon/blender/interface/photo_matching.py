@@ -20,7 +20,7 @@ from mathutils import Vector
 
 from ... import photo_match
 from ...comparison.statistics import plain
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, targets
@@ -338,7 +338,7 @@ def begun(camera_object: bpy.types.Object | None, context: bpy.types.Context) ->
         chosen = [each for each in context.selected_objects if each != camera_object]
         drawing.places = tuple(tuple(each.matrix_world.translation) for each in chosen)
         if len(chosen) < 4:
-            raise InputError(f"{len(chosen)} objects are selected: select four in one plane, or six")
+            raise InputError(f"only {counted(len(chosen), 'object')} selected: select four in one plane, or six")
         column, row, away = like.project(drawing.places)
         middle = like.width / 2, like.height / 2
         drawing.ends = [

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from ...errors import InputError
+from ...errors import InputError, counted
 from ...file_names import distinct
 from ...jobs.folder import Outputs
 from ...jobs.job import Job
@@ -80,10 +80,14 @@ class Rendering(BackgroundBatch):
             return None
         _sheet = self.sheet if self.sheet.is_file() else None
         status, sentence = ended
+        pictures = counted(self.count, "picture")
         if status == 0:
-            return True, f"{self.count} picture{'s' if self.count > 1 else ''} in {self.folder}"
+            return True, f"{pictures} in {self.folder}"
         if self.sheet.is_file():
-            return False, f"{self.done} of {self.count} pictures in {self.folder}: the contact sheet says what went wrong"
+            return (
+                False,
+                f"{self.done} of {pictures} in {self.folder}: the contact sheet says what went wrong",
+            )
         return False, sentence
 
 

@@ -1,9 +1,9 @@
 """Reading shader nodes, and giving a tree another output for a while.
 
-An input is followed to the node that feeds it: reroutes, muted nodes and node groups are looked through. What nothing feeds
-has a value of its own, and so has what a link feeds that counts for nothing: those that Blender marks as invalid, as where
-links go in a circle or from a shader to a color, and those from nodes that only EEVEE has, or that are muted and pass nothing
-on.
+An input is followed to the node that feeds it: reroutes, muted nodes, node groups and what a menu chooses are looked through.
+What nothing feeds has a value of its own, and so has what a link feeds that counts for nothing: those that Blender marks as
+invalid, as where links go in a circle or from a shader to a color, and those from nodes that only EEVEE has, or that are muted
+and pass nothing on.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -67,6 +67,12 @@ def source(of: Input) -> Output | Input:
         of, kept = through, kept if is_passed_on else through
 
 
+def is_left_alone(of: Input) -> bool:
+    """True if nothing is given to an input, so that Cycles takes for it what surfaces have of themselves, if anything."""
+    end = source(of)
+    return isinstance(end, Input) and (end.socket == of.socket or not versions.GROUPS_GIVE_ALL_VALUES)
+
+
 def _counts(link: bpy.types.NodeLink) -> bool:
     """True if Cycles has a link, too."""
     is_one = link.is_valid and not link.is_muted and link.from_node.type not in _UNKNOWN_TO_CYCLES
@@ -91,6 +97,10 @@ def _through(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: tuple[b
         return end and _by_identifier(end, socket, (*groups, node))
     if node.type == "GROUP_INPUT" and groups:
         return _by_identifier(groups[-1], socket, groups[:-1])
+    if node.type == "MENU_SWITCH" and socket == node.outputs[0]:
+        menu = source(Input(node.inputs[0], groups))
+        chosen = None if isinstance(menu, Output) else menu.socket.default_value
+        return next((Input(each, groups) for each in node.inputs[1:] if each.name == chosen), None)
     return None
 
 

@@ -60,6 +60,16 @@ _FIXED = {
     ("LIGHT_PATH", "Ray Length"),
 }
 _LUMINANCE = (0.2126390, 0.7151687, 0.0721923)
+_MEAN = (1.0 / 3.0,) * 3
+# Vectors that surfaces, or the light, have of themselves where no node is given any.
+_OF_THEMSELVES = (UV, GENERATED, POSITION, INCOMING)
+# Operation of a Math or Vector Math node → the inputs of which one that is 0 leaves none of the others.
+_LEAVES_NOTHING = {
+    **dict.fromkeys(("MULTIPLY", "DOT_PRODUCT", "CROSS_PRODUCT"), (0, 1)),
+    **{"DIVIDE": (0,), "POWER": (1,), "SCALE": (0, 3)},
+}
+# Nodes that are a constant of the node itself → where it stands; RGB and Value have it in their output.
+_CONSTANTS = {"INPUT_VECTOR": "vector", "INPUT_INT": "integer", "INPUT_BOOL": "boolean"}
 
 
 # Shaders that Cycles takes for another one on a surface, and for none.
@@ -197,6 +207,9 @@ class Tree:
                 continue
             if known[name] is TANGENT and not Node(ours, tuple(inputs.items())).is_stretched:
                 continue
+            if known[name] is TANGENT and (of := source.input(theirs)) and not nodes.is_left_alone(of) and _is_nothing(of):
+                self._reason(source, "is stretched along a Tangent of 0, which Cycles shows black")
+                continue
             if known[name] in OWN:
                 inputs |= self._normal(source, name, theirs)
             elif known[name] is not None and source.input(theirs) is not None:
@@ -279,6 +292,8 @@ class Tree:
         vector = nodes.source(output.input("Vector"))
         if isinstance(vector, Output) and not self._is_uv(vector):
             self._reason(vector, "is not modeled")
+        elif isinstance(vector, Input) and not nodes.is_left_alone(output.required("Vector")):
+            self._reason(output, "shows one place")
         return Color(_WHITE, node.image.original.name_full, node.interpolation == "Closest")
 
     def _shows(self, output: Output) -> bool:
@@ -363,10 +378,12 @@ class Tree:
     def _normal(self, output: Output, name: str, theirs: str) -> dict[str, Node]:
         """The node that makes a normal, where one does and is modeled."""
         of = output.input(theirs)
-        source = of and nodes.source(of)
+        if of is None or nodes.is_left_alone(of):
+            return {}
+        source, constant = nodes.source(of), constant_color_of(of)
         if isinstance(source, Output) and source.node.type == "BUMP" and _constant(source.input("Height")) is not None:
             return self._normal(source, name, "Normal")
-        value = self._value(source) if isinstance(source, Output) else None
+        value = self._value(source) if constant is None else _vector(constant)
         return {name: value} if isinstance(value, Node) else {}
 
     def _words(self, output: Output, ours: str) -> dict[str, str]:
@@ -479,17 +496,19 @@ class Tree:
             if socket is None:
                 inputs[name] = (row.before[name](versions.CYCLES),) * 3
                 continue
+            of = Input(socket, output.groups)
+            if known in _OF_THEMSELVES and nodes.is_left_alone(of):
+                if (of_itself := self._of_itself(output, known)) is not None:
+                    inputs[name] = of_itself
+                elif len(self.reading.reasons) > reasons_before:
+                    return None
+                continue
             is_beside, self._is_beside = self._is_beside, self._is_beside or name == "height"
-            read = self._value_input(Input(socket, output.groups), known)
+            read = self._value_input(of, known)
             self._is_beside = is_beside
             if read is None:
                 return None
-            if known not in (UV, GENERATED, POSITION, INCOMING) or isinstance(read, Color | Node):
-                inputs[name] = read
-            elif (of_itself := self._of_itself(output, known)) is not None:
-                inputs[name] = of_itself
-            elif len(self.reading.reasons) > reasons_before:
-                return None
+            inputs[name] = _vector(read) if known in _OF_THEMSELVES and isinstance(read, tuple) else read
         try:
             result = Node(ours, tuple(inputs.items()))
         except InputError:
@@ -531,8 +550,12 @@ class Tree:
             return "has its instancer's coordinates"
         if ours == "brick" and versions.ROWS_NEED_HEIGHTS and constant_number(output, "Row Height") == 0:
             return "has rows without a height, of which Cycles makes no number"
-        if ours == "bump" and output.node.inputs.get("Filter Width") and constant_number(output, "Filter Width") is None:
-            return "has a Filter Width that varies"
+        if ours == "bump" and output.node.inputs.get("Filter Width"):
+            width = constant_number(output, "Filter Width")
+            if width is None or width < 0:
+                return (
+                    "has a Filter Width that varies" if width is None else "has a Filter Width below 0, which makes no normal"
+                )
         if ours == "light_path" and self._shines and output.socket.identifier not in _SURE_OF_PATHS:
             return f"says the {output.socket.name} of light"
         return None
@@ -617,14 +640,23 @@ def _left_by_folding(output: Output) -> list[Input]:
         if share == 0.0 and blend not in ("LIGHTEN", "DODGE", "BURN"):
             return [first]
         return [second] if share == 1.0 and blend == "MIX" else inputs
-    if kind in ("MATH", "VECT_MATH") and node.operation == "MULTIPLY":
-        return [] if _ZERO in map(constant_color_of, inputs[:2]) else inputs
+    if kind in ("MATH", "VECT_MATH"):
+        return [] if any(_is_nothing(inputs[number]) for number in _LEAVES_NOTHING.get(node.operation, ())) else inputs
     if kind in ("EMISSION", "BACKGROUND"):
-        return [] if _ZERO in (constant_color(output, "Color"), constant_color(output, "Strength")) else inputs
+        return [] if any(_is_nothing(output.required(name)) for name in ("Color", "Strength")) else inputs
     if kind == "BSDF_PRINCIPLED":
         weights = {name: needed[0] for name, needed in _ONLY_WITH["principled"].items() if len(needed) == 1}
         return [of for of in inputs if constant_number(output, weights.get(of.socket.name, "")) != 0.0]
     return inputs
+
+
+def _is_nothing(of: Input) -> bool:
+    """True if 0 is all that Cycles leaves of an input."""
+    constant, source = constant_color_of(of), nodes.source(of)
+    if constant is not None or isinstance(source, Input):
+        return constant == _ZERO
+    is_product = source.node.type in ("MATH", "VECT_MATH") and source.node.operation != "POWER"
+    return is_product and not _left_by_folding(source)
 
 
 def divided_images(output: bpy.types.Node) -> frozenset[object]:
@@ -640,7 +672,7 @@ def divided_images(output: bpy.types.Node) -> frozenset[object]:
 def _looked_up(output: Output) -> object:
     """The way in which an Image Texture looks its image up, the same for nodes that are alike."""
     node, vector = output.node, nodes.source(output.required("Vector"))
-    place: object = vector if isinstance(vector, Output) else None
+    place: object = vector if isinstance(vector, Output) else constant_color_of(vector)
     if isinstance(vector, Output) and vector.node.type == "TEX_COORD":
         place = vector.socket.name, vector.node.object
     return node.image, node.interpolation, node.extension, node.projection, node.projection_blend, place
@@ -672,6 +704,11 @@ def _quarter_further(rotation: Color | Node) -> Color | Node:
     if rotation.varies:
         return _node("math", operation="add", a=rotation, b=(0.25,) * 3)
     return Color(((rotation.rgb[0] + 0.25) % 1.0,) * 3)
+
+
+def _vector(value: RGB) -> Node:
+    """The node that gives a constant where nothing given would be something else."""
+    return _node("combine_xyz", **dict(zip("xyz", value, strict=True)))
 
 
 def in_space_of(matrix: object) -> Node:
@@ -722,7 +759,9 @@ def constant_number_of(of: Input) -> float | None:
     value = _constant(of)
     if value is None or isinstance(value, int | float):
         return value
-    return sum(factor * each for factor, each in zip(_LUMINANCE, _rgb(value), strict=True))
+    end = nodes.source(of)
+    factors = _MEAN if end.socket.type == "VECTOR" else _LUMINANCE
+    return sum(factor * each for factor, each in zip(factors, _rgb(value), strict=True))
 
 
 def constant_color(output: Output, name: str | int) -> RGB | None:
@@ -744,6 +783,8 @@ def _constant(of: Input) -> object:
     if isinstance(source, Output) and source.node.type == "LIGHT_FALLOFF" and source.socket.name == "Quadratic":
         # Light that falls off as it does of itself.
         return _constant(source.input("Strength")) if _constant(source.input("Smooth")) == 0 else None
+    if isinstance(source, Output) and (name := _CONSTANTS.get(source.node.type)):
+        return getattr(source.node, name)
     if isinstance(source, Output) and source.node.type not in ("RGB", "VALUE"):
         return None
     return 0.0 if isinstance(source, Input) and source.is_zero else source.socket.default_value

@@ -230,14 +230,15 @@ def _wrapped(source: Output | Input) -> _Wrapped | None:
         or not shaders.maps_plainly(node)
     ):
         return None
-    rotation = _rotation(nodes.source(source.required("Vector")))
+    rotation = _rotation(source.required("Vector"))
     return rotation and _Wrapped(node.image.original, node.interpolation == "Closest", rotation)
 
 
-def _rotation(vector: Output | Input) -> tuple[float, float, float] | None:
-    """The angles by which directions are turned, or None where more is done to them."""
+def _rotation(of: Input) -> tuple[float, float, float] | None:
+    """The angles by which the directions that an input is given are turned, or None where more is done to them."""
+    vector = nodes.source(of)
     if not isinstance(vector, Output):
-        return 0.0, 0.0, 0.0
+        return (0.0, 0.0, 0.0) if nodes.is_left_alone(of) else None
     if vector.node.type == "TEX_COORD":
         is_direction = vector.socket.name == "Generated" or (vector.socket.name == "Object" and vector.node.object is None)
         return (0.0, 0.0, 0.0) if is_direction else None
@@ -247,7 +248,8 @@ def _rotation(vector: Output | Input) -> tuple[float, float, float] | None:
         shaders.constant_color(vector, name)
         for name in ("Location", "Rotation", "Scale")[vector.node.vector_type == "VECTOR" :]
     ]
-    inner = _rotation(nodes.source(vector.required("Vector")))
+    of = vector.required("Vector")
+    inner = None if nodes.is_left_alone(of) else _rotation(of)
     if None in turns or inner is None or any(inner) or turns[-1] != (1.0, 1.0, 1.0) or (len(turns) == 3 and any(turns[0])):
         return None
     return turns[-2]

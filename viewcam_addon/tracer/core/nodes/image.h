@@ -97,7 +97,7 @@ struct EnvironmentImageNode {
     Vec3 eval(const ShadingPoint& at) const {
         if (image.image == NONE) return {};
         Vec3 direction = at.value(vector);
-        if (is_black(direction)) direction = {0, 0, 1e-30};
+        if (is_black(direction)) return at.textures[image.image].at(ball ? Vec2{0.5, 0.5} : Vec2{}, lookup);
         return at.textures[image.image].at(ball ? mirror_ball(direction) : equirectangular(direction), lookup);
     }
 };

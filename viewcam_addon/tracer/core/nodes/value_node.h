@@ -113,9 +113,8 @@ struct ValueNodes {
             if constexpr (!requires { Kind::VARIES; })
                 if (inputs.all_constant() && !varies(node)) {
                     Interaction nowhere;
-                    Vec3 value = finite(node.eval({nowhere, {0, 0, -1}, textures}));
-                    // As a number a vector is its mean, and a constant its luminance.
-                    if (Kind::GIVES != Gives::VECTOR || (value.x == value.y && value.y == value.z)) return ConstantNode{value};
+                    // As a number a vector is its mean, and a constant its luminance; as a normal one of zeros is none.
+                    if (Kind::GIVES != Gives::VECTOR) return ConstantNode{finite(node.eval({nowhere, {0, 0, -1}, textures}))};
                 }
             return node;
         }
