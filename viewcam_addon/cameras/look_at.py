@@ -451,6 +451,10 @@ class _Code:
             if named:
                 return Unknown(place)
             return values[0] if len(values) == 1 else tuple(values)
+        return self._whole(place)
+
+    def _whole(self, place: int) -> object:
+        """The value at a place, an `Unknown` where something more is done with it."""
         value, end = self.reader.value(place)
         return Unknown(place) if _GOES_ON.match(self.text, end) else value
 
@@ -492,7 +496,7 @@ class _Code:
                 if sign != ":":
                     texts.fail(self.text, start, "this moves or bends the camera by other means, write eye, look-at and up")
             elif role[:-1] in ("position_", "up_"):
-                value = self.reader.value(at)[0]
+                value = self._whole(at)
                 if not isinstance(value, float):
                     texts.fail(self.text, at, "this is computed from what the text does not say, write the number")
                 scene.moved.append(start)
@@ -589,7 +593,7 @@ class _Code:
             if not values and not named:
                 return  # a getter
         else:
-            value = self.reader.value(at)[0]
+            value = self._whole(at)
         if role in _VECTORS:
             value = _only(value)
             vector = numbers(value, 3)
@@ -691,7 +695,7 @@ class _Code:
         scene.is_height_first = True
 
     def _camera_position(self, scene: _Scene, at: int, start: int) -> None:
-        value = self.reader.value(at)[0]
+        value = self._whole(at)
         if single := numbers(value, 3):
             return self._place(scene, start, single)
         vectors = [numbers(part, 3) for part in value] if isinstance(value, tuple) and len(value) == 3 else [None]
