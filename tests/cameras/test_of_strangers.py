@@ -1310,3 +1310,26 @@ def test_meshrooms_version_may_be_one_text():
     (camera,) = cameras.read(json.dumps(document | {"version": "1.2.3"}))
     assert camera.pinhole == cameras.read(json.dumps(document | {"version": ["1", "2", "3"]}))[0].pinhole
     assert "version" in refusal(json.dumps(document | {"version": "new"}))
+
+
+def test_a_rotation_vector_in_degrees_is_refused():
+    """90 was taken for 90 radians."""
+    document = {"K": [[500, 0, 320], [0, 500, 180], [0, 0, 1]], "image_size": [640, 360], "rvec": [90, 0, 0], "t": [1, 2, 3]}
+    assert "give an angle in radians" in refusal(json.dumps(document))
+
+
+def test_a_key_of_opencvs_xml_that_is_there_twice_is_refused():
+    """The last one counted, where JSON and YAML refuse it."""
+    xml = "<opencv_storage><K><rows>3</rows><cols>3</cols><data>500 0 320 0 500 240 0 0 1</data></K>{}</opencv_storage>"
+    size = "<image_width>640</image_width><image_height>480</image_height>"
+    assert cameras.read(xml.format(size + size))[0].pinhole.width == 640
+    assert "'image_width' twice" in refusal(xml.format(size + "<image_width>700</image_width>"))
+
+
+@pytest.mark.parametrize(("place", "is_told"), [((0, 0), True), ((640, 0), True), ((0, 240), False), ((320, 240), False)])
+def test_a_principal_point_in_the_corner_is_told(place, is_told):
+    """Programs that do not know it write 0 0."""
+    frames = [{"file_path": "a.png", "transform_matrix": np.eye(4).tolist()}]
+    document = {"fl_x": 500, "w": 640, "h": 480, "cx": place[0], "cy": place[1], "frames": frames}
+    notes = read(json.dumps(document)).notes
+    assert any("lies in a corner" in note for note in notes) == is_told, f"{notes} of {place}"
