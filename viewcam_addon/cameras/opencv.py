@@ -49,6 +49,7 @@ _LISTS = ("cameras", "Cameras", "views")  # CMU Panoptic's calibrations, and man
 _STEREO = (("1", "2"), ("left", "right"), ("l", "r"))
 _OF_ONE = ("m", *_K)
 _BESIDE = "extrinsics.yml", "extrinsics.yaml", "extrinsics.xml"
+_WHOLE_TURN = 2 * math.pi * 1.01  # with room for what was found by fitting
 _RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
 _T = ("t", "tvec", "tvecs", "translation", "translationvector", "trans", "tw2c")
 _EXTRINSIC = (
@@ -184,8 +185,10 @@ def of_rotation_vector(vector: Sequence[float], what: str) -> np.ndarray:
     """(3, 3) of axis times angle, Rodrigues'."""
     vector = checks.vector(f"the rotation vector of {what}", vector, 3)
     angle = math.hypot(*vector)
-    if angle > 1e6:
-        raise InputError(f"the rotation vector of {what} has the length {angle:g}: give an angle in radians")
+    if angle > _WHOLE_TURN:
+        raise InputError(
+            f"the rotation vector of {what} has the length {angle:g}: give an angle in radians, within a whole turn"
+        )
     sine = math.sin(angle / 2) / angle if angle else 0.5
     return axes.rotation_of((math.cos(angle / 2), *(sine * part for part in vector)), what)
 
@@ -406,7 +409,9 @@ def _xml(source: Source) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for child in root:
         inner = {each.tag: (each.text or "").strip() for each in child}
-        result[child.tag] = inner if inner else (child.text or "").strip()
+        value = inner if inner else (child.text or "").strip()
+        if child.tag != "_" and result.setdefault(child.tag, value) != value:  # _ is an item of a list
+            raise InputError(f"{source.name} has the key {checks.quoted(child.tag)} twice, with other values: leave one out")
     return result
 
 

@@ -89,7 +89,7 @@ def _files(source: Source) -> list[Source]:
 def _matrix(file: Source) -> tuple[float, ...] | None:
     """The numbers of a pose, of which some may be infinite; None if it is none."""
     lines = [line.split() for line in file.text[:2000].strip().split("\n")]
-    if file.is_binary or [len(line) for line in lines] not in ([4] * 3, [4] * 4):
+    if file.is_binary or "_" in file.text[:2000] or [len(line) for line in lines] not in ([4] * 3, [4] * 4):
         return None
     try:
         rows = np.array([[float(word) for word in line] for line in lines])

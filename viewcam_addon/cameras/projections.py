@@ -174,7 +174,7 @@ def _alone(source: Source) -> np.ndarray | None:
         matrix = np.array([[float(word) for word in line] for line in lines])
     except ValueError:
         return None
-    if not np.isfinite(matrix).all():
+    if "_" in text or not np.isfinite(matrix).all():
         return None
     turn = matrix[:, :3]
     is_pose = np.abs(turn).max() < 2 and np.abs(turn @ turn.T - np.eye(3)).max() < _ORTHOGONAL
