@@ -1252,3 +1252,84 @@ def test_a_damaged_matrix_of_neus_is_told_and_not_left_out(tmp_path):
     np.savez(tmp_path / "cameras.npz", world_mat_0=matrix, world_mat_1=matrix * np.nan)
     with pytest.raises(InputError, match="projection matrix of camera 1 is flat"):
         cameras.read(tmp_path / "cameras.npz", options=VGA)
+
+
+VIEWED = "view = {}[[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, -3], [0, 0, 0, 1]]{}\n"
+VIEWED += "projection = [[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, -1, -0.2], [0, 0, -1, 0]]\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (THREE.replace("5)", "5).multiplyScalar(2)"), "by other means"),
+        ("eye = (3, 4, 5)[::-1]; look_at = (0, 0, 0); up = (0, 0, 1); vfov = 40;", "eye"),
+        ("eye = [3, 4, 5] @ turn; look_at = (0, 0, 0); up = (0, 0, 1); vfov = 40;", "eye"),
+        ("camera.SetPosition(1, 2, 3)\ncamera.SetFocalPoint(0, 0, 0)\ncamera.UseHorizontalViewAngleOn()", "by other means"),
+        ("p.camera.position = (1, 2, 3)\np.camera.focal_point = (0, 0, 0)\np.camera.roll += 10", "moves the camera from where"),
+        (VIEWED.format("np.linalg.inv(", ")"), "this view matrix is computed"),
+        (VIEWED.format("np.array(", ") @ flip"), "this view matrix is computed"),
+        (VIEWED.format("np.array(", ").T @ flip"), "this view matrix is computed"),
+        (VIEWED.format("Matrix(", ").inverse()"), "this view matrix is computed"),
+        (POSED + "for i in range(3):\n    cam.rotation_euler[i] = angles[i]", "one coordinate of many"),
+        (POSED + "cam.rotation_euler.rotate_axis('Z', 1)", "by other means"),
+        (POSED + "bpy.ops.transform.translate(value=(1, 0, 0))", "by other means"),
+    ],
+)
+def test_what_is_done_with_a_value_that_is_read_is_refused_and_not_passed_over(text, sentence):
+    """Each was read as if that did not stand there."""
+    with pytest.raises(InputError, match=sentence):
+        cameras.read(text, options=Options(size=(640, 480), view_plane=CAMERAS["plain"].plane))
+
+
+@pytest.mark.parametrize("kept", ["", ".T", ".astype(np.float32)", "  # in meters", ", dtype=float"])
+def test_a_matrix_that_stays_what_it_is_is_read(kept):
+    assert read(VIEWED.format("np.array(", f"{kept})" if kept[:1] == "," else f"){kept}")).pinhole.eye == (-5, 0, 3)
+
+
+def test_a_sidecars_matrices_that_contradict_its_camera_are_refused(tmp_path):
+    """Whoever changed them had the old camera, since only the values of `camera` were read."""
+    for key, at in (("cameraToWorld", (0, 3)), ("worldToCamera", (1, 2)), ("K", (0, 0))):
+        (file,) = cameras.save([Camera("a", CAMERAS["rolled"])], tmp_path / key, "sidecar")
+        document = json.loads(file.read_text())
+        document[key][at[0]][at[1]] += 1e-3
+        file.write_text(json.dumps(document))
+        with pytest.raises(InputError, match=f"^{key} of .* is not that of its camera"):
+            cameras.read(file)
+
+
+def test_a_matrix_whose_last_row_is_no_number_is_refused():
+    """A comparison with NaN is never true."""
+    rows = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, math.nan, 0, 1]]
+    document = {"fl_x": 500, "w": 640, "h": 480, "frames": [{"file_path": "a.png", "transform_matrix": rows}]}
+    assert "the last row of the matrix" in refusal(json.dumps(document))
+
+
+def test_meshrooms_version_may_be_one_text():
+    """The principal point was then taken from the picture's corner, as in the oldest files."""
+    document = json.loads(meshroom())
+    (camera,) = cameras.read(json.dumps(document | {"version": "1.2.3"}))
+    assert camera.pinhole == cameras.read(json.dumps(document | {"version": ["1", "2", "3"]}))[0].pinhole
+    assert "version" in refusal(json.dumps(document | {"version": "new"}))
+
+
+def test_a_rotation_vector_in_degrees_is_refused():
+    """90 was taken for 90 radians."""
+    document = {"K": [[500, 0, 320], [0, 500, 180], [0, 0, 1]], "image_size": [640, 360], "rvec": [90, 0, 0], "t": [1, 2, 3]}
+    assert "give an angle in radians" in refusal(json.dumps(document))
+
+
+def test_a_key_of_opencvs_xml_that_is_there_twice_is_refused():
+    """The last one counted, where JSON and YAML refuse it."""
+    xml = "<opencv_storage><K><rows>3</rows><cols>3</cols><data>500 0 320 0 500 240 0 0 1</data></K>{}</opencv_storage>"
+    size = "<image_width>640</image_width><image_height>480</image_height>"
+    assert cameras.read(xml.format(size + size))[0].pinhole.width == 640
+    assert "'image_width' twice" in refusal(xml.format(size + "<image_width>700</image_width>"))
+
+
+@pytest.mark.parametrize(("place", "is_told"), [((0, 0), True), ((640, 0), True), ((0, 240), False), ((320, 240), False)])
+def test_a_principal_point_in_the_corner_is_told(place, is_told):
+    """Programs that do not know it write 0 0."""
+    frames = [{"file_path": "a.png", "transform_matrix": np.eye(4).tolist()}]
+    document = {"fl_x": 500, "w": 640, "h": 480, "cx": place[0], "cy": place[1], "frames": frames}
+    notes = read(json.dumps(document)).notes
+    assert any("lies in a corner" in note for note in notes) == is_told, f"{notes} of {place}"

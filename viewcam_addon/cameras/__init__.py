@@ -358,7 +358,7 @@ def recognized(source: str | Path | Source) -> str:
     for name in readable():
         with _told_of_damage(source, FORMATS[name].TITLE):
             if _recognizes(FORMATS[name], source):
-                if is_json and name in _CODE and source.json_problem:
+                if is_json and name in _CODE and source.json_problem and not own.lines_of(source):
                     break
                 return name
     for beginning, sentence in _OTHER_FILES.items():
@@ -491,7 +491,9 @@ def _doubted(camera: Camera) -> Camera:
     """The camera, with a note where its size can't well be that of the picture that its principal point is in."""
     (c_x, c_y), pinhole = camera.pinhole.principal_point, camera.pinhole
     if 0 <= c_x <= pinhole.width and 0 <= c_y <= pinhole.height:
-        return camera
+        if max(min(c_x, pinhole.width - c_x), min(c_y, pinhole.height - c_y)) > 0.5:
+            return camera
+        return camera.noted(f"The principal point of {camera.name} lies in a corner of its picture: is it known?")
     size = f"{pinhole.width} × {pinhole.height}"
     return camera.noted(f"The principal point of {camera.name} lies outside of a picture of {size} pixels: is that its size?")
 

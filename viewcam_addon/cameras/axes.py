@@ -117,7 +117,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
 def upper_rows(matrix: np.ndarray, what: str) -> list[list[float]]:
     """The upper three rows. Raises InputError if there is a fourth and it is not 0 0 0 1."""
     *rows, last = [*matrix.tolist(), [0.0, 0.0, 0.0, 1.0]][:4]
-    if max(map(abs, map(float.__sub__, last, (0.0, 0.0, 0.0, 1.0)))) > _NOTED:
+    if not all(abs(a - b) <= _NOTED for a, b in zip(last, (0.0, 0.0, 0.0, 1.0), strict=True)):  # nor if it is none
         hint = "transpose it" if not any(row[3] for row in rows) else "it should be 0 0 0 1"
         raise InputError(f"the last row of the matrix of {what} is {checks.quoted(last)}: {hint}")
     return rows

@@ -41,13 +41,14 @@ _LENS = ("lens", "angle", "sensor_width", "sensor_height", "sensor_fit", "shift_
 _RENDER = ("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y")
 _SET = re.compile(
     rf"(?<!\w)({'|'.join((*_POSE, *_LENS, *_RENDER))})"
-    r"['\"]?(?:\.xyz\b|\[:\])?(?:\.([wxyz])|\[([0-3])\])?[ \t]*([-+*/]?=(?!=)|:|\n)[ \t]*"
+    r"['\"]?(?:\.xyz\b|\[:\])?(?:\.([wxyz])|\[([^\]\n]{1,40})\])?[ \t]*([-+*/]?=(?!=)|:|\n)[ \t]*"
 )
 _ADDED = re.compile(r"\bcamera_add\s*(?=\()")
 _MADE = re.compile(r"\bcameras\.new\s*\(|\bcamera_add\s*\(")
 _NAMED = re.compile(r"^[ \t]*(?:>>> )?([A-Za-z_]\w{0,60})[ \t]*=(?!=)[ \t]*(.*)$", re.MULTILINE)
 _OTHERWISE = re.compile(
-    r"TRACK_TO|to_track_quat|DAMPED_TRACK|constraints\.new|\.parent\s*=(?!=)|delta_(?:location|rotation)|(?i:\bcam\w*)\.scale\b[^\n]*-"
+    r"TRACK_TO|to_track_quat|DAMPED_TRACK|constraints\.new|\.parent\s*=(?!=)|delta_(?:location|rotation)"
+    r"|(?i:\bcam\w*)\.scale\b[^\n]*-|\brotation_(?:euler|quaternion)\.rotate|\bops\.transform\.\w"
 )
 _MATRIX = re.compile(r"\bmatrix_(?:world|basis|local)\s*=(?!=)")
 _ANY_ADDED = re.compile(r"\b(\w+_add)\s*\(")
@@ -181,6 +182,9 @@ class _Script:
 
     def _take(self, match: re.Match, path: str) -> None:
         key, coordinate = match[1], match[2] or match[3]
+        if coordinate and coordinate not in "wxyz" and not re.fullmatch("[0-3]", coordinate):
+            self.problems.append((match.start(), "this is one coordinate of many, write the whole of it in plain numbers"))
+            return
         if match[4] not in ("=", ":", "\n"):
             self.problems.append((match.start(), "this moves the camera from where it was, write where it is then"))
         elif key in _POSE and self._whose.setdefault(key, path) != path:

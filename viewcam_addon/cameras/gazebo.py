@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from .. import checks, rotation
-from ..errors import InputError
+from ..errors import InputError, counted
 from . import axes, opencv, texts
 from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Source, flat, number, pixels
@@ -119,7 +119,7 @@ def _pose(pose: ElementTree.Element, what: str) -> np.ndarray:
     numbers = flat(what, (pose.text or "").strip() or "0 0 0 0 0 0")
     is_quaternion = pose.get("rotation_format") == "quat_xyzw"
     if len(numbers) != (7 if is_quaternion else 6):
-        raise InputError(f"{what} has {len(numbers)} numbers: it should have {7 if is_quaternion else 6}")
+        raise InputError(f"{what} has {counted(len(numbers), 'number')}: it should have {7 if is_quaternion else 6}")
     result[:3, 3] = numbers[:3]
     if is_quaternion:
         x, y, z, w = numbers[3:]

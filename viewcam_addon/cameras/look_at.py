@@ -129,7 +129,7 @@ _PYTORCH3D_LOOK = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))  # eye, at
 _MOVES = {
     "rotatex", "rotatey", "rotatez", "rotateonaxis", "translatex", "translatey", "translatez", "azimuth", "elevation",
     "dolly", "roll", "yaw", "pitch", "setroll", "orthogonalizeviewup", "applymatrix4", "setfocallength",
-    "filmoffset", "quaternion", "rotation", "flyto", "setview"
+    "filmoffset", "quaternion", "rotation", "flyto", "setview", "usehorizontalviewangleon"
 }  # fmt: skip
 _TURNED = {"rotation", "quaternion", "matrix", "matrixworld", "rotate"}
 _TURNED |= {"rotationeuler", "rotationquaternion", "rotationaxisangle"}  # Blender's
@@ -144,6 +144,8 @@ _CHANGES_BY = {*"+-*/"}
 _COORDINATES = {*"xyzXYZ"}
 _CHANGES = {"glloadidentity", "glpushmatrix", "resetcamera", "add", *_GL_MOVES}
 _VECTORS = {"eye", "target", "up", "direction"}
+# Operations on what stands before them that no value is computed by.
+_GOES_ON = re.compile(r"(?<![ \t])[ \t]*(?:[@%?\[]|\*\*|if\b|\.[ \t]*[A-Za-z_])")
 _OF_VTK = re.compile(
     r"SetViewUp|SetFocalPoint|CameraFocalPoint|\bcamera_position\s*=|\bcpos\s*=|\bfocal_point\s*=", re.IGNORECASE
 )
@@ -449,7 +451,12 @@ class _Code:
             if named:
                 return Unknown(place)
             return values[0] if len(values) == 1 else tuple(values)
-        return self.reader.value(place)[0]
+        return self._whole(place)
+
+    def _whole(self, place: int) -> object:
+        """The value at a place, an `Unknown` where something more is done with it."""
+        value, end = self.reader.value(place)
+        return Unknown(place) if _GOES_ON.match(self.text, end) else value
 
     # ---- what it says
 
@@ -483,11 +490,13 @@ class _Code:
                 whose = ".".join(parts[: parts.index(name, 1)])
                 if placed.setdefault(name, whose) != whose:
                     texts.fail(self.text, start, f"this is another camera than {placed[name][:40]}, copy one camera")
+            if sign == "(" and role in _VECTORS and _GOES_ON.match(self.text, self.reader.arguments(at - 1)[2]):
+                role = "moves"  # position.set(…).multiplyScalar(…)
             if role == "moves":
                 if sign != ":":
                     texts.fail(self.text, start, "this moves or bends the camera by other means, write eye, look-at and up")
             elif role[:-1] in ("position_", "up_"):
-                value = self.reader.value(at)[0]
+                value = self._whole(at)
                 if not isinstance(value, float):
                     texts.fail(self.text, at, "this is computed from what the text does not say, write the number")
                 scene.moved.append(start)
@@ -541,7 +550,7 @@ class _Code:
     def _refuse_moves(self, scene: _Scene) -> None:
         """Raise InputError where the camera, or one coordinate of it, is moved from where it was."""
         for parts, place in self._changed:
-            if self._is_camera(parts[:1]) and self._role(parts, "=") not in (None, "width", "height", "size"):
+            if self._is_camera(parts[:-1] or parts) and self._role(parts, "=") not in (None, "width", "height", "size"):
                 texts.fail(self.text, place, "this moves the camera from where it was, write where it is then")
         for parts, place in self._coordinates:
             if self._role(parts, "=") in _VECTORS:
@@ -584,7 +593,7 @@ class _Code:
             if not values and not named:
                 return  # a getter
         else:
-            value = self.reader.value(at)[0]
+            value = self._whole(at)
         if role in _VECTORS:
             value = _only(value)
             vector = numbers(value, 3)
@@ -686,7 +695,7 @@ class _Code:
         scene.is_height_first = True
 
     def _camera_position(self, scene: _Scene, at: int, start: int) -> None:
-        value = self.reader.value(at)[0]
+        value = self._whole(at)
         if single := numbers(value, 3):
             return self._place(scene, start, single)
         vectors = [numbers(part, 3) for part in value] if isinstance(value, tuple) and len(value) == 3 else [None]

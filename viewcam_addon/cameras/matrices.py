@@ -52,6 +52,12 @@ _SIZE = re.compile(
     r"\b(?:size|viewport|resolution)\b['\"]?\s*[=:]\s*(?:[\[({]\s*)?(\d{1,9})(?:\s*[x×,]\s*|\s+)(\d{1,9})", re.IGNORECASE
 )
 _NUMBER = re.compile(r"[\s,;|()\[\]{}<>]*([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)[fFd]?(?![\w.])")
+_COMPUTED = re.compile(r"inv|linalg|dot|mul", re.IGNORECASE)
+_KEPT = r"(?:T\b|transpos|astype|float|double|numpy|to\b|cuda|cpu|reshape|copy|clone|contiguous|view\b)"
+_OPERATION = re.compile(
+    r"(?<!\s)(?:\s{0,99}[)\]}>,])+[ \t]*(?:\.(?:T\b|transpos)[()\w]{0,20}[ \t]*)?"
+    rf"(?:\*(?!\*)|/(?![/*])|@|(?<=\S)\[|\.(?!{_KEPT})[A-Za-z_])"
+)
 _MOST = 100
 _ROUNDED = 1e-4  # a zero's rest after rounding to digits, relative to the largest number
 
@@ -61,20 +67,23 @@ def recognizes(source: Source) -> bool:
 
 
 def _matrices_in(text: str) -> list[tuple[str, list[float], int]]:
-    """Each matrix: view, projection or both; sixteen numbers; its place."""
+    """Each matrix: view, projection or both; sixteen numbers, none where it is computed of them; its place."""
     result = []
     for name in _NAMES.finditer(text[: 2**20]):
         role = _ROLES.get(texts.plain((name[1] + (name[2] or "")).replace(" ", "")))
         before = _BEFORE.match(text, name.end())
-        numbers = before and _sixteen(text, before.end())
-        if role and numbers:
-            result.append((role, numbers, name.start()))
+        sixteen = before and _sixteen(text, before.end())
+        if role and before and sixteen:
+            numbers, end = sixteen
+            is_computed = bool(_COMPUTED.search(before[0]) or _OPERATION.match(text, end))
+            result.append((role, [] if is_computed else numbers, name.start()))
             if len(result) > _MOST:
                 break
     return result
 
 
-def _sixteen(text: str, at: int) -> list[float] | None:
+def _sixteen(text: str, at: int) -> tuple[list[float], int] | None:
+    """The sixteen numbers at a place, and where they end."""
     numbers: list[float] = []
     rows = 0
     while len(numbers) < 16:
@@ -88,7 +97,7 @@ def _sixteen(text: str, at: int) -> list[float] | None:
             continue
         numbers.append(float(match[1]))
         at = match.end()
-    return None if _NUMBER.match(text, at) and re.match(r"[ \t,]*[-+.\d]", text[at : at + 40]) else numbers
+    return None if _NUMBER.match(text, at) and re.match(r"[ \t,]*[-+.\d]", text[at : at + 40]) else (numbers, at)
 
 
 def read(source: Source, options: Options) -> list[Camera]:
@@ -99,6 +108,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     result: dict[str, np.ndarray] = {}
     like_rows: bool | None = None  # where a view does not tell the order, it is the projection's
     for role, numbers, at in sorted(texts_found, key=lambda matrix: matrix[0] == "view"):
+        if not numbers:
+            texts.fail(text, at, f"this {role} matrix is computed, write the numbers that it has then")
         as_written = np.array(numbers).reshape(4, 4)
         matrix = _in_rows(role, as_written, text, at, like_rows)
         if role == "projection":

@@ -81,7 +81,8 @@ def _key(record: Record, key: str) -> str:
 
 def _version(document: Record) -> tuple[int, ...]:
     numbers = document.values.get("version") or ["1", "2", "11"]
-    return tuple(int(number(document.called("version"), part, 0, 1e6)) for part in numbers) if isinstance(numbers, list) else ()
+    parts = numbers if isinstance(numbers, list) else str(numbers).split(".")
+    return tuple(int(number(document.called("version"), part, 0, 1e6)) for part in parts)
 
 
 def _plane(

@@ -67,7 +67,7 @@ def read(source: Source, options: Options) -> list[Camera]:
                 plane, lens, notes = planes[sensor]
                 numbers = flat(f"the transform of {what}", own)
                 if len(numbers) != 16:
-                    raise InputError(f"the transform of {what} has {len(numbers)} numbers: it should have 16")
+                    raise InputError(f"the transform of {what} has {counted(len(numbers), 'number')}: it should have 16")
                 belongs = camera.get("component_id")
                 if components and belongs is not None and belongs not in components:
                     raise InputError(

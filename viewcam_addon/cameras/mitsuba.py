@@ -22,7 +22,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from .. import checks, terminal
-from ..errors import InputError
+from ..errors import InputError, counted
 from . import axes, naming, own, texts, tokens
 from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .expressions import Expressions, Unknown, numbers
@@ -321,7 +321,7 @@ def _step(step: ElementTree.Element, name: str, text: Callable[[str], str]) -> "
         elif len(parts) == 9:
             result[:3, :3] = np.array(parts).reshape(3, 3)
         else:
-            raise InputError(f"{what} has {len(parts)} numbers: give 16, row by row")
+            raise InputError(f"{what} has {counted(len(parts), 'number')}: give 16, row by row")
         if result[3].tolist() != [0, 0, 0, 1]:
             raise InputError(f"the last row of {what} is {checks.quoted(result[3].tolist())}: it should be 0 0 0 1")
     else:

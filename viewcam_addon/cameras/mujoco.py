@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from .. import checks
-from ..errors import InputError
+from ..errors import InputError, counted
 from . import axes, texts
 from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Source, flat, pixels
@@ -154,5 +154,5 @@ def _unit(vector: np.ndarray, kind: str, what: str) -> np.ndarray:
 def _numbers(values: dict[str, str], key: str, count: int | None, what: str) -> tuple[float, ...]:
     result = flat(f"{key} of {what}", values[key])
     if count is not None and len(result) != count:
-        raise InputError(f"{key} of {what} has {len(result)} numbers: it should have {count}")
+        raise InputError(f"{key} of {what} has {counted(len(result), 'number')}: it should have {count}")
     return result

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, counted
 from . import axes, naming, opencv
 from .camera import Camera, LeftOut, Options
 from .source import Source, flat, image_size
@@ -60,7 +60,7 @@ def _camera(file: Source, name: str, options: Options) -> Camera:
         raise InputError(f"{file.name} has no extrinsic and intrinsic of numbers: export it again")
     extrinsic, intrinsic = (flat(f"the {kind} of {what}", part) for kind, part in zip(_KINDS, matched.groups(), strict=True))
     if len(extrinsic) not in (12, 16) or len(intrinsic) < 9:
-        raise InputError(f"{what} has {len(extrinsic)} and {len(intrinsic)} numbers: it should have 16 and 9")
+        raise InputError(f"{what} has {len(extrinsic)} and {counted(len(intrinsic), 'number')}: it should have 16 and 9")
     picture = _picture(file, name)
     size = image_size(picture) if picture else None
     half = opencv.half_pixel(options, "corner")

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from ..errors import InputError
+from ..errors import InputError, counted
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming, own
 from .camera import POSES, Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
@@ -49,6 +49,7 @@ _LISTS = ("cameras", "Cameras", "views")  # CMU Panoptic's calibrations, and man
 _STEREO = (("1", "2"), ("left", "right"), ("l", "r"))
 _OF_ONE = ("m", *_K)
 _BESIDE = "extrinsics.yml", "extrinsics.yaml", "extrinsics.xml"
+_WHOLE_TURN = 2 * math.pi * 1.01  # with room for what was found by fitting
 _RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
 _T = ("t", "tvec", "tvecs", "translation", "translationvector", "trans", "tw2c")
 _EXTRINSIC = (
@@ -184,8 +185,10 @@ def of_rotation_vector(vector: Sequence[float], what: str) -> np.ndarray:
     """(3, 3) of axis times angle, Rodrigues'."""
     vector = checks.vector(f"the rotation vector of {what}", vector, 3)
     angle = math.hypot(*vector)
-    if angle > 1e6:
-        raise InputError(f"the rotation vector of {what} has the length {angle:g}: give an angle in radians")
+    if angle > _WHOLE_TURN:
+        raise InputError(
+            f"the rotation vector of {what} has the length {angle:g}: give an angle in radians, within a whole turn"
+        )
     sine = math.sin(angle / 2) / angle if angle else 0.5
     return axes.rotation_of((math.cos(angle / 2), *(sine * part for part in vector)), what)
 
@@ -406,7 +409,9 @@ def _xml(source: Source) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for child in root:
         inner = {each.tag: (each.text or "").strip() for each in child}
-        result[child.tag] = inner if inner else (child.text or "").strip()
+        value = inner if inner else (child.text or "").strip()
+        if child.tag != "_" and result.setdefault(child.tag, value) != value:  # _ is an item of a list
+            raise InputError(f"{source.name} has the key {checks.quoted(child.tag)} twice, with other values: leave one out")
     return result
 
 
@@ -418,7 +423,7 @@ def _numbers(name: str, value: Any) -> tuple[float, ...]:
         if rows is not None and columns is not None:
             rows, columns = pixels(f"rows of {name}", rows), pixels(f"cols of {name}", columns)
             if len(result) != rows * columns:
-                raise InputError(f"{name} has {len(result)} numbers: its rows and cols say {rows} × {columns}")
+                raise InputError(f"{name} has {counted(len(result), 'number')}: its rows and cols say {rows} × {columns}")
         return result
     return flat(name, value)
 
@@ -434,7 +439,7 @@ def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float
         if len(values) == 12:
             values = [values[i] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)]
         if len(values) != 9:
-            raise InputError(f"K of {what} has {len(values)} numbers: give nine")
+            raise InputError(f"K of {what} has {counted(len(values), 'number')}: give nine")
         f_x, skew, c_x, lower, f_y, c_y, *last = values
         if [lower, *last[:2]] != [0, 0, 0] or last[2] != 1:
             hint = "transpose it" if [values[1], values[2], values[5]] == [0, 0, 0] else "its last row should be 0 0 1"
@@ -613,7 +618,7 @@ def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple
     if (both := _first(values, _SIZE)) is not None:
         numbers = _numbers(f"the size of {what}", both)
         if len(numbers) != 2:
-            raise InputError(f"the size of {what} has {len(numbers)} numbers: give the width and the height")
+            raise InputError(f"the size of {what} has {counted(len(numbers), 'number')}: give the width and the height")
         across, up = (pixels(f"the size of {what}", number) for number in numbers)
         return (across, up), True
     return options.size_or_refuse(what), False
@@ -654,7 +659,9 @@ def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.nd
     elif len(numbers) == 3 and turn is None:
         matrix = of_rotation_vector(numbers, what)
     else:
-        raise InputError(f"R of {what} has {len(numbers)} numbers: give nine, or as rvec the three of a rotation vector")
+        raise InputError(
+            f"R of {what} has {counted(len(numbers), 'number')}: give nine, or as rvec the three of a rotation vector"
+        )
     if turn is not None and vector is not None and len(numbers) == 9:
         both = _numbers(f"rvec of {what}", vector)
         if len(both) == 3 and np.abs(of_rotation_vector(both, what) - matrix).max() > 1e-3:

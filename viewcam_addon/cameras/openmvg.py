@@ -78,7 +78,7 @@ def _plane(data: Record, kind: str, options: Options) -> tuple[ViewPlane, distor
     c_x, c_y = inner.numbers("principal_point", 2)
     half = opencv.half_pixel(options, "corner")
     plane = axes.view_plane(f, f, c_x + half, c_y + half, (inner.size("width"), inner.size("height")))
-    if kind == "fisheye":
+    if kind == "fisheye" or "fisheye" in data:
         lens = distortion.fisheye(dict(zip(_FISHEYE, data.numbers("fisheye", len(_FISHEYE)), strict=True)))
         return plane, *distortion.settle(lens, plane, data.place, options.without_distortion)
     key = next((key for key in _LENSES if key in data), None)

@@ -89,7 +89,7 @@ def _files(source: Source) -> list[Source]:
 def _matrix(file: Source) -> tuple[float, ...] | None:
     """The numbers of a pose, of which some may be infinite; None if it is none."""
     lines = [line.split() for line in file.text[:2000].strip().split("\n")]
-    if file.is_binary or [len(line) for line in lines] not in ([4] * 3, [4] * 4):
+    if file.is_binary or "_" in file.text[:2000] or [len(line) for line in lines] not in ([4] * 3, [4] * 4):
         return None
     try:
         rows = np.array([[float(word) for word in line] for line in lines])
@@ -131,7 +131,7 @@ def _intrinsics(file: Source) -> Mapping[str, Any]:
                 numbers = flat(f"K in {k_file.name}", text)
                 side = {9: 3, 16: 4}.get(len(numbers))
                 if side is None:
-                    raise InputError(f"{k_file.name} has {len(numbers)} numbers: K has 3 × 3, or 4 × 4")
+                    raise InputError(f"{k_file.name} has {counted(len(numbers), 'number')}: K has 3 × 3, or 4 × 4")
                 return {**size, "k": np.array(numbers).reshape(side, side)[:3, :3].ravel().tolist()}
     return {}
 

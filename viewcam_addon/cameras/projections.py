@@ -26,7 +26,7 @@ import zlib
 import numpy as np
 
 from .. import npy
-from ..errors import InputError
+from ..errors import InputError, counted
 from . import naming, opencv, texts
 from .camera import Camera, Options
 from .source import Source, flat, image_size, pixels
@@ -155,7 +155,9 @@ def _of_kitti(source: Source) -> dict[str, np.ndarray]:
         numbers = flat(what := f"{match[1]} of {source.name}", match[2].split())
         if len(numbers) != 12 or match[1] in matrices:
             problem = (
-                "is there twice: leave one out" if match[1] in matrices else f"has {len(numbers)} numbers: it should have 12"
+                "is there twice: leave one out"
+                if match[1] in matrices
+                else f"has {counted(len(numbers), 'number')}: it should have 12"
             )
             raise InputError(f"{what} {problem}")
         matrices[match[1]] = np.array(numbers).reshape(3, 4)
@@ -172,7 +174,7 @@ def _alone(source: Source) -> np.ndarray | None:
         matrix = np.array([[float(word) for word in line] for line in lines])
     except ValueError:
         return None
-    if not np.isfinite(matrix).all():
+    if "_" in text or not np.isfinite(matrix).all():
         return None
     turn = matrix[:, :3]
     is_pose = np.abs(turn).max() < 2 and np.abs(turn @ turn.T - np.eye(3)).max() < _ORTHOGONAL

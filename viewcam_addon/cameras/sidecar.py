@@ -10,6 +10,8 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from .. import checks
 from ..errors import InputError
 from ..intrinsics import CameraData
@@ -23,6 +25,8 @@ from .source import Record, Source
 TITLE = "the sidecars of a batch"
 SUFFIX = ".json"
 LENSES = True
+
+_SAME = 1e-9  # they are written to the last digit; others may have read and written them
 
 CONVENTION = (
     "K times the first three numbers of worldToCamera times (x, y, z, 1) is depth times (column, row, 1): column vectors; "
@@ -90,6 +94,11 @@ def _camera(source: Source, options: Options) -> Camera:
     if isinstance(document.get("name"), str):  # the key that a batch leaves out
         name = document.text("name")
     pinhole = Pinhole(**camera.values)
+    for key, rows in record(pinhole).items():
+        if key in ("cameraToWorld", "worldToCamera", "K"):
+            numbers, others = np.ravel(rows), document.numbers(key, np.size(rows))
+            if np.abs(numbers - others).max() > _SAME * (1 + np.abs(numbers).max()):
+                raise InputError(f"{key} of {document.place} is not that of its camera: change both alike, or export it again")
     lens: Lens | None = None
     notes: tuple[str, ...] = ()
     if "lens" in document:

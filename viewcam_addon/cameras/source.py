@@ -161,7 +161,7 @@ class Source:
         """The sentence on a text that looks like JSON or XML by how it begins, and is none; nothing if it is all right."""
         if self.json_problem:
             return f"looks like JSON and is none ({self.json_problem}): correct it"
-        if _LIKE_XML.match(self.text) and self.xml is None:
+        if self.path and _LIKE_XML.match(self.text) and self.xml is None:
             return f"looks like XML and is none ({self._xml[1]}): correct it"
         return ""
 
@@ -291,7 +291,7 @@ class Record:
         """So many numbers, in whatever nesting."""
         result = flat(self.called(key), self.needed(key))
         if len(result) != count:
-            raise InputError(f"{self.called(key)} has {len(result)} numbers: it should have {count}")
+            raise InputError(f"{self.called(key)} has {counted(len(result), 'number')}: it should have {count}")
         return result
 
     def record(self, key: str) -> "Record":

@@ -117,7 +117,7 @@ def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suf
             text = transforms.text(transforms.document(views, more=more, of_frames=of_frames))
             temporary.write_text(text, encoding="utf-8", newline="\n")
     of_points = f" and {points:,} points" if points else ""
-    return f"dataset of {len(cameras)} pictures{of_points}: {folder.path / transforms.FILE} and {model}"
+    return f"dataset of {counted(len(cameras), 'picture')}{of_points}: {folder.path / transforms.FILE} and {model}"
 
 
 def _labeled(records: Mapping[str, Mapping[str, Any]]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
@@ -155,7 +155,7 @@ def _held_out(names: Sequence[str], test: str) -> set[str]:
         result = {name for name in names if fnmatch.fnmatchcase(name, test)}
     if not result or len(result) == len(names):
         what = "none" if not result else "all"
-        raise InputError(f"--test {test} holds out {what} of the {len(names)} pictures: give another number or name")
+        raise InputError(f"--test {test} holds out {what} of the {counted(len(names), 'picture')}: give another number or name")
     return result
 
 
