@@ -525,9 +525,9 @@ def test_a_color_whose_alpha_counts_for_nothing_is_not_divided_by_it(floor, imag
 
 @pytest.mark.parametrize("clamp", [True, False])
 def test_a_range_that_maps_from_one_number_is_0_within_what_it_maps_to(floor, clamp):
-    one = {"From Min": 0.4, "From Max": 0.4, "To Min": 0.3, "To Max": 2.0}
+    ends = {"From Min": 0.4, "From Max": 0.4, "To Min": 0.3, "To Max": 2.0}
     kinds = ("LINEAR", "STEPPED", "SMOOTHSTEP", "SMOOTHERSTEP")
-    check(floor({kind: N("MapRange", {"Value": U, **one}, interpolation_type=kind, clamp=clamp) for kind in kinds}))
+    check(floor({kind: N("MapRange", {"Value": U, **ends}, interpolation_type=kind, clamp=clamp) for kind in kinds}))
 
 
 def test_a_mapping_that_scales_by_0_drops_its_location_unless_all_of_it_is_constant(floor):
