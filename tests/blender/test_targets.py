@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 bpy = pytest.importorskip("bpy")
 
 import viewcam_addon
+from viewcam_addon import roll as rolls
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import datablocks, findings, hold, targets
+from viewcam_addon.blender import datablocks, findings, hold, targets, versions
 from viewcam_addon.blender.interface import panel
 from viewcam_addon.pinhole import Pinhole
 
@@ -204,6 +205,26 @@ def test_a_target_that_blender_leaves_out_is_followed_all_the_same(watching_came
     update()
     assert number_of(watching_camera, "look_at") == (6, 2, 9)
     assert is_where_stated(watching_camera, scene)
+
+
+@pytest.mark.parametrize("leave_out", LEFT_OUT)
+def test_a_keyed_roll_about_a_target_that_blender_leaves_out_is_right_at_every_frame(
+    watching_camera, scene, moving_target, leave_out, capfd
+):
+    """Blender asks for the roll as it evaluates, and to evaluate the target for that began it anew until the stack was full."""
+    group = watching_camera.virtual_pinhole
+    for frame, roll in ((1, 0.1), (11, 0.6)):
+        group.roll = roll
+        group.keyframe_insert("roll", frame=frame)
+    leave_out(moving_target)
+    update()
+    for frame in (6, 11, 1, 8):
+        scene.frame_set(frame)
+        curve = next(each for each in versions.animation_curves(watching_camera) if each.data_path == "virtual_pinhole.roll")
+        assert group.roll == pytest.approx(curve.evaluate(frame), abs=1e-6)
+        there = rolls.angle_from((0, 0, 1), cameras.read(watching_camera, scene))
+        assert there == pytest.approx(curve.evaluate(frame), abs=1e-5), f"frame {frame}"
+    assert capfd.readouterr().err == ""
 
 
 @pytest.mark.parametrize("leave_out", [lambda target: None, *LEFT_OUT])

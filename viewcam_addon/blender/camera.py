@@ -797,11 +797,21 @@ def roll(camera_object: bpy.types.Object) -> float:
         asked = storage.asked_of(camera_object)
         if "roll" in asked:
             return asked["roll"]
-        values = targets.values(camera_object)
+        values = _followed(camera_object, storage.load(camera_object))
         held = hold.roll(camera_object, values, datablocks.scene_of(camera_object.original))
         angle = values.roll_from(preferences.up_axis(), held)
         return angle if abs(angle) > _UNSEEN else 0.0
     return 0.0
+
+
+def _followed(camera_object: bpy.types.Object, values: CameraValues) -> CameraValues:
+    """`targets.followed`, with targets as they stood last where the roll is animated.
+
+    Blender then asks for the roll, and for other looks at values, as it evaluates: to evaluate here would begin that anew,
+    without end.
+    """
+    is_animated = bool(values.follows) and "up" in datablocks.animated_values(camera_object.original)
+    return targets.followed(camera_object, values, as_evaluated=is_animated)
 
 
 def answer(camera_object: bpy.types.Object) -> None:
@@ -820,7 +830,7 @@ def _answered(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.
     for look, number in values.asked:
         with contextlib.suppress(InputError, ZeroDivisionError):
             if look == "roll":
-                followed = targets.followed(camera_object, values)
+                followed = _followed(camera_object, values)
                 turned = followed.rolled(number, preferences.up_axis(), hold.roll(camera_object, followed, scene))
                 values = replace(values, up=turned.up, held_roll=turned.held_roll)
             else:

@@ -187,12 +187,17 @@ def bound_camera(bindings: Iterable[tuple[bpy.types.TimelineMarker, bpy.types.Ob
     return (max(before, key=by_frame) if before else min(bound, key=by_frame))[1]
 
 
-def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
-    """The scene's dependency graph, up to date: of the current view layer, or the first one of another scene."""
-    if bpy.context.scene == scene:
+def depsgraph_of(scene: bpy.types.Scene, as_evaluated: bool = False) -> bpy.types.Depsgraph:
+    """The scene's dependency graph, of the current view layer, or the first one of another scene.
+
+    as_evaluated : true for the graph as Blender has evaluated it last, or else it is brought up to date.
+    """
+    is_current = bpy.context.scene == scene
+    if is_current and not as_evaluated:
         return bpy.context.evaluated_depsgraph_get()
-    layer = scene.view_layers[0]
-    layer.update()
+    layer = bpy.context.view_layer if is_current else scene.view_layers[0]
+    if not as_evaluated:
+        layer.update()
     return layer.depsgraph
 
 

@@ -46,9 +46,9 @@ def values(camera_object: bpy.types.Object) -> CameraValues:
     return followed(camera_object, storage.load(camera_object))
 
 
-def followed(camera_object: bpy.types.Object, stored: CameraValues) -> CameraValues:
-    """Stored values of a camera with a followed point where its target is."""
-    places = {point: place(camera_object, point) for point in stored.follows}
+def followed(camera_object: bpy.types.Object, stored: CameraValues, as_evaluated: bool = False) -> CameraValues:
+    """Stored values of a camera with a followed point where its target is. as_evaluated : see `place`."""
+    places = {point: place(camera_object, point, as_evaluated) for point in stored.follows}
     more: dict[str, Any] = {point: at for point, at in places.items() if at}
     return replace(stored, **more)
 
@@ -58,18 +58,19 @@ def target_of(camera_object: bpy.types.Object, point: str) -> bpy.types.Object |
     return getattr(camera_object.virtual_pinhole, f"{point}_target")
 
 
-def place(camera_object: bpy.types.Object, point: str) -> Triple | None:
+def place(camera_object: bpy.types.Object, point: str, as_evaluated: bool = False) -> Triple | None:
     """World space: where the target of a point stands, or None where there is none to be followed.
 
     camera_object : an original, or the evaluated one of any depsgraph, which has evaluated targets.
+    as_evaluated : true for where it stood when it was evaluated last, which is all that may be asked while Blender evaluates.
     """
     target = target_of(camera_object, point)
     if target is None or _loop(camera_object.original, point):
         return None
     if _is_led(target):
-        return place(target, "eye") or storage.load(target).eye
+        return place(target, "eye", as_evaluated) or storage.load(target).eye
     if not target.is_evaluated:
-        target = target.evaluated_get(datablocks.depsgraph_of(datablocks.scene_of(camera_object)))
+        target = target.evaluated_get(datablocks.depsgraph_of(datablocks.scene_of(camera_object), as_evaluated))
     bone, group = bone_of(camera_object, point, target), group_of(camera_object, point, target)
     local = bone.head if bone else _middle(target, group) if group else None
     return tuple(target.matrix_world.translation if local is None else target.matrix_world @ local)
