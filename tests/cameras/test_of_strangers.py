@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from viewcam_addon import cameras
-from viewcam_addon.cameras import Camera, Options, distortion
+from viewcam_addon.cameras import Camera, Options, axes, distortion
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 
@@ -708,6 +708,7 @@ def test_what_blenders_own_importers_read_is_sent_there(tmp_path, data):
         ("transforms.json", b"<!DOCTYPE html>\n<html>", "is a page of the web: download the file itself"),
         ("a.exr", b"v/1\x01\x02", "is a picture: give the file of its camera"),
         ("a.ply", b"ply\nformat ascii 1.0\n", "is a point cloud or a mesh"),
+        ("scene.ma", b"//Maya ASCII 2025 scene\n", "is a scene of Maya's: export its camera as USD or FBX"),
         ("database.db", b"SQLite format 3\0", "is a database, as COLMAP's, which has no poses"),
         ("poses.pkl", b"\x80\x04\x95", "is a pickle, which may run programs"),
         ("a.json", b" \n", "is empty"),
@@ -1333,3 +1334,16 @@ def test_a_principal_point_in_the_corner_is_told(place, is_told):
     document = {"fl_x": 500, "w": 640, "h": 480, "cx": place[0], "cy": place[1], "frames": frames}
     notes = read(json.dumps(document)).notes
     assert any("lies in a corner" in note for note in notes) == is_told, f"{notes} of {place}"
+
+
+def test_a_node_of_gltf_with_two_poses_is_refused_where_they_differ():
+    """Its matrix counted. A node may have one or the other."""
+    document = json.loads(cameras.write([Camera("a", CAMERAS["rolled"])], "gltf"))
+    (node,) = [each for each in document["nodes"] if "camera" in each]
+    matrix = np.array(axes.camera_to_world(CAMERAS["rolled"]))
+    for moved, is_right in ((0, True), (0.1, False)):
+        node["matrix"] = (matrix + np.array([[0, 0, 0, moved], *[[0] * 4] * 3])).T.ravel().tolist()
+        if is_right:
+            assert np.allclose(read(json.dumps(document)).pinhole.eye, CAMERAS["rolled"].eye)
+        else:
+            assert "has a matrix, and another as translation" in refusal(json.dumps(document))

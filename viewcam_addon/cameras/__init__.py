@@ -340,6 +340,7 @@ _OTHER_FILES = {
     **dict.fromkeys((b"\x89PNG", b"\xff\xd8\xff", b"v/1\x01", b"II*\0", b"MM\0*", b"RIFF"), _A_PICTURE),
     **dict.fromkeys((b"<!DOCTYPE html", b"<!doctype html", b"<html"), _A_PAGE),
     **dict.fromkeys((b"ply\n", b"ply\r"), "is a point cloud or a mesh, which has no cameras: give the file of these"),
+    **dict.fromkeys((b"//Maya ASCII", b"FOR4", b"FOR8"), "is a scene of Maya's: export its camera as USD or FBX"),
     b"SQLite format 3": "is a database, as COLMAP's, which has no poses: give the model, as the folder sparse/0",
     **dict.fromkeys(
         (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"), "is a pickle, which may run programs: save JSON or NPZ"

@@ -27,6 +27,7 @@ SUFFIX = ".gltf"
 
 _Y_UP = "glTF's y points up: the numbers stay as they are unless the axes Y up → Z up are chosen"
 _NEAR = 0.01  # written where glTF asks for one
+_SAME = 1e-3  # some write float32, and some a few digits
 
 
 def recognizes(source: Source) -> bool:
@@ -128,14 +129,17 @@ class _Worlds:
 
 
 def _local(node: Record) -> np.ndarray:
-    if "matrix" in node:
-        return np.array(node.numbers("matrix", 16)).reshape(4, 4).T
     x, y, z, w = node.numbers("rotation", 4) if "rotation" in node else (0, 0, 0, 1)
     scale = node.numbers("scale", 3) if "scale" in node else (1, 1, 1)
     matrix = np.eye(4)
     matrix[:3, :3] = axes.rotation_of((w, x, y, z), node.place) * np.array(scale)
     matrix[:3, 3] = node.numbers("translation", 3) if "translation" in node else (0, 0, 0)
-    return matrix
+    if "matrix" not in node:
+        return matrix
+    whole = np.array(node.numbers("matrix", 16)).reshape(4, 4).T
+    if (matrix != np.eye(4)).any() and np.abs(matrix - whole).max() > _SAME * (1 + np.abs(whole).max()):
+        raise InputError(f"{node.place} has a matrix, and another as translation, rotation and scale: take one of them out")
+    return whole
 
 
 def _index(node: Record, key: str, count: int) -> int:
