@@ -523,6 +523,24 @@ def test_a_color_whose_alpha_counts_for_nothing_is_not_divided_by_it(floor, imag
     check(floor({"both": Both("")}))
 
 
+@pytest.mark.parametrize("clamp", [True, False])
+def test_a_range_that_maps_from_one_number_is_0_within_what_it_maps_to(floor, clamp):
+    ends = {"From Min": 0.4, "From Max": 0.4, "To Min": 0.3, "To Max": 2.0}
+    kinds = ("LINEAR", "STEPPED", "SMOOTHSTEP", "SMOOTHERSTEP")
+    check(floor({kind: N("MapRange", {"Value": U, **ends}, interpolation_type=kind, clamp=clamp) for kind in kinds}))
+
+
+def test_a_mapping_that_scales_by_0_drops_its_location_unless_all_of_it_is_constant(floor):
+    place, there = N("TexCoord", output="Object"), {"Location": CORNER, "Scale": (0.0, 0.0, 0.0)}
+    graphs = {kind: N("Mapping", {"Vector": place, **there}, vector_type=kind) for kind in ("POINT", "TEXTURE")}
+    check(
+        floor(
+            graphs
+            | {"constant": N("Mapping", there), "by a color": N("Mapping", {"Vector": Constant("RGB", (1.0,) * 4), **there})}
+        )
+    )
+
+
 def test_bricks_without_a_width_have_the_mortar_that_they_have_in_cycles(floor):
     bricks = {"Vector": N("TexCoord", output="Object"), "Scale": 3.0, "Mortar Size": 0.05}
     graphs = {}

@@ -465,6 +465,13 @@ class Tree:
         if why:
             self._reason(output, why)
             return None
+        others = ("Vector", "Location", "Rotation")
+        if (
+            ours == "mapping"
+            and constant_color(output, "Scale") == _ZERO
+            and None in (constant_color(output, each) for each in others)
+        ):
+            return _vector(_ZERO)  # Cycles drops the location with what it scales (ConstantFolder::fold_mapping)
         inputs = dict(words)
         if "image" in KINDS[ours].inputs:
             if not self._shows(output):

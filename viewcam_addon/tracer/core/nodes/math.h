@@ -188,17 +188,17 @@ struct MapRange {
         } else if (interpolation == "smootherstep") {
             x = unit_range(x), x = x * x * x * (x * (x * 6 - 15) + 10);
         }
-        value = low + x * (high - low);
-        return clamp ? max(min(value, max(low, high)), min(low, high)) : value;
+        return within(low + x * (high - low), low, high);
     }
+    double within(double value, double low, double high) const { return clamp ? max(min(value, max(low, high)), min(low, high)) : value; }
 };
 struct MapRangeNode : MapRange {
     static constexpr const char* NAME = "map_range";
     static constexpr Gives GIVES = Gives::NUMBER;
     using MapRange::MapRange;
     Vec3 eval(const ShadingPoint& at) const {
-        double first = at.number(from_min), last = at.number(from_max);
-        return gray(first == last ? 0 : mapped(at.number(value), first, last, at.number(to_min), at.number(to_max), at.number(steps)));
+        double first = at.number(from_min), last = at.number(from_max), low = at.number(to_min), high = at.number(to_max);
+        return gray(first == last ? within(0, low, high) : mapped(at.number(value), first, last, low, high, at.number(steps)));
     }
 };
 struct MapRangeVectorNode : MapRange {
