@@ -102,7 +102,7 @@ def test_images_that_were_changed_beside_their_rigs_are_refused_and_read_without
     (model.write_binary if binary else model.write_text)(tmp_path)
     for path, content in zip(rigs, before, strict=True):
         path.write_bytes(content)
-    with pytest.raises(InputError, match=rf"and 9 more have another pose than by .*rigs\.{suffix} and .*frames\.{suffix}, and"):
+    with pytest.raises(InputError, match=rf"and 9 more is another by .*rigs\.{suffix} and .*frames\.{suffix}, and"):
         cameras.read(tmp_path)
     for path in rigs:
         path.unlink()

@@ -327,7 +327,7 @@ def _refuse_other_poses(images: Sequence[_Image], poses: dict[int, tuple[float, 
     differ |= np.abs(place - carried).max(axis=1, initial=0.0) > _SAME_POSE * reach
     if differ.any():
         raise InputError(
-            f"{several([what for what, other in zip(whats, differ, strict=True) if other])} have another pose than by "
+            f"the pose of {several([what for what, other in zip(whats, differ, strict=True) if other])} is another by "
             f"{' and '.join(file.name for file in rigs)}, and programs differ in which of them counts: take these two files "
             "out, or write the model again"
         )
