@@ -304,7 +304,8 @@ def vague_beginnings(source: str) -> list[str]:
 
 
 NO_NAMES = "found|given|it|made|one|said|shown|some|stuff|thing|things|told"
-POOR = rf"_?(?:{NO_NAMES})_?"
+ONLY_OF_FUNCTIONS = "how|of"  # as in CameraSync.of(camera_object)
+POOR = rf"_?(?:{NO_NAMES}|{ONLY_OF_FUNCTIONS})_?"
 SPELLED_AS_NAMES = [  # more or less: whole trees of syntax take ten seconds for all files
     re.compile(rf"\b{POOR}\)?( [:|+*/-]?= |, [^\"\n]* = )"),
     re.compile(rf"(?m)^ *{POOR}: "),
@@ -327,14 +328,14 @@ def poor_names(source: str) -> list[str]:
         return []
     result = []
     for node in ast.walk(tree_of(source)):
-        name = ""
+        name, refused = "", f"{NO_NAMES}|{ONLY_OF_FUNCTIONS}"
         if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
             name = node.id if isinstance(node, ast.Name) else node.attr
         elif isinstance(node, ast.arg):
             name = node.arg
         elif isinstance(node, ast.FunctionDef | ast.ClassDef):
-            name = node.name
-        result += [name] if name.strip("_") in NO_NAMES.split("|") or is_british(name) else []
+            name, refused = node.name, NO_NAMES
+        result += [name] if name.strip("_") in refused.split("|") or is_british(name) else []
     return result
 
 

@@ -279,10 +279,12 @@ def test_a_normal_that_is_given_as_a_value_counts_as_in_cycles(patches, value):
     check(patches(cases, give), cases, p50=3e-5, p99=2e-4)
 
 
-@pytest.mark.parametrize("of, words", [("a tangent of 0", "a Tangent of 0"), ("bumps of a width below 0", "Width below 0")])
-def test_normals_that_cycles_makes_no_number_of_are_told(scene, bare_body, of, words):
+@pytest.mark.parametrize(
+    ("fault", "words"), [("a tangent of 0", "a Tangent of 0"), ("bumps of a width below 0", "Width below 0")]
+)
+def test_normals_that_cycles_makes_no_number_of_are_told(scene, bare_body, fault, words):
     material = bare_body[1]
-    if of == "a tangent of 0":
+    if fault == "a tangent of 0":
         material.node_tree.nodes["Shader"].inputs["Anisotropic"].default_value = 0.8
         node = material.node_tree.nodes.new("ShaderNodeRGB")
         node.outputs[0].default_value = (0.0, 0.0, 0.0, 1.0)

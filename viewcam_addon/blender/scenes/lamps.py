@@ -356,10 +356,10 @@ class _LampReader(shaders.Tree):
         super().__init__(Color(_WHITE), divided=shaders.divided_images(output))
         self._light, self._matrix, self._uv = light, matrix, uv
 
-    def emission(self, of: Input) -> RGB | Node:
+    def emission(self, node_input: Input) -> RGB | Node:
         """The emission of the shaders: the same everywhere, or a node that makes it; if `reading` has no reasons then."""
         total: RGB | Node = _BLACK
-        for closure in closures(self.surface(of)):
+        for closure in closures(self.surface(node_input)):
             if closure.node.type != "emission":
                 self.reading.reasons.append("has nodes that scatter light")
                 return _WHITE
@@ -397,8 +397,8 @@ class _LampReader(shaders.Tree):
         if output.socket.name != "Quadratic" and not versions.SUNS_HAVE_NO_FALLOFF:
             self._reason(output, "lets a sun grow with its distance")
             return None
-        of = output.input("Strength")
-        strength = of and self._value_input(of, 0.0)
+        node_input = output.input("Strength")
+        strength = node_input and self._value_input(node_input, 0.0)
         return None if strength is None else node("math", operation="add", a=strength, b=0.0)
 
     def _of_itself(self, output: Output, known: object) -> Node | None:

@@ -48,29 +48,29 @@ class Output(NamedTuple):
         return Input(self.node.inputs[name], self.groups)
 
 
-def source(of: Input) -> Output | Input:
+def source(node_input: Input) -> Output | Input:
     """The output that feeds an input, or the input, perhaps of a group around it, that nothing feeds.
 
     What a muted node or a reroute passes on of its own is no value in Cycles: the input keeps its own, or is 0.
     """
-    kept = of
+    kept = node_input
     while True:
-        links = of.socket.links if of.socket.is_linked else ()
+        links = node_input.socket.links if node_input.socket.is_linked else ()
         link = next((link for link in links if _counts(link)), None)
         if link is None:
-            return kept if of is kept or versions.MUTED_NODES_HAVE_NO_VALUES else of._replace(is_zero=True)
+            return kept if node_input is kept or versions.MUTED_NODES_HAVE_NO_VALUES else node_input._replace(is_zero=True)
         node, socket = link.from_node, link.from_socket
-        through = _through(node, socket, of.groups)
+        through = _through(node, socket, node_input.groups)
         if through is None:
-            return Output(node, socket, of.groups)
+            return Output(node, socket, node_input.groups)
         is_passed_on = node.type == "REROUTE" or node.mute
-        of, kept = through, kept if is_passed_on else through
+        node_input, kept = through, kept if is_passed_on else through
 
 
-def is_left_alone(of: Input) -> bool:
+def is_left_alone(node_input: Input) -> bool:
     """True if nothing is given to an input, so that Cycles takes for it what surfaces have of themselves, if anything."""
-    end = source(of)
-    return isinstance(end, Input) and (end.socket == of.socket or not versions.GROUPS_GIVE_ALL_VALUES)
+    end = source(node_input)
+    return isinstance(end, Input) and (end.socket == node_input.socket or not versions.GROUPS_GIVE_ALL_VALUES)
 
 
 def _counts(link: bpy.types.NodeLink) -> bool:
@@ -109,13 +109,13 @@ def _by_identifier(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: t
     return inner and Input(inner, groups)
 
 
-def feeding(of: Input, inputs_of: Callable[[Output], Iterable[Input]] | None = None) -> set[Output]:
+def feeding(node_input: Input, inputs_of: Callable[[Output], Iterable[Input]] | None = None) -> set[Output]:
     """All outputs that an input is made of.
 
     inputs_of : a function that says which inputs an output is made of; all of its node's where None.
     """
     result: set[Output] = set()
-    left = [of]
+    left = [node_input]
     while left:
         output = source(left.pop())
         if isinstance(output, Output) and output not in result:

@@ -121,14 +121,14 @@ def read(material: bpy.types.Material) -> Reading:
     output = tree and tree.get_output_node("CYCLES")
     if not output:
         return in_the_viewport(material)
-    viewport, of = _viewport_color(material), Input(output.inputs["Surface"])
+    viewport, node_input = _viewport_color(material), Input(output.inputs["Surface"])
     divided = divided_images(output)
     reader = Tree(viewport, divided=divided)
-    surface = reader.surface(of)
+    surface = reader.surface(node_input)
     shines = any(closure.node.is_shining for closure in closures(surface))
     if shines:
         reader = Tree(viewport, shines, divided)
-        surface = reader.surface(of)
+        surface = reader.surface(node_input)
     simple = simplified(surface)
     is_tree = surface is not None and simple is surface
     reader.reading.material = Material(simple, not is_tree or material.use_transparent_shadow)
@@ -183,13 +183,13 @@ class Tree:
         self._deep = 0
         self._is_beside = False  # true while values are asked for a little beside, too, as heights are
 
-    def surface(self, of: Input | None) -> Node | None:
+    def surface(self, node_input: Input | None) -> Node | None:
         """The tracer's node, or None where there is no surface."""
-        source = of and nodes.source(of)
+        source = node_input and nodes.source(node_input)
         if not isinstance(source, Output) or source.node.type in _VOLUMES:
             return None
         if source.socket.type != "SHADER":
-            return Node("emission", (("color", self._emission(of)),))
+            return Node("emission", (("color", self._emission(node_input)),))
         kind = _AS.get(source.node.type, source.node.type)
         row = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == kind), None)
         if row is None:
@@ -207,7 +207,12 @@ class Tree:
                 continue
             if known[name] is TANGENT and not Node(ours, tuple(inputs.items())).is_stretched:
                 continue
-            if known[name] is TANGENT and (of := source.input(theirs)) and not nodes.is_left_alone(of) and _is_nothing(of):
+            if (
+                known[name] is TANGENT
+                and (node_input := source.input(theirs))
+                and not nodes.is_left_alone(node_input)
+                and _is_nothing(node_input)
+            ):
                 self._reason(source, "is stretched along a Tangent of 0, which Cycles shows black")
                 continue
             if known[name] in OWN:
@@ -241,9 +246,9 @@ class Tree:
         is_opaque = not alpha.varies and alpha.rgb[0] == 1.0
         return _node("add", first=below, second=glow if is_opaque else _node("mix", factor=alpha, second=glow))
 
-    def _emission(self, of: Input) -> Color | Node:
+    def _emission(self, node_input: Input) -> Color | Node:
         """The emission of a surface whose shader is a color or a number."""
-        value = self._value_input(of, None)
+        value = self._value_input(node_input, None)
         return value if isinstance(value, Color | Node) else Color(value) if value and possible(value) else self.viewport
 
     def _color(self, output: Output, name: str | int) -> Color:
@@ -329,9 +334,9 @@ class Tree:
         if reason not in self.reading.reasons:
             self.reading.reasons.append(reason)
 
-    def height(self, of: Input) -> Node | None:
+    def height(self, node_input: Input) -> Node | None:
         """The height of a displacement along the normal, or None where it is the same everywhere or not modeled."""
-        source = nodes.source(of)
+        source = nodes.source(node_input)
         if not isinstance(source, Output):
             return None
         self._is_beside = True
@@ -377,10 +382,10 @@ class Tree:
 
     def _normal(self, output: Output, name: str, theirs: str) -> dict[str, Node]:
         """The node that makes a normal, where one does and is modeled."""
-        of = output.input(theirs)
-        if of is None or nodes.is_left_alone(of):
+        node_input = output.input(theirs)
+        if node_input is None or nodes.is_left_alone(node_input):
             return {}
-        source, constant = nodes.source(of), constant_color_of(of)
+        source, constant = nodes.source(node_input), constant_color_of(node_input)
         if isinstance(source, Output) and source.node.type == "BUMP" and _constant(source.input("Height")) is not None:
             return self._normal(source, name, "Normal")
         value = self._value(source) if constant is None else _vector(constant)
@@ -503,15 +508,15 @@ class Tree:
             if socket is None:
                 inputs[name] = (row.before[name](versions.CYCLES),) * 3
                 continue
-            of = Input(socket, output.groups)
-            if known in _OF_THEMSELVES and nodes.is_left_alone(of):
+            node_input = Input(socket, output.groups)
+            if known in _OF_THEMSELVES and nodes.is_left_alone(node_input):
                 if (of_itself := self._of_itself(output, known)) is not None:
                     inputs[name] = of_itself
                 elif len(self.reading.reasons) > reasons_before:
                     return None
                 continue
             is_beside, self._is_beside = self._is_beside, self._is_beside or name == "height"
-            read = self._value_input(of, known)
+            read = self._value_input(node_input, known)
             self._is_beside = is_beside
             if read is None:
                 return None
@@ -537,16 +542,16 @@ class Tree:
             self.reading.images[key], inputs["image"] = image, Color(_WHITE, key)
         self.reading.alphas.add(key)
 
-    def _value_input(self, of: Input, known: object) -> Color | Node | tuple[float, ...] | None:
+    def _value_input(self, node_input: Input, known: object) -> Color | Node | tuple[float, ...] | None:
         """The value of an input of a node that makes values. known : its default, a number where it is one."""
-        constant = constant_number_of(of) if isinstance(known, float) else _constant(of)
+        constant = constant_number_of(node_input) if isinstance(known, float) else _constant(node_input)
         if constant is not None:
             three = _rgb(constant)
             if all(math.isfinite(value) and abs(value) <= LARGEST_RADIANCE for value in three):
                 return three
-            self.reading.reasons.append(f"has a node {of.socket.node.name!r} that is given {max(three, key=abs):g}")
+            self.reading.reasons.append(f"has a node {node_input.socket.node.name!r} that is given {max(three, key=abs):g}")
             return None
-        return self._value(nodes.source(of))
+        return self._value(nodes.source(node_input))
 
     def _departure(self, output: Output, ours: str) -> str | None:
         """The reason that a node that we know is another here, one clause."""
@@ -653,13 +658,13 @@ def _left_by_folding(output: Output) -> list[Input]:
         return [] if any(_is_nothing(output.required(name)) for name in ("Color", "Strength")) else inputs
     if kind == "BSDF_PRINCIPLED":
         weights = {name: needed[0] for name, needed in _ONLY_WITH["principled"].items() if len(needed) == 1}
-        return [of for of in inputs if constant_number(output, weights.get(of.socket.name, "")) != 0.0]
+        return [node_input for node_input in inputs if constant_number(output, weights.get(node_input.socket.name, "")) != 0.0]
     return inputs
 
 
-def _is_nothing(of: Input) -> bool:
+def _is_nothing(node_input: Input) -> bool:
     """True if 0 is all that Cycles leaves of an input."""
-    constant, source = constant_color_of(of), nodes.source(of)
+    constant, source = constant_color_of(node_input), nodes.source(node_input)
     if constant is not None or isinstance(source, Input):
         return constant == _ZERO
     is_product = source.node.type in ("MATH", "VECT_MATH") and source.node.operation != "POWER"
@@ -757,34 +762,34 @@ def _rgb(value: object) -> RGB:
 
 def constant_number(output: Output, name: str | int) -> float | None:
     """The constant that a node's input is given, or None where it varies."""
-    of = output.input(name)
-    return of and constant_number_of(of)
+    node_input = output.input(name)
+    return node_input and constant_number_of(node_input)
 
 
-def constant_number_of(of: Input) -> float | None:
+def constant_number_of(node_input: Input) -> float | None:
     """The constant of an input as a number, or None where it varies."""
-    value = _constant(of)
+    value = _constant(node_input)
     if value is None or isinstance(value, int | float):
         return value
-    end = nodes.source(of)
+    end = nodes.source(node_input)
     factors = _MEAN if end.socket.type == "VECTOR" else _LUMINANCE
     return sum(factor * each for factor, each in zip(factors, _rgb(value), strict=True))
 
 
 def constant_color(output: Output, name: str | int) -> RGB | None:
     """The constant color that a node's input is given, or None where it varies."""
-    of = output.input(name)
-    return of and constant_color_of(of)
+    node_input = output.input(name)
+    return node_input and constant_color_of(node_input)
 
 
-def constant_color_of(of: Input) -> RGB | None:
+def constant_color_of(node_input: Input) -> RGB | None:
     """The constant of an input as a color, or None where it varies."""
-    value = _constant(of)
+    value = _constant(node_input)
     return None if value is None else _rgb(value)
 
 
-def _constant(of: Input) -> object:
-    source = nodes.source(of)
+def _constant(node_input: Input) -> object:
+    source = nodes.source(node_input)
     if isinstance(source, Output) and images.shows_nothing(source.node):
         return images.MISSING[3] if source.socket.name == "Alpha" else images.MISSING[:3]
     if isinstance(source, Output) and source.node.type == "LIGHT_FALLOFF" and source.socket.name == "Quadratic":

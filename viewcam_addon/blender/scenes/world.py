@@ -152,11 +152,11 @@ _MIXES: tuple[tuple[str, dict[str, Any], tuple[str, ...]], ...] = (
 )
 
 
-def _unmixed(of: Input, camera: bool) -> Input:
+def _unmixed(node_input: Input, camera: bool) -> Input:
     """An input or, where a mixture feeds it that is but one side of it to the camera, or to other rays, that side."""
-    source = nodes.source(of)
+    source = nodes.source(node_input)
     if not isinstance(source, Output):
-        return of
+        return node_input
     for kind, wanted, names in _MIXES:
         if source.node.type != kind or any(getattr(source.node, name) != value for name, value in wanted.items()):
             continue
@@ -167,7 +167,7 @@ def _unmixed(of: Input, camera: bool) -> Input:
             share = float(camera)
         if share in (0.0, 1.0):
             return _unmixed(sides[share == 1.0], camera)
-    return of
+    return node_input
 
 
 def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, list[str]]:
@@ -234,11 +234,11 @@ def _wrapped(source: Output | Input) -> _Wrapped | None:
     return rotation and _Wrapped(node.image.original, node.interpolation == "Closest", rotation)
 
 
-def _rotation(of: Input) -> tuple[float, float, float] | None:
+def _rotation(node_input: Input) -> tuple[float, float, float] | None:
     """The angles by which the directions that an input is given are turned, or None where more is done to them."""
-    vector = nodes.source(of)
+    vector = nodes.source(node_input)
     if not isinstance(vector, Output):
-        return (0.0, 0.0, 0.0) if nodes.is_left_alone(of) else None
+        return (0.0, 0.0, 0.0) if nodes.is_left_alone(node_input) else None
     if vector.node.type == "TEX_COORD":
         is_direction = vector.socket.name == "Generated" or (vector.socket.name == "Object" and vector.node.object is None)
         return (0.0, 0.0, 0.0) if is_direction else None
@@ -248,8 +248,8 @@ def _rotation(of: Input) -> tuple[float, float, float] | None:
         shaders.constant_color(vector, name)
         for name in ("Location", "Rotation", "Scale")[vector.node.vector_type == "VECTOR" :]
     ]
-    of = vector.required("Vector")
-    inner = None if nodes.is_left_alone(of) else _rotation(of)
+    node_input = vector.required("Vector")
+    inner = None if nodes.is_left_alone(node_input) else _rotation(node_input)
     if None in turns or inner is None or any(inner) or turns[-1] != (1.0, 1.0, 1.0) or (len(turns) == 3 and any(turns[0])):
         return None
     return turns[-2]
