@@ -227,6 +227,17 @@ def test_a_keyed_roll_about_a_target_that_blender_leaves_out_is_right_at_every_f
     assert capfd.readouterr().err == ""
 
 
+def test_a_keyed_roll_about_a_target_is_told_in_a_scene_that_was_never_evaluated(watching_camera, tmp_path):
+    watching_camera.virtual_pinhole.roll = 0.25
+    watching_camera.virtual_pinhole.keyframe_insert("roll", frame=1)
+    bpy.context.window.scene = bpy.data.scenes.new("Other")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "other.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "other.blend"))
+    camera_object = bpy.data.objects["Camera"]
+    assert datablocks.scene_of(camera_object).view_layers[0].depsgraph is None, "else the test proves nothing"
+    assert camera_object.virtual_pinhole.roll == pytest.approx(0.25, abs=1e-6)
+
+
 @pytest.mark.parametrize("leave_out", [lambda target: None, *LEFT_OUT])
 def test_a_render_sees_the_target_where_it_is_at_each_frame(
     watching_camera, scene, moving_target, render_positions, picture_error, leave_out

@@ -190,14 +190,15 @@ def bound_camera(bindings: Iterable[tuple[bpy.types.TimelineMarker, bpy.types.Ob
 def depsgraph_of(scene: bpy.types.Scene, as_evaluated: bool = False) -> bpy.types.Depsgraph:
     """The scene's dependency graph, of the current view layer, or the first one of another scene.
 
-    as_evaluated : true for the graph as Blender has evaluated it last, or else it is brought up to date.
+    as_evaluated : true for the graph as Blender has evaluated it last, if it ever has, or else it is brought up to date.
     """
     is_current = bpy.context.scene == scene
-    if is_current and not as_evaluated:
-        return bpy.context.evaluated_depsgraph_get()
     layer = bpy.context.view_layer if is_current else scene.view_layers[0]
-    if not as_evaluated:
-        layer.update()
+    if as_evaluated and layer.depsgraph:
+        return layer.depsgraph
+    if is_current:
+        return bpy.context.evaluated_depsgraph_get()
+    layer.update()
     return layer.depsgraph
 
 

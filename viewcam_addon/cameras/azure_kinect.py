@@ -1,12 +1,12 @@
 """Azure Kinect's raw calibration (JSON), as its SDK gives it and its recordings hold it: a depth camera and one of color.
 
 A camera's `ModelParameters` are cx, cy, fx, fy, as parts of its sensor's width and height from the corner, then k1 … k6, the
-center of distortion (0) and p2, p1: OpenCV's, of the Brown-Conrady model. `Rt` takes meters from the depth camera to it, x
-right, y down, z into the view. The picture is that of the whole sensor, of which the SDK's modes show parts: 16:9 is the middle
-of the color camera's 4:3.
+center of distortion (0) and p2, p1: OpenCV's, of the Brown-Conrady model. `Rt` takes meters from the depth camera to it, row
+after row, x right, y down, z into the view. The picture is that of the whole sensor, of which the SDK's modes show parts: 16:9
+is the middle of the color camera's 4:3.
 
-Source: the Azure Kinect Sensor SDK's calibration.c, mode_specific_calibration.c, intrinsic_transformation.c and
-extrinsic_transformation.c (world to camera, row after row, the depth camera's that of the world).
+Source: the Azure Kinect Sensor SDK's calibration.c, mode_specific_calibration.c, intrinsic_transformation.c and, for `Rt`,
+extrinsic_transformation.c.
 """
 
 import numpy as np
