@@ -22,7 +22,7 @@ from ...tracer.scene import ies
 from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, PLAIN_COLOR, Color, Material, Picture, simplified, sum_of
 from ...tracer.scene.shader_nodes import KINDS, MOST_NODES, SHADERS, Node, closures, word_of
 from ...tracer.scene.shader_nodes import node as _node
-from ...tracer.scene.value_nodes import GENERATED, INCOMING, NORMAL, OWN, POSITION, TANGENT, UV
+from ...tracer.scene.value_nodes import GENERATED, INCOMING, NORMAL, OWN, POSITION, TANGENT, UV, BlenderNode
 from .. import versions
 from . import cycles_attributes, images, nodes, value_nodes
 from .nodes import Input, Output
@@ -459,68 +459,25 @@ class Tree:
             return self._ramp(output)
         if node.type == "NORMAL":
             return self._along(output)
+        return self._value_by_table(output)
+
+    def _value_by_table(self, output: Output) -> Color | Node | None:
+        """The value of a node that `value_nodes` has a row of."""
         entry = value_nodes.row_of(output)
         if entry is None:
             self._reason(output, "is not modeled")
             return None
-        reasons_before = len(self.reading.reasons)
         ours, row = entry
         words = value_nodes.given_words(output, ours, row)
         why = words if isinstance(words, str) else self._departure(output, ours)
         if why:
             self._reason(output, why)
             return None
-        others = ("Vector", "Location", "Rotation")
-        if (
-            ours == "mapping"
-            and constant_color(output, "Scale") == _ZERO
-            and None in (constant_color(output, each) for each in others)
-        ):
-            return _vector(_ZERO)  # Cycles drops the location with what it scales (ConstantFolder::fold_mapping)
+        if ours == "mapping" and _drops_its_location(output):
+            return _vector(_ZERO)
         inputs = dict(words)
-        if "image" in KINDS[ours].inputs:
-            if not self._shows(output):
-                return None
-            image = node.image.original
-            inputs["image"] = Color(_WHITE, image.name_full)
-            if ours == "image" and _looked_up(output) in self._divided:
-                if why := images.alpha_obstacle(image):
-                    self._reason(output, why)
-                    return None
-                inputs["straight"] = images.is_divided(image)
-                self._ask_for_alpha(image, inputs)
-        if "table" in KINDS[ours].inputs:
-            inputs |= self._curves(output)
-        if ours == "ies":
-            text = value_nodes.ies_text(node)
-            try:
-                ies.read("it", text)
-            except InputError as error:
-                self._reason(output, f"shows what {str(error).partition(': ')[0].removeprefix('it ')}")
-                return None
-            inputs["text"] = text
-        for name, theirs in row.inputs.items():
-            known = KINDS[ours].inputs[name]
-            if known in OWN:
-                inputs |= self._normal(output, name, theirs)
-                continue
-            socket = value_nodes.input_of(node, theirs)
-            if socket is None:
-                inputs[name] = (row.before[name](versions.CYCLES),) * 3
-                continue
-            node_input = Input(socket, output.groups)
-            if known in _OF_THEMSELVES and nodes.is_left_alone(node_input):
-                if (of_itself := self._of_itself(output, known)) is not None:
-                    inputs[name] = of_itself
-                elif len(self.reading.reasons) > reasons_before:
-                    return None
-                continue
-            is_beside, self._is_beside = self._is_beside, self._is_beside or name == "height"
-            read = self._value_input(node_input, known)
-            self._is_beside = is_beside
-            if read is None:
-                return None
-            inputs[name] = _vector(read) if known in _OF_THEMSELVES and isinstance(read, tuple) else read
+        if not self._add_contents(output, ours, inputs) or not self._add_sockets(output, ours, row, inputs):
+            return None
         try:
             result = Node(ours, tuple(inputs.items()))
         except InputError:
@@ -530,6 +487,57 @@ class Tree:
         if result == plain and result["interpolation"] != "cubic":
             return Color(_WHITE, result["image"].image, result["interpolation"] == "closest")
         return result
+
+    def _add_contents(self, output: Output, ours: str, inputs: dict[str, object]) -> bool:
+        """Add the image, the curves or the lamp's profile that a node holds; false where one can't be shown."""
+        if "image" in KINDS[ours].inputs:
+            if not self._shows(output):
+                return False
+            image = output.node.image.original
+            inputs["image"] = Color(_WHITE, image.name_full)
+            if ours == "image" and _looked_up(output) in self._divided:
+                if why := images.alpha_obstacle(image):
+                    self._reason(output, why)
+                    return False
+                inputs["straight"] = images.is_divided(image)
+                self._ask_for_alpha(image, inputs)
+        if "table" in KINDS[ours].inputs:
+            inputs |= self._curves(output)
+        if ours == "ies":
+            inputs["text"] = text = value_nodes.ies_text(output.node)
+            try:
+                ies.read("it", text)
+            except InputError as error:
+                self._reason(output, f"shows what {str(error).partition(': ')[0].removeprefix('it ')}")
+                return False
+        return True
+
+    def _add_sockets(self, output: Output, ours: str, row: BlenderNode, inputs: dict[str, object]) -> bool:
+        """Add the values of a node's sockets; false where one can't be told."""
+        reasons_before = len(self.reading.reasons)
+        for name, theirs in row.inputs.items():
+            known = KINDS[ours].inputs[name]
+            if known in OWN:
+                inputs |= self._normal(output, name, theirs)
+                continue
+            socket = value_nodes.input_of(output.node, theirs)
+            if socket is None:
+                inputs[name] = (row.before[name](versions.CYCLES),) * 3
+                continue
+            node_input = Input(socket, output.groups)
+            if known in _OF_THEMSELVES and nodes.is_left_alone(node_input):
+                if (of_itself := self._of_itself(output, known)) is not None:
+                    inputs[name] = of_itself
+                elif len(self.reading.reasons) > reasons_before:
+                    return False
+                continue
+            is_beside, self._is_beside = self._is_beside, self._is_beside or name == "height"
+            read = self._value_input(node_input, known)
+            self._is_beside = is_beside
+            if read is None:
+                return False
+            inputs[name] = _vector(read) if known in _OF_THEMSELVES and isinstance(read, tuple) else read
+        return True
 
     def _ask_for_alpha(self, image: bpy.types.Image, inputs: dict[str, object]) -> None:
         """Note that an image's alpha is asked for: one that is packed is a picture of its own, since a picture's colors are
@@ -716,6 +724,12 @@ def _quarter_further(rotation: Color | Node) -> Color | Node:
     if rotation.varies:
         return _node("math", operation="add", a=rotation, b=(0.25,) * 3)
     return Color(((rotation.rgb[0] + 0.25) % 1.0,) * 3)
+
+
+def _drops_its_location(output: Output) -> bool:
+    """True if Cycles drops the location of a Mapping with what it scales by 0 (ConstantFolder::fold_mapping)."""
+    others = ("Vector", "Location", "Rotation")
+    return constant_color(output, "Scale") == _ZERO and None in (constant_color(output, each) for each in others)
 
 
 def _vector(value: RGB) -> Node:
