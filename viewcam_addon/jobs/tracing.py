@@ -262,16 +262,9 @@ class _Server:
         from ..tracer.scene import LedgerEntry
         from ..tracer.tiles import Progress
 
-        wanted, files, seen = Job.from_json(job), Written(**written), self._scene(scene)
-        if camera and clip:
-            stated_camera = stated and Pinhole(**stated)
-            seen = dataclasses.replace(
-                seen, camera=Pinhole(**camera), clip=(clip[0], clip[1]), stated_camera=stated_camera or None
-            )
-        elif wanted.size:
-            seen = dataclasses.replace(seen, camera=seen.camera.resized(*wanted.size))
+        wanted, files = Job.from_json(job), Written(**written)
         entries = tuple(LedgerEntry(**entry) for entry in ledger)
-        seen = dataclasses.replace(seen, ledger=entries)
+        seen = dataclasses.replace(self._seen(scene, wanted, camera, clip, stated), ledger=entries)
         level, samples = wanted.level or LEVELS[0], wanted.samples or SAMPLES
         tell("step", name="tracing")
         watcher = Progress(tell, seen.camera.height)
@@ -310,6 +303,21 @@ class _Server:
             pictures = [renderers.completed(picture, comparison.pinhole) for picture in pictures]
         result = _to_json(comparison, reference, pictures, entries, files, whole)
         return {**result, "seconds": seconds}
+
+    def _seen(
+        self,
+        path: str,
+        wanted: Job,
+        camera: dict[str, Any] | None,
+        clip: list[float] | None,
+        stated: dict[str, Any] | None,
+    ) -> "Scene":
+        """The scene of a file through the camera of a job, or in its size."""
+        scene = self._scene(path)
+        if camera and clip:
+            stated_camera = Pinhole(**stated) if stated else None
+            return dataclasses.replace(scene, camera=Pinhole(**camera), clip=(clip[0], clip[1]), stated_camera=stated_camera)
+        return dataclasses.replace(scene, camera=scene.camera.resized(*wanted.size)) if wanted.size else scene
 
     def _label(
         self,
