@@ -156,37 +156,44 @@ def note_object(
         # Transparent alone, where it lies on a floor a ray that has gone through it would miss the floor.
         ledger.set_for_cycles(real.original, "hide_render", True)
     for material in filter(None, slots):
-        if materials.is_volume_alone(material):
-            ledger.note(name, "skipped", f"material {material.name!r} is a volume without a surface, which is not modeled")
-            ledger.call_for_cycles(material.original, materials.make_transparent)
-            continue
-        if not shading:  # the Normal pass; mirrors and glass bend normals on both sides (scattering.specular_normal)
-            ledger.call_for_cycles(material.original, materials.keep_normals, stands_in=False)
-        reasons = materials.departures(material, lit=shading is not None)
-        if shading:
-            reading = shading.reading(material)
-            reasons += reading.reasons
-            tree = versions.node_tree(material)
-            nodes.leave_out_circles(tree, ledger, name, f"material {material.name!r} has")
-            for missing in images.missing(tree):
-                ledger.note(name, "exported", f"material {material.name!r} {missing}")
-            if reading.mixes_refractions:  # Cycles weighs directions that no facet refracts into as if it sampled them
-                reason = "refracts roughly beside another closure that lets light through: Cycles shows up to 5 % more or less"
-                ledger.note(name, "approximated", f"material {material.name!r} {reason}")
-            if reading.material.follows_own_uv and isinstance(evaluated.data, bpy.types.Mesh) and not evaluated.data.uv_layers:
-                reason = "follows a UV map that the mesh has not: Cycles makes tangents round its origin, and here are none"
-                ledger.note(name, "approximated", f"material {material.name!r} {reason}")
-            if reading.is_bumped and not material.cycles.use_bump_map_correction:
-                ledger.note(name, "approximated", f"material {material.name!r} has its bumped normals corrected on both sides")
-                ledger.set_for_cycles(material.original.cycles, "use_bump_map_correction", True)
-        for reason in reasons:
-            ledger.note(name, "approximated", f"material {material.name!r} {reason}, and a plain one stands in")
-        if reasons and shading:
-            ledger.call_for_cycles(material.original, materials.stand_in, shading.reading(material))
-        elif reasons:
-            ledger.call_for_cycles(material.original, materials.make_plain)
+        _note_material(material, placed, ledger, shading)
     if shading:
         _note_light(placed, slots, ledger, shading)
+
+
+def _note_material(material: bpy.types.Material, placed: Placed, ledger: Ledger, shading: Shading | None) -> None:
+    """Note what a surface's material is that is not modeled, and what stands in for it on both sides."""
+    name, words = placed.name, f"material {material.name!r}"
+    if materials.is_volume_alone(material):
+        ledger.note(name, "skipped", f"{words} is a volume without a surface, which is not modeled")
+        ledger.call_for_cycles(material.original, materials.make_transparent)
+        return
+    reasons = materials.departures(material, lit=shading is not None)
+    if not shading:  # the Normal pass; mirrors and glass bend normals on both sides (scattering.specular_normal)
+        ledger.call_for_cycles(material.original, materials.keep_normals, stands_in=False)
+    else:
+        reading = shading.reading(material)
+        reasons += reading.reasons
+        tree = versions.node_tree(material)
+        nodes.leave_out_circles(tree, ledger, name, f"{words} has")
+        for missing in images.missing(tree):
+            ledger.note(name, "exported", f"{words} {missing}")
+        if reading.mixes_refractions:  # Cycles weighs directions that no facet refracts into as if it sampled them
+            reason = "refracts roughly beside another closure that lets light through: Cycles shows up to 5 % more or less"
+            ledger.note(name, "approximated", f"{words} {reason}")
+        mesh = placed.evaluated.data
+        if reading.material.follows_own_uv and isinstance(mesh, bpy.types.Mesh) and not mesh.uv_layers:
+            reason = "follows a UV map that the mesh has not: Cycles makes tangents round its origin, and here are none"
+            ledger.note(name, "approximated", f"{words} {reason}")
+        if reading.is_bumped and not material.cycles.use_bump_map_correction:
+            ledger.note(name, "approximated", f"{words} has its bumped normals corrected on both sides")
+            ledger.set_for_cycles(material.original.cycles, "use_bump_map_correction", True)
+    for reason in reasons:
+        ledger.note(name, "approximated", f"{words} {reason}, and a plain one stands in")
+    if reasons and shading:
+        ledger.call_for_cycles(material.original, materials.stand_in, shading.reading(material))
+    elif reasons:
+        ledger.call_for_cycles(material.original, materials.make_plain)
 
 
 def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: Ledger, shading: Shading) -> None:
