@@ -119,6 +119,7 @@ def upper_rows(matrix: np.ndarray, what: str) -> list[list[float]]:
     *rows, last = [*matrix.tolist(), [0.0, 0.0, 0.0, 1.0]][:4]
     if not all(abs(a - b) <= _NOTED for a, b in zip(last, (0.0, 0.0, 0.0, 1.0), strict=True)):  # nor if it is none
         hint = "transpose it" if not any(row[3] for row in rows) else "it should be 0 0 0 1"
+        hint = hint if all(map(math.isfinite, last)) else "give finite numbers"
         raise InputError(f"the last row of the matrix of {what} is {checks.quoted(last)}: {hint}")
     return rows
 
