@@ -55,7 +55,7 @@ ROOMS = {
     "cameras": "errors checks files file_names terminal npy usd_stage pinhole rotation intrinsics",
     "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks machine files npy pinhole image",
-    "labels": "errors machine files png pinhole image cameras tracer",
+    "labels": "errors machine files npy png pinhole image cameras tracer",
     "api": "errors image comparison tracer labels",
     "pytest_plugin": "errors junit jobs",
     "jobs": (
