@@ -276,7 +276,7 @@ def test_a_thousand_updates_of_nothing_change_no_bit(posed_camera, scene):
 @pytest.mark.parametrize("parented", [False, True])
 @pytest.mark.parametrize("steps", [300, pytest.param(2000, marks=pytest.mark.exhaustive)])
 def test_values_and_camera_agree_whoever_is_edited(posed_camera, scene, empty, steps, parented):
-    """Random edits of values, transforms, lens, sensor, of what carries the camera, of frames, undo and redo, some before Blender
+    """Random edits of values, transforms, lens, sensor, what carries the camera, frames, undo and redo, some before Blender
     evaluates. 4,600 in all."""
     random = np.random.default_rng(steps)
     if parented:
