@@ -39,7 +39,7 @@ ROOMS = {
     "html_page": "errors",
     "junit": "checks files",
     "png": "",
-    "child_process": "errors events",
+    "child_process": "errors events files",
     "usd_stage": "errors child_process files",
     "crashes": "",
     "exact": "",

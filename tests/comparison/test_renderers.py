@@ -87,8 +87,8 @@ def test_a_depth_that_is_written_otherwise_is_told_how(change, words, name, pape
 @pytest.mark.parametrize("scale", [lambda inverse: 110 * inverse, lambda inverse: 1 - 0.1 * inverse])
 def test_disparities_and_the_depths_of_a_depth_buffer_are_told(scale, paper_scene):
     depth = paper_scene.rendered()["Depth"].astype(float)
-    made = np.where(depth < BACKGROUND_DEPTH, scale(1 / depth), 0).astype(np.float32)
-    assert "Depth is in a scale of 1/depth" in judged(paper_scene, Image({"Depth": made})).sentence
+    scaled = np.where(depth < BACKGROUND_DEPTH, scale(1 / depth), 0).astype(np.float32)
+    assert "Depth is in a scale of 1/depth" in judged(paper_scene, Image({"Depth": scaled})).sentence
 
 
 OF_CAMERA = "in the camera's axes: give it in world space"

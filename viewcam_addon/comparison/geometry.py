@@ -180,11 +180,11 @@ def _mistaken_vectors(pinhole: Pinhole, expected: Seen, seen: Seen, name: str) -
         return ""
     reference, test = (passes[name][hits].astype(np.float64) for passes in (expected, seen))
 
-    def off(read_anew: Array, of: Array) -> float:
-        return float(np.quantile(np.linalg.norm(read_anew - of, axis=-1), _OF_ALL_PIXELS))
+    def off(read_anew: Array, right: Array) -> float:
+        return float(np.quantile(np.linalg.norm(read_anew - right, axis=-1), _OF_ALL_PIXELS))
 
-    def explains(read_anew: Array, of: Array) -> bool:
-        return off(read_anew, of) < _OF_A_UNIT * off(test, reference)
+    def explains(read_anew: Array, right: Array) -> bool:
+        return off(read_anew, right) < _OF_A_UNIT * off(test, reference)
 
     frame = np.array(pinhole.basis())
     of_camera = (reference - (pinhole.eye if name == "Position" else 0.0)) @ frame.T
