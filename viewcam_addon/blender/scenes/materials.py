@@ -256,7 +256,7 @@ def _nodes_that_fill(overrides: Overrides) -> bpy.types.NodeTree:
     for direction in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
     made = tree.nodes.new("NodeGroupInput").outputs[0]
-    for _ in range(2):  # what has no slots has an empty one after the first
+    for _ in range(2):  # the first gives an empty slot to meshes that have none
         fill = tree.nodes.new("GeometryNodeSetMaterial")
         fill.inputs["Material"].default_value = overrides.shared(plain)
         tree.links.new(tree.nodes.new("GeometryNodeMaterialSelection").outputs[0], fill.inputs["Selection"])
