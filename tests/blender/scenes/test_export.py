@@ -440,8 +440,8 @@ def test_an_empty_slot_of_an_object_beside_an_empty_one_of_its_mesh(add, both_si
     own.material_slots[0].material = None
     sides = both_sides()
     sides.check()
-    shown = {0, 5} if bpy.app.version < (5, 1) else {0}
-    assert set(np.unique(sides.cycles["Material Index"])) == shown
+    indices = {0, 5} if bpy.app.version < (5, 1) else {0}
+    assert set(np.unique(sides.cycles["Material Index"])) == indices
 
 
 def test_a_material_override_of_the_view_layer_overrides_the_index(monkey, both_sides):

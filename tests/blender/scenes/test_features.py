@@ -357,12 +357,12 @@ def sphere_of_nodes():
 @pytest.mark.parametrize("is_instanced", [False, True])
 def test_what_geometry_nodes_make_without_a_material_has_one_for_a_while(monkey, both_sides, is_instanced):
     """Since 5.0 Cycles bends the normals of what has none where they graze."""
-    tree, made = sphere_of_nodes()
+    tree, output = sphere_of_nodes()
     if is_instanced:
         line, place = tree.nodes.new("GeometryNodeMeshLine"), tree.nodes.new("GeometryNodeInstanceOnPoints")
         line.inputs["Count"].default_value = 2
         tree.links.new(line.outputs[0], place.inputs["Points"])
-        tree.links.new(made, place.inputs["Instance"])
+        tree.links.new(output, place.inputs["Instance"])
         tree.links.new(place.outputs[0], next(node for node in tree.nodes if node.type == "GROUP_OUTPUT").inputs[0])
     monkey.modifiers.new("Nodes", "NODES").node_group = tree
     sides = both_sides()
@@ -375,14 +375,14 @@ def test_what_geometry_nodes_make_without_a_material_has_one_for_a_while(monkey,
 def test_what_nodes_make_beside_other_objects_that_they_place_is_told(monkey, both_sides, add, mesh_from):
     """A node that sets materials would make these the object's own."""
     other = add(mesh_from("cube", size=0.5), "Other", location=(2, 0, 0))
-    tree, made = sphere_of_nodes()
+    tree, output = sphere_of_nodes()
     line, place, join = (tree.nodes.new(f"GeometryNode{kind}") for kind in ("MeshLine", "InstanceOnPoints", "JoinGeometry"))
     source = tree.nodes.new("GeometryNodeObjectInfo")
     source.inputs["Object"].default_value, source.inputs["As Instance"].default_value = other, True
     tree.links.new(line.outputs[0], place.inputs["Points"])
     tree.links.new(source.outputs["Geometry"], place.inputs["Instance"])
-    for output in (made, place.outputs[0]):
-        tree.links.new(output, join.inputs[0])
+    for each in (output, place.outputs[0]):
+        tree.links.new(each, join.inputs[0])
     tree.links.new(join.outputs[0], next(node for node in tree.nodes if node.type == "GROUP_OUTPUT").inputs[0])
     monkey.modifiers.new("Nodes", "NODES").node_group = tree
     sides = both_sides()

@@ -255,14 +255,14 @@ def _nodes_that_fill(overrides: Overrides) -> bpy.types.NodeTree:
     overrides.afterwards(bpy.data.node_groups.remove, tree)
     for direction in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    made = tree.nodes.new("NodeGroupInput").outputs[0]
+    geometry = tree.nodes.new("NodeGroupInput").outputs[0]
     for _ in range(2):  # the first gives an empty slot to meshes that have none
         fill = tree.nodes.new("GeometryNodeSetMaterial")
         fill.inputs["Material"].default_value = overrides.shared(plain)
         tree.links.new(tree.nodes.new("GeometryNodeMaterialSelection").outputs[0], fill.inputs["Selection"])
-        tree.links.new(made, fill.inputs[0])
-        made = fill.outputs[0]
-    tree.links.new(made, tree.nodes.new("NodeGroupOutput").inputs[0])
+        tree.links.new(geometry, fill.inputs[0])
+        geometry = fill.outputs[0]
+    tree.links.new(geometry, tree.nodes.new("NodeGroupOutput").inputs[0])
     return tree
 
 
