@@ -938,6 +938,17 @@ def test_a_window_of_a_sensor_sees_what_the_sensor_sees_there(form, size, binnin
     assert is_noted == ((across, down, *roi) != (1, 1, 0, 0, 0, 0))
 
 
+@pytest.mark.parametrize("form", ["message", "calibration", "flow"])
+def test_the_place_in_its_pair_of_a_camera_that_has_no_pose_is_told(form):
+    for offset, is_told in ((-49.26, True), (0.0, False)):
+        p = [410.5, 0, 633.25, offset, 0, 410.5, 372.75, 0, 0, 0, 1, 0]
+        key = f"P: {p}" if form == "message" else f"projection_matrix: {{rows: 3, cols: 4, data: {p}}}"
+        turn = ["R: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]"] if form == "message" else []
+        text = "\n".join([ros(form, (1280, 800), (0, 0), (0, 0, 0, 0)), *turn, key, ""])
+        (camera,) = cameras.read(text, options=Options(size=(1280, 800)))
+        assert any("stands 0.12 right and 0 down" in note for note in camera.notes) == is_told, camera.notes
+
+
 def test_yaml_in_brackets_is_read_as_pyyaml_reads_it():
     from viewcam_addon.cameras import yaml as ours
 

@@ -499,6 +499,19 @@ def of_window(plane: ViewPlane, values: Mapping[str, Any], what: str) -> tuple[V
     return cut, (f"{notes}, in a picture of {size[0]} × {size[1]}",)
 
 
+def told_of_pair(values: Mapping[str, Any], what: str) -> tuple[str, ...]:
+    """The note that a camera is the second of a rectified pair, by the place that ROS' P says with its fourth column.
+
+    values : by plain names; P is p or projection_matrix.
+    """
+    p = _first(values, ("p", "projectionmatrix"))
+    numbers = _numbers(f"P of {what}", p) if isinstance(p, list | dict) else ()
+    if len(numbers) != 12 or numbers[0] == 0 or not any((numbers[3], numbers[7])):
+        return ()
+    right, down = -numbers[3] / numbers[0], -numbers[7] / numbers[0]
+    return (f"{what} stands {right + 0.0:g} right and {down + 0.0:g} down of its pair's first camera by P: that was left out",)
+
+
 def coefficients(numbers: Sequence[float], what: str) -> dict[str, float]:
     """OpenCV's distortion coefficients by name. Raises InputError if they are more than OpenCV has."""
     if len(numbers) not in (0, 1, 2, 3, 4, 5, 8, 12, 14):
@@ -551,6 +564,8 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
         pinhole = dataclasses.replace(standing, **vars(plane))
         return Camera(name, pinhole, stated, (*notes, "The text does not say where the camera stands: where it did"), lens=lens)
     matrix, more = _pose(values, what, options)
+    if _first(values, (*_T, *_EXTRINSIC, *_OTHER_POSE)) is None:
+        more += told_of_pair(values, what)
     pinhole, more_of_pose = axes.pinhole(matrix, plane, what)
     return Camera(name, pinhole, stated, (*notes, *more, *more_of_pose), lens=lens)
 
