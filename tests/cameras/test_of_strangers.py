@@ -656,6 +656,27 @@ def test_an_intrinsic_of_open3d_alone_has_its_columns_first():
     assert camera.pinhole.eye == (0, 0, 0) and camera.pinhole.basis()[1] == pytest.approx((0, -1, 0))
 
 
+def test_frames_that_are_kept_apart_for_tests_are_cameras_too():
+    """ScanNet++'s, which the pictures that a method is measured by are of."""
+    frames = [{"file_path": f"DSC{number}.JPG", "transform_matrix": np.eye(4).tolist()} for number in range(3)]
+    document = {"fl_x": 500, "w": 640, "h": 480, "frames": frames[:2], "test_frames": frames[2:]}
+    assert [camera.name for camera in cameras.read(json.dumps(document))] == ["DSC0", "DSC1", "DSC2"]
+
+
+@pytest.mark.parametrize(
+    ("frames", "sentence"),
+    [
+        ([], "holds no camera"),
+        ([{"file_path": "a.png", "w2c": np.eye(4).tolist()}], "frame 0 has no transform_matrix"),
+        ({"left": {"file_path": "a.png"}}, "frame 'left' has no transform_matrix"),
+        ([{"transform_matrix": [[True, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}], "of frame 0 is .*: give numbers, not true"),
+    ],
+)
+def test_what_frames_lack_is_told_of_a_transforms_json(frames, sentence):
+    with pytest.raises(InputError, match=sentence):
+        cameras.read(json.dumps({"fl_x": 500, "w": 640, "h": 480, "frames": frames}))
+
+
 def test_a_bare_list_of_frames_is_read_once_its_distance_and_size_are_said():
     plane = Pinhole((0, 0, 0), (0, 1, 0), (0, 0, 1), 500, 640, 480).plane
     pose = [[1.0, 0.0, 0.0, 2.0], [0.0, 1.0, 0.0, 3.0], [0.0, 0.0, 1.0, 4.0]]
