@@ -17,6 +17,7 @@ import pytest
 
 from viewcam_addon import cameras
 from viewcam_addon.cameras import Camera, Options, axes, distortion
+from viewcam_addon.cameras.source import Source
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 
@@ -1368,3 +1369,27 @@ def test_a_node_of_gltf_with_two_poses_is_refused_where_they_differ():
             assert np.allclose(read(json.dumps(document)).pinhole.eye, CAMERAS["rolled"].eye)
         else:
             assert "has a matrix, and another as translation" in refusal(json.dumps(document))
+
+
+def test_a_picture_as_far_across_as_up_that_is_no_square_is_told():
+    for sides, is_told in (((0.7, 0.7), True), ((0.7, 0.4), False)):
+        angles = dict(zip(("camera_angle_x", "camera_angle_y"), sides, strict=True))
+        document = {**angles, "w": 1920, "h": 1080, "frames": [{"transform_matrix": np.eye(4).tolist()}]}
+        (camera,) = cameras.read(json.dumps(document))
+        assert any("1.78 times as high as wide" in note for note in camera.notes) == is_told, camera.notes
+
+
+def test_cameras_in_geocentric_coordinates_are_told():
+    for x, is_told in ((3_781_700, True), (378_170, False)):
+        pose = [[1, 0, 0, x], [0, 1, 0, 900_000], [0, 0, 1, 5_040_000]]
+        document = {"fl_x": 500, "w": 640, "h": 480, "frames": [{"transform_matrix": pose}]}
+        (camera,) = cameras.read(json.dumps(document))
+        assert any("in geocentric coordinates" in note for note in camera.notes) == is_told, camera.notes
+
+
+def test_a_lens_of_another_model_is_doubted_where_it_leads_far_out_of_the_picture():
+    pinhole = "1 {} 640 480 500 500 320 240\n"  # as many numbers as SIMPLE_RADIAL has, and others
+    for model, is_told in (("SIMPLE_RADIAL", True), ("PINHOLE", False)):
+        files = {"cameras.txt": pinhole.format(model), "images.txt": "1 1 0 0 0 0 0 0 1 a.jpg\n\n"}
+        notes = cameras.FORMATS["colmap"].read(Source(files), Options())[0].notes
+        assert any("which may be of another model" in note for note in notes) == is_told, notes

@@ -43,6 +43,7 @@ stand first, and what takes any text last.
 
 import contextlib
 import itertools
+import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -203,6 +204,8 @@ _JSON = (".json", ".gltf", ".sfm")
 _CODE = ("text", "blender_python", "vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
 """The formats that a damaged JSON file may look like."""
 _MOST_LOOKED_AT = 100
+_ON_EARTH = 6.33e6, 6.42e6  # meters from the Earth's middle, as far down and up as anybody takes pictures
+_SAME_SHAPE = 1e-3  # relative: what the angles of both sides may differ by for the few digits of one
 _REMEMBERED = re.compile(rf"{own.KEY}: (axes=\w+ scale=[\d.e+-]+)")
 
 
@@ -312,7 +315,7 @@ def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
     cameras = _to_the_bit(cameras, [pinhole for text in notes for pinhole in own.pinholes_in(text)], module, options)
     world = module.in_world(source, options) if hasattr(module, "in_world") else options
     noted = _told_of_world(notes, world)
-    noted += _told_of_size(cameras, source)
+    noted += _told_of_size(cameras, source) + _told_of_globe(cameras)
     result = [_readable(_doubted(_unmirrored(moved(camera, world), options))) for camera in cameras]
     return [camera.noted(*noted) for camera in result] if noted else result
 
@@ -488,15 +491,33 @@ def _told_of_size(cameras: Sequence[Camera], source: Source) -> tuple[str, ...]:
     return (f"{file} has {pixels} pixels and its camera {of_camera}, which counts",)
 
 
+def _told_of_globe(cameras: Sequence[Camera]) -> tuple[str, ...]:
+    """A note where a camera is as far from the origin as what stands on the Earth is from its middle."""
+    if not any(_ON_EARTH[0] < math.hypot(*camera.pinhole.eye) < _ON_EARTH[1] for camera in cameras):
+        return ()
+    return (
+        "The cameras are as far from the origin as the Earth's surface from its middle: in geocentric coordinates z is not up, "
+        "and float32 keeps half a meter; export it in local coordinates",
+    )
+
+
 def _doubted(camera: Camera) -> Camera:
-    """The camera, with a note where its size can't well be that of the picture that its principal point is in."""
-    (c_x, c_y), pinhole = camera.pinhole.principal_point, camera.pinhole
-    if 0 <= c_x <= pinhole.width and 0 <= c_y <= pinhole.height:
-        if max(min(c_x, pinhole.width - c_x), min(c_y, pinhole.height - c_y)) > 0.5:
-            return camera
-        return camera.noted(f"The principal point of {camera.name} lies in a corner of its picture: is it known?")
-    size = f"{pinhole.width} × {pinhole.height}"
-    return camera.noted(f"The principal point of {camera.name} lies outside of a picture of {size} pixels: is that its size?")
+    """The camera, with notes where its principal point, size and pixels can't well be those of one picture."""
+    (c_x, c_y), (d_x, d_y), pinhole = camera.pinhole.principal_point, camera.pinhole.distance, camera.pinhole
+    shape, size = pinhole.width / pinhole.height, f"{pinhole.width} × {pinhole.height}"
+    if abs(d_x / d_y / shape - 1) < _SAME_SHAPE < abs(d_x / d_y - 1) / 10:
+        words = "high as wide" if shape > 1 else "wide as high"
+        camera = camera.noted(
+            f"{camera.name} sees as far across as up in a picture of {size} pixels, which are then "
+            f"{max(shape, 1 / shape):.3g} times as {words}: are they?"
+        )
+    if not (0 <= c_x <= pinhole.width and 0 <= c_y <= pinhole.height):
+        return camera.noted(
+            f"The principal point of {camera.name} lies outside of a picture of {size} pixels: is that its size?"
+        )
+    if max(min(c_x, pinhole.width - c_x), min(c_y, pinhole.height - c_y)) > 0.5:
+        return camera
+    return camera.noted(f"The principal point of {camera.name} lies in a corner of its picture: is it known?")
 
 
 def _readable(camera: Camera) -> Camera:

@@ -116,7 +116,11 @@ def read(source: Source, options: Options) -> list[Camera]:
     for key in values.keys() - known.keys():
         if not opencv.is_size(key) and not (is_posed and opencv.is_of_pose(key)):
             raise InputError(f"{values[key].name} is computed from what the text does not say: write its numbers")
-    return [opencv.camera("Camera", known, options)]
+    camera = opencv.camera("Camera", known, options)
+    unread = [] if camera.size_stated else [value.name for key, value in values.items() if key not in known]
+    return [
+        camera.noted(*(f"{name} is computed from what the text does not say: the size is the one given" for name in unread))
+    ]
 
 
 def _of_toolbox(text: str) -> dict[str, dict[str, Any]]:
