@@ -730,7 +730,15 @@ def test_what_blenders_own_importers_read_is_sent_there(tmp_path, data):
         ("transforms.json", b"<!DOCTYPE html>\n<html>", "is a page of the web: download the file itself"),
         ("a.exr", b"v/1\x01\x02", "is a picture: give the file of its camera"),
         ("a.ply", b"ply\nformat ascii 1.0\n", "is a point cloud or a mesh"),
-        ("scene.ma", b"//Maya ASCII 2025 scene\n", "is a scene of Maya's: export its camera as USD or FBX"),
+        ("scene.ma", b"//Maya ASCII 2025 scene\n", "is a scene of Maya's, which is not read: export its cameras as USD"),
+        ("a.tscn", b'[gd_scene format=3]\n\n[node name="Camera3D"]\nfov = 60.0\n', "is a scene of Godot's, which is not read"),
+        ("a.dae", b'<?xml version="1.0"?>\n<COLLADA version="1.4.1"></COLLADA>', "is a scene of Collada's, which is not read"),
+        ("a.nk", b"Camera2 {\n translate {1 2 3}\n focal 35\n}\n", "is a script of Nuke's, which is not read"),
+        ("a.ass", b"persp_camera\n{\n name cam\n fov 54.4\n}\n", "is a scene of Arnold's, which is not read"),
+        ("a.scn", b"scene.camera.lookat.orig = 1 2 3\nscene.camera.lookat.target = 0 0 0\n", "is a scene of LuxCore's"),
+        ("a.xml", b"<cycles>\n<transform><camera type='perspective'/></transform>\n</cycles>", "is a scene of Cycles' own"),
+        ("a.x3d", b"<X3D><Scene><Viewpoint position='0 0 9'/></Scene></X3D>", "is a scene of X3D or VRML"),
+        ("a.t3d", b"Begin Map\n Begin Level\n", "is a part of a level of Unreal's"),
         ("database.db", b"SQLite format 3\0", "is a database, as COLMAP's, which has no poses"),
         ("poses.pkl", b"\x80\x04\x95", "is a pickle, which may run programs"),
         ("a.json", b" \n", "is empty"),
@@ -740,6 +748,23 @@ def test_a_file_of_another_kind_is_called_by_it_and_not_by_a_list_of_all_formats
     (tmp_path / name).write_bytes(data)
     with pytest.raises(InputError, match=f"{name} {sentence}"):
         cameras.read(tmp_path / name)
+
+
+@pytest.mark.parametrize("place", ["sparse/1", "dense/0/sparse", "nerf"])
+def test_a_folder_without_cameras_says_in_which_of_its_folders_they_are(tmp_path, place):
+    (tmp_path / place).mkdir(parents=True)
+    (tmp_path / "images" / "left").mkdir(parents=True)
+    with pytest.raises(InputError, match="is no camera that is understood"):
+        cameras.read(tmp_path)
+    (tmp_path / place / ("transforms.json" if place == "nerf" else "images.txt")).write_text("")
+    with pytest.raises(InputError, match=f"has no cameras itself: give {place} in it"):
+        cameras.read(tmp_path)
+
+
+def test_one_half_of_a_colmap_model_is_told_which_is_missing(tmp_path):
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 1 2 3 1 a.jpg\n\n")
+    with pytest.raises(InputError, match=r"images\.txt of a COLMAP model and no cameras\.txt"):
+        cameras.read(tmp_path)
 
 
 def test_a_pointer_of_git_lfs_says_how_to_get_the_file():

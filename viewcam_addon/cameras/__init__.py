@@ -204,6 +204,9 @@ _JSON = (".json", ".gltf", ".sfm")
 _CODE = ("text", "blender_python", "vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
 """The formats that a damaged JSON file may look like."""
 _MOST_LOOKED_AT = 100
+_DEEPEST = 3
+_FILES_OF_DATA_SETS = (transforms.FILE, "images.bin", "images.txt")
+_HEAD = 4000  # characters by which a text is known
 _ON_EARTH = 6.33e6, 6.42e6  # meters from the Earth's middle, as far down and up as anybody takes pictures
 _SAME_SHAPE = 1e-3  # relative: what the angles of both sides may differ by for the few digits of one
 _REMEMBERED = re.compile(rf"{own.KEY}: (axes=\w+ scale=[\d.e+-]+)")
@@ -343,7 +346,9 @@ _OTHER_FILES = {
     **dict.fromkeys((b"\x89PNG", b"\xff\xd8\xff", b"v/1\x01", b"II*\0", b"MM\0*", b"RIFF"), _A_PICTURE),
     **dict.fromkeys((b"<!DOCTYPE html", b"<!doctype html", b"<html"), _A_PAGE),
     **dict.fromkeys((b"ply\n", b"ply\r"), "is a point cloud or a mesh, which has no cameras: give the file of these"),
-    **dict.fromkeys((b"//Maya ASCII", b"FOR4", b"FOR8"), "is a scene of Maya's: export its camera as USD or FBX"),
+    **dict.fromkeys((b"FOR4", b"FOR8"), "is a scene of Maya's: export its camera as USD or FBX"),
+    b"QC4DC4D": "is a scene of Cinema 4D's: export its camera as USD or FBX",
+    b"\xd0\xcf\x11\xe0": "is a document, or a scene of 3ds Max's: export its camera as USD or FBX",
     b"SQLite format 3": "is a database, as COLMAP's, which has no poses: give the model, as the folder sparse/0",
     **dict.fromkeys(
         (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"), "is a pickle, which may run programs: save JSON or NPZ"
@@ -353,12 +358,41 @@ _OTHER_FILES = {
 """The first bytes of files that hold no camera that is read here, and what is to be said of them."""
 
 
+_OTHER_TEXTS = {
+    r"^//Maya ASCII|^requires maya |^createNode camera ": "a scene of Maya's",
+    r"^\[gd_scene |^\[node name=": "a scene of Godot's",
+    r"<COLLADA\b": "a scene of Collada's",
+    r"^#! ?\S{0,200}[Nn]uke|^Camera[234]? \{$": "a script of Nuke's",
+    r"^ ?persp_camera$": "a scene of Arnold's",
+    r"^##RenderMan RIB|^ ?Projection \"perspective\"": "a scene of RenderMan's",
+    r"^scene\.camera\.": "a scene of LuxCore's",
+    r"^%TAG !u! tag:unity3d": "a scene of Unity's",
+    r"^ ?RenderView \w{1,60} ?\{": "a scene of V-Ray's",
+    r"^#VRML |<X3D\b": "a scene of X3D or VRML",
+    r"<cycles>": "a scene of Cycles' own",
+    r"<project format_revision=": "a scene of Appleseed's",
+    r"\"autoClear\":|new BABYLON\.": "a scene of Babylon's",
+    r"^Begin (?:Map|Actor|Object)\b": "a part of a level of Unreal's",
+    r"^(?:name|id),tx,ty,tz,qx,qy,qz,qw\b": "a table of poses of Unreal's",
+}
+"""What stands in the first lines of texts of other programs that are not read, blanks being one, and what these are."""
+
+
+def _refuse_others(source: Source) -> None:
+    """Raise InputError if it is a text of a program whose cameras are not read."""
+    head = re.sub(r"[ \t]+", " ", source.text[:_HEAD])
+    for pattern, kind in _OTHER_TEXTS.items():
+        if re.search(pattern, head, re.MULTILINE):
+            raise InputError(f"{source.name} is {kind}, which is not read: export its cameras as USD, glTF or FBX")
+
+
 def recognized(source: str | Path | Source) -> str:
     """The name of the format. Raises InputError if it is none that can be read."""
     source = source if isinstance(source, Source) else Source(source)
     if source.path is None and not source.text.strip():
         raise InputError("there is no text: copy a camera first")
     is_json = source.path is not None and source.path.suffix.lower() in _JSON
+    _refuse_others(source)
     for name in readable():
         with _told_of_damage(source, FORMATS[name].TITLE):
             if _recognizes(FORMATS[name], source):
@@ -379,6 +413,14 @@ def recognized(source: str | Path | Source) -> str:
     for file in (source, *itertools.islice(source.files("*.[jx]*[nlp]"), _MOST_LOOKED_AT)):
         if file.problem:
             raise InputError(f"{file.name} {file.problem}")
+    for there, lacks in itertools.permutations(colmap.FILES):
+        for suffix in (".bin", ".txt"):
+            if source.is_folder and source.file(f"{there}{suffix}"):
+                raise InputError(
+                    f"{source.name} has {there}{suffix} of a COLMAP model and no {lacks}{suffix}: put it there, too"
+                )
+    if source.is_folder and source.path and (found := _data_sets_in(source.path)):
+        raise InputError(f"{source.name} has no cameras itself: give {several(found)} in it")
     if source.path is None:
         place = checks.quoted(source.text.strip()[:40])
         raise InputError(
@@ -386,6 +428,17 @@ def recognized(source: str | Path | Source) -> str:
             "eye=1,2,3 look_at=0,0,0 up=0,0,1 d=1000"
         )
     raise InputError(f"{source.name} is no camera that is understood: give a file of {', '.join(readable())}")
+
+
+def _data_sets_in(folder: Path) -> list[str]:
+    """The folders in a folder, to three deep, that have cameras by the names of their files."""
+    found, level = list[Path](), [folder]
+    for _ in range(_DEEPEST):
+        with contextlib.suppress(OSError):
+            level = [Path(each) for parent in level for each in os.scandir(parent) if each.is_dir(follow_symlinks=False)]
+        level = sorted(level)[:_MOST_LOOKED_AT]
+        found += [each for each in level if any((each / name).is_file() for name in _FILES_OF_DATA_SETS)]
+    return [each.relative_to(folder).as_posix() for each in found]
 
 
 def write(cameras: Iterable[Camera], format: str, options: Options | None = None) -> str | dict[str, str | bytes]:
