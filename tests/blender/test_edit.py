@@ -22,7 +22,7 @@ BY_BLENDER = {
     "on_frame_change",
     "_edit_of",
 }  # called by Blender as it evaluates, and as a property is stored
-MOST = 29
+MOST = 30
 
 
 def walk_of(action):

@@ -858,6 +858,15 @@ def test_renaming_the_target_changes_nothing(watching_camera, scene, target):
     assert watching_camera.virtual_pinhole.numbers()[1] == (8, 2, 3)
 
 
+def test_where_animation_data_are_cleared_the_target_is_followed_all_the_same(watching_camera, target):
+    watching_camera.animation_data_clear()
+    update()
+    target.location.x = 8
+    update()
+    assert watching_camera.virtual_pinhole.numbers()[1] == (8, 2, 3)
+    assert is_where_stated(watching_camera, bpy.context.scene)
+
+
 @pytest.fixture
 def saved(watching_camera, tmp_path):
     """The path of a file with the watching camera and its target."""

@@ -128,6 +128,43 @@ def test_a_parent_moved_by_hand_carries_the_values_along(posed_camera, scene, em
     assert tuple(posed_camera.virtual_pinhole.eye) == (7, -6, 7) and differences(posed_camera, scene) == {}
 
 
+@pytest.mark.parametrize("way", ["unparented", "deleted", "constraint removed"])
+def test_a_camera_that_nothing_carries_any_more_keeps_values_that_are_true(posed_camera, scene, empty, way):
+    mover = empty("Mover", (1, 2, 3))
+    if way == "constraint removed":
+        posed_camera.constraints.new("COPY_LOCATION").target = mover
+    else:
+        posed_camera.parent = mover
+    update()
+    carried = tuple(posed_camera.virtual_pinhole.eye)
+    if way == "deleted":
+        bpy.data.objects.remove(mover)
+    posed_camera.parent = None
+    posed_camera.constraints.clear()
+    assert differences(posed_camera, scene) == {}
+    assert tuple(posed_camera.virtual_pinhole.eye) == (7, -6, 5) != carried
+
+
+def test_a_file_opens_with_values_that_are_true_where_something_was_edited_and_not_keyed(posed_camera, scene, tmp_path):
+    """Blender shows the keyed number then: that of the values moves the camera, that of the camera the values."""
+    posed_camera.virtual_pinhole.keyframe_insert("eye", frame=1)
+    posed_camera.virtual_pinhole.eye = (1, 2, 3)
+    other = bpy.data.objects.new("Other", bpy.data.cameras.new("Other"))
+    scene.collection.objects.link(other)
+    other.location = (4, 5, 6)
+    other.keyframe_insert("location", frame=1)
+    other.virtual_pinhole.enabled = True
+    other.location = (1, 2, 3)
+    update()
+    path = str(tmp_path / "edited.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    for name, eye in (("Camera", (7, -6, 5)), ("Other", (4, 5, 6))):
+        camera_object = bpy.data.objects[name]
+        assert differences(camera_object, bpy.context.scene) == {}, name
+        assert tuple(camera_object.virtual_pinhole.eye) == eye == tuple(camera_object.matrix_world.translation)
+
+
 def test_keyframes_on_the_location_move_the_values_as_frames_pass(posed_camera, scene):
     for frame, height in ((1, 5), (11, 25)):
         posed_camera.location.z = height
@@ -239,7 +276,8 @@ def test_a_thousand_updates_of_nothing_change_no_bit(posed_camera, scene):
 @pytest.mark.parametrize("parented", [False, True])
 @pytest.mark.parametrize("steps", [300, pytest.param(2000, marks=pytest.mark.exhaustive)])
 def test_values_and_camera_agree_whoever_is_edited(posed_camera, scene, empty, steps, parented):
-    """Random edits of values, transforms, lens, sensor, frames, undo and redo, some before Blender evaluates. 4,600 in all."""
+    """Random edits of values, transforms, lens, sensor, what carries the camera, frames, undo and redo, some before Blender
+    evaluates. 4,600 in all."""
     random = np.random.default_rng(steps)
     if parented:
         posed_camera.parent = parent = empty("Parent", (1, 2, 3))
@@ -257,7 +295,22 @@ def test_values_and_camera_agree_whoever_is_edited(posed_camera, scene, empty, s
         name = "rotation_quaternion" if parented else "rotation_euler"
         setattr(camera_(), name, random.normal(0, 1, 4 if parented else 3))
 
+    def mover():
+        if "Mover" not in bpy.data.objects:
+            bpy.context.scene.collection.objects.link(bpy.data.objects.new("Mover", None))
+        return bpy.data.objects["Mover"]
+
+    def constrain():
+        constraint = camera_().constraints.new("COPY_LOCATION")
+        constraint.target = mover()
+
     edits = {
+        "parent": lambda: setattr(camera_(), "parent", mover()),
+        "no parent": lambda: setattr(camera_(), "parent", None),
+        "constraint": constrain,
+        "no constraints": lambda: camera_().constraints.clear(),
+        "mover's location": lambda: setattr(mover(), "location", random.normal(0, 8, 3)),
+        "mover deleted": lambda: bpy.data.objects.remove(mover()),
         "eye": lambda: setattr(group(), "eye", random.normal(0, 8, 3)),
         "look-at": lambda: setattr(group(), "look_at", random.normal(0, 8, 3)),
         "up": lambda: setattr(group(), "up", random.normal(0, 1, 3)),

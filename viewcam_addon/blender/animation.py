@@ -56,15 +56,20 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @persistent
 def on_load(_path: str, _more: object = None) -> None:
-    """Targets may have moved where the add-on was not, and Blender does not save the drivers of an override's own targets."""
+    """Targets may have moved where the add-on was not, Blender does not save the drivers of an override's own targets, and what
+    was edited and not keyed is lost, as Blender will show what is keyed, and tells nobody."""
     targets.forget_shapes()
     cameras.forget_all()
     datablocks.forget_curves()
     scene = bpy.context.scene
-    watching = [each for each in scene.objects if each.type == "CAMERA" and targets.names(each)]
+    cameras_of_scene = [each for each in scene.objects if each.type == "CAMERA"]
+    watching = [each for each in cameras_of_scene if targets.names(each)]
     for camera_object in watching:
         targets.connect(camera_object)
-    for camera_object in watching:
+    led = [each for each in cameras_of_scene if storage.is_enabled(each) and (each.animation_data or each.data.animation_data)]
+    for camera_object in led:
+        cameras.tag_animation(camera_object)
+    for camera_object in dict.fromkeys(watching + led):
         with _errors_told(camera_object, scene):
             CameraSync.of(camera_object).at_frame(scene, bpy.context.evaluated_depsgraph_get())
 

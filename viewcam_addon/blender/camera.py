@@ -54,6 +54,7 @@ __all__ = [
     "roll",
     "simplest_up",
     "stated",
+    "tag_animation",
     "takes_part",
 ]
 
@@ -89,6 +90,7 @@ class CameraSync:
         self._state: Any = None  # a tuple, and CameraValues; None until it is first seen
         self._values: Any = None
         self._matrix: Matrix | None = None  # the one that the channels of this state make
+        self._was_carried = False  # a parent or a constraint had a say in where that is
         self._raw: tuple | None = None  # as Blender holds these values, once a frame has looked
         # The picture in which they decide all of the camera, each by itself, so that `carry` may bring it; None in no picture.
         self._carried_in: intrinsics.Frame | None = None
@@ -231,6 +233,8 @@ class CameraSync:
         """
         camera_object = self.camera_object
         is_driven = bool(camera_object.animation_data) and datablocks.has_driven_values(camera_object)
+        if not is_driven and targets.names(camera_object):
+            targets.connect(camera_object)  # its animation data were cleared, and the targets' drivers with them
         is_moved = False
         if self.is_untouched(by_values=is_driven):
             self._is_moving = False  # the next move is another
@@ -265,7 +269,7 @@ class CameraSync:
                 left.append(sync)
                 continue
             sync._carried_in = picture  # two that are one and the same are compared in no time
-            if camera_object.parent or camera_object.constraints:
+            if _is_carried(camera_object):
                 left.append(sync)
                 continue
             if not datablocks.is_known_as_animated(camera_object):
@@ -437,8 +441,7 @@ class CameraSync:
             values, level = self._carried(evaluated, values, level, decided, scene, depsgraph)
         self._place(rolls.turned(level, hold.roll(evaluated, values, scene)), scene, depsgraph, decided)
         if is_render:
-            camera_object.update_tag(refresh={"OBJECT", "DATA", "TIME"})
-            camera_object.data.update_tag(refresh={"TIME"})
+            tag_animation(camera_object)
         else:
             if camera_object.animation_data.drivers:
                 targets.connect(camera_object)  # one that was removed from the file leaves its driver
@@ -451,7 +454,7 @@ class CameraSync:
     def is_untouched(self, by_values: bool) -> bool:
         """True if neither the camera nor, unless by_values, its values have changed since they were last seen to agree."""
         camera_object = self.camera_object
-        if camera_object.parent or camera_object.constraints or self._state != conversion.state_of(camera_object):
+        if self._was_carried or _is_carried(camera_object) or self._state != conversion.state_of(camera_object):
             return False
         return by_values or self._values == storage.load(camera_object)
 
@@ -520,7 +523,7 @@ class CameraSync:
         if since:
             level = since.pinhole(level.plane, frame, camera_object.data.sensor_fit, level.mirrored)
         wanted = rolls.turned(level, hold.roll(evaluated, base, scene))
-        is_carried = bool(camera_object.parent or camera_object.constraints)
+        is_carried = self._was_carried or _is_carried(camera_object)
         pinhole = read(evaluated, scene)
         bound |= targets.bound(evaluated)
         moved = _moved(camera_object, wanted, pinhole, depsgraph)
@@ -602,15 +605,22 @@ class CameraSync:
         """Take note that the camera is where its values say."""
         self._state = channels, kind, *_ = conversion.state_of(self.camera_object)
         self._matrix = self.camera_object.matrix_basis.copy()
+        self._was_carried = _is_carried(self.camera_object)
         self._values = values = storage.load(self.camera_object)
         self._raw, self._rests, self._is_moving = None, rests, is_moving
-        is_simple = values.pole != HOLD and not values.follows and values.set_for == values.counted_in
+        is_simple = not (self._was_carried or values.pole == HOLD or values.follows) and values.set_for == values.counted_in
         self._carried_in = values.set_for if is_simple and channels.is_plain and kind == "PERSP" else None
 
 
 def _poses_of(values: list[CameraValues]) -> Array:
     """(n, 3, 3): eye, look-at and up of each."""
     return np.array([(*each.eye, *each.look_at, *each.up) for each in values]).reshape(-1, 3, 3)
+
+
+def tag_animation(camera_object: bpy.types.Object) -> None:
+    """Let Blender evaluate a camera anew with its animation, and its lens with that."""
+    camera_object.update_tag(refresh={"OBJECT", "DATA", "TIME"})
+    camera_object.data.update_tag(refresh={"TIME"})
 
 
 def forget_all() -> None:
@@ -704,6 +714,11 @@ def _agreed(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole 
         if not findings.differences(wanted, read(camera_object, scene), reach):
             return wanted
     return None
+
+
+def _is_carried(camera_object: bpy.types.Object) -> bool:
+    """True if its channels alone do not say where a camera stands."""
+    return bool(camera_object.parent or camera_object.constraints)
 
 
 def _free(camera_object: bpy.types.Object) -> frozenset[str]:
