@@ -761,6 +761,39 @@ def test_a_folder_without_cameras_says_in_which_of_its_folders_they_are(tmp_path
         cameras.read(tmp_path)
 
 
+def test_k_in_a_matrix_of_four_columns_is_k_where_these_add_nothing():
+    for more, is_read in ((0, True), (-50, False)):
+        for rows in (
+            [[500, 0, 320, more], [0, 500, 240, 0], [0, 0, 1, 0]],
+            [[500, 0, 320, 0], [0, 500, 240, more], [0, 0, 1, 0]],
+        ):
+            for last in ([], [[0, 0, 0, 1]]):
+                text = json.dumps({"intrinsic": rows + last, "width": 640, "height": 480})
+                if is_read:
+                    assert read(text).pinhole.distance == (500, 500)
+                    continue
+                with pytest.raises(InputError, match="more than K in its fourth"):
+                    read(text)
+
+
+def test_sections_in_brackets_are_no_damaged_json(tmp_path):
+    """ZED's calibration, and whatever else is INI."""
+    left = "[LEFT_CAM_HD]\nfx=700\nfy=700\ncx=640\ncy=360\n"
+    (tmp_path / "SN1.conf").write_text(left)
+    assert cameras.read(tmp_path / "SN1.conf", options=Options(size=(1280, 720)))[0].pinhole.distance == (700, 700)
+    (tmp_path / "SN1.conf").write_text(left + left.replace("700", "710"))
+    with pytest.raises(InputError, match="fx is something else before, copy one camera"):
+        cameras.read(tmp_path / "SN1.conf")
+
+
+@pytest.mark.parametrize("k", ["K = [[500, 0, 320], [0, 500, 240], [0, 0, 1]]", "fx = fy = 500\nfy = 500\ncx, cy = 320, 240"])
+def test_coefficients_that_code_says_one_by_one_are_a_lens(k):
+    bent = read(f"{k}\nk1 = -0.17\nk2 = 0.02\n")
+    assert bent.lens == distortion.opencv({"k1": -0.17, "k2": 0.02}), bent.notes
+    assert read(f"{k}\nk1, k2 = -0.17, 0.02\ndist = np.array([k1, k2, 0, 0])\n").lens == bent.lens
+    assert read(f"{k}\nk1 = [1, 2, 3]\n").lens is None
+
+
 def test_one_half_of_a_colmap_model_is_told_which_is_missing(tmp_path):
     (tmp_path / "images.txt").write_text("1 1 0 0 0 1 2 3 1 a.jpg\n\n")
     with pytest.raises(InputError, match=r"images\.txt of a COLMAP model and no cameras\.txt"):

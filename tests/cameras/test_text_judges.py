@@ -966,8 +966,8 @@ def test_quaternions_of_a_path_go_on_from_camera_to_camera(form):
         Camera(f"{number}", Pinhole(eye, (0, 0, 0.2), (0, 0, 1), 500, 640, 360)) for number, eye in enumerate(eyes)
     ]
 
-    def turns_of(some):
-        text = cameras.write(some, form)
+    def turns_of(path):
+        text = cameras.write(path, form)
         if form == "unity":
             return np.array([record["rotation"] for record in json.loads(text)["cameras"]])
         return np.array([[float(part) for part in line.split(",")[4:8]] for line in text.splitlines()[1:]])

@@ -359,30 +359,30 @@ _OTHER_FILES = {
 
 
 _OTHER_TEXTS = {
-    r"^//Maya ASCII|^requires maya |^createNode camera ": "a scene of Maya's",
-    r"^\[gd_scene |^\[node name=": "a scene of Godot's",
-    r"<COLLADA\b": "a scene of Collada's",
-    r"^#! ?\S{0,200}[Nn]uke|^Camera[234]? \{$": "a script of Nuke's",
-    r"^ ?persp_camera$": "a scene of Arnold's",
-    r"^##RenderMan RIB|^ ?Projection \"perspective\"": "a scene of RenderMan's",
-    r"^scene\.camera\.": "a scene of LuxCore's",
-    r"^%TAG !u! tag:unity3d": "a scene of Unity's",
-    r"^ ?RenderView \w{1,60} ?\{": "a scene of V-Ray's",
-    r"^#VRML |<X3D\b": "a scene of X3D or VRML",
-    r"<cycles>": "a scene of Cycles' own",
-    r"<project format_revision=": "a scene of Appleseed's",
-    r"\"autoClear\":|new BABYLON\.": "a scene of Babylon's",
-    r"^Begin (?:Map|Actor|Object)\b": "a part of a level of Unreal's",
-    r"^(?:name|id),tx,ty,tz,qx,qy,qz,qw\b": "a table of poses of Unreal's",
+    re.compile(r"^//Maya ASCII|^requires maya |^createNode camera ", re.MULTILINE): "a scene of Maya's",
+    re.compile(r"^\[gd_scene |^\[node name=", re.MULTILINE): "a scene of Godot's",
+    re.compile(r"<COLLADA\b", re.MULTILINE): "a scene of Collada's",
+    re.compile(r"^#! ?\S{0,200}[Nn]uke|^Camera[234]? \{$", re.MULTILINE): "a script of Nuke's",
+    re.compile(r"^ ?persp_camera$", re.MULTILINE): "a scene of Arnold's",
+    re.compile(r"^##RenderMan RIB|^ ?Projection \"perspective\"", re.MULTILINE): "a scene of RenderMan's",
+    re.compile(r"^scene\.camera\.", re.MULTILINE): "a scene of LuxCore's",
+    re.compile(r"^%TAG !u! tag:unity3d", re.MULTILINE): "a scene of Unity's",
+    re.compile(r"^ ?RenderView \w{1,60} ?\{", re.MULTILINE): "a scene of V-Ray's",
+    re.compile(r"^#VRML |<X3D\b", re.MULTILINE): "a scene of X3D or VRML",
+    re.compile(r"<cycles>", re.MULTILINE): "a scene of Cycles' own",
+    re.compile(r"<project format_revision=", re.MULTILINE): "a scene of Appleseed's",
+    re.compile(r"\"autoClear\":|new BABYLON\.", re.MULTILINE): "a scene of Babylon's",
+    re.compile(r"^Begin (?:Map|Actor|Object)\b", re.MULTILINE): "a part of a level of Unreal's",
+    re.compile(r"^(?:name|id),tx,ty,tz,qx,qy,qz,qw\b", re.MULTILINE): "a table of poses of Unreal's",
 }
-"""What stands in the first lines of texts of other programs that are not read, blanks being one, and what these are."""
+"""The first lines of texts of other programs that are not read, with one blank for several, and what these are."""
 
 
 def _refuse_others(source: Source) -> None:
     """Raise InputError if it is a text of a program whose cameras are not read."""
     head = re.sub(r"[ \t]+", " ", source.text[:_HEAD])
     for pattern, kind in _OTHER_TEXTS.items():
-        if re.search(pattern, head, re.MULTILINE):
+        if pattern.search(head):
             raise InputError(f"{source.name} is {kind}, which is not read: export its cameras as USD, glTF or FBX")
 
 
@@ -419,8 +419,8 @@ def recognized(source: str | Path | Source) -> str:
                 raise InputError(
                     f"{source.name} has {there}{suffix} of a COLMAP model and no {lacks}{suffix}: put it there, too"
                 )
-    if source.is_folder and source.path and (found := _data_sets_in(source.path)):
-        raise InputError(f"{source.name} has no cameras itself: give {several(found)} in it")
+    if source.is_folder and source.path and (folders := _data_sets_in(source.path)):
+        raise InputError(f"{source.name} has no cameras itself: give {several(folders)} in it")
     if source.path is None:
         place = checks.quoted(source.text.strip()[:40])
         raise InputError(
@@ -432,13 +432,13 @@ def recognized(source: str | Path | Source) -> str:
 
 def _data_sets_in(folder: Path) -> list[str]:
     """The folders in a folder, to three deep, that have cameras by the names of their files."""
-    found, level = list[Path](), [folder]
+    folders, level = list[Path](), [folder]
     for _ in range(_DEEPEST):
         with contextlib.suppress(OSError):
             level = [Path(each) for parent in level for each in os.scandir(parent) if each.is_dir(follow_symlinks=False)]
         level = sorted(level)[:_MOST_LOOKED_AT]
-        found += [each for each in level if any((each / name).is_file() for name in _FILES_OF_DATA_SETS)]
-    return [each.relative_to(folder).as_posix() for each in found]
+        folders += [each for each in level if any((each / name).is_file() for name in _FILES_OF_DATA_SETS)]
+    return [each.relative_to(folder).as_posix() for each in folders]
 
 
 def write(cameras: Iterable[Camera], format: str, options: Options | None = None) -> str | dict[str, str | bytes]:

@@ -222,9 +222,14 @@ def is_size(name: str) -> bool:
     return name in (*_WIDTH, *_HEIGHT, *_SIZE)
 
 
+def is_distortion(name: str) -> bool:
+    """True if a plain name is that of all of a lens's coefficients."""
+    return name in _DISTORTION
+
+
 def is_known(name: str) -> bool:
     """True if a plain name is that of anything that a camera has."""
-    return is_of_pose(name) or is_size(name) or name in (*_K, *_DISTORTION)
+    return is_of_pose(name) or is_size(name) or is_distortion(name) or name in _K
 
 
 def _is_camera(values: Mapping[str, Any]) -> bool:
@@ -232,7 +237,7 @@ def _is_camera(values: Mapping[str, Any]) -> bool:
     if k is None or len(values.keys() & {"frames", "poses", "object"}):
         return False
     try:
-        return len(_numbers("K", k)) in (4, 9, 12)
+        return len(_numbers("K", k)) in (4, 9, 12, 16)
     except InputError:
         return isinstance(k, dict) and {"rows", "cols", "data"} <= k.keys()  # a matrix, and what is wrong is said
 
@@ -429,14 +434,16 @@ def _numbers(name: str, value: Any) -> tuple[float, ...]:
 
 
 def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float, float]:
-    """(fx, fy, cx, cy) of nine numbers, row after row, of the twelve of a 3 × 4, or of these four themselves.
+    """(fx, fy, cx, cy) of nine numbers, row after row, of a 3 × 4 or 4 × 4 that adds nothing, or of these four themselves.
 
     Raises InputError if it has no last row 0 0 1, or a focal length that is not above 0; NoPinholeError if it has skew.
     """
     if len(values) == 4:
         f_x, f_y, c_x, c_y = values
     else:
-        if len(values) == 12:
+        if len(values) in (12, 16):
+            if any(values[3:12:4]) or [*values[12:]] not in ([], [0, 0, 0, 1]):
+                raise InputError(f"K of {what} has more than K in its fourth row or column: give nine numbers")
             values = [values[i] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)]
         if len(values) != 9:
             raise InputError(f"K of {what} has {counted(len(values), 'number')}: give nine")

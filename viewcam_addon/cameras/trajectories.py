@@ -35,7 +35,7 @@ _HEAD = re.compile(r"\s*t(?:ime)?(?:_?stamp)?\w{0,8}(?:[\s,;]+(?:[tp]_?)?[xyz]){
 _NANOSECONDS = 1e15  # as seconds these are 30 million years
 _STEPS = {"KITTI": 0.1, "KITTI-360": 0.1, "Replica": 1 / 30, "Redwood": 1 / 30}  # seconds; pictures at 10 and 30 Hz
 _PINNED = [0.0, 0.0, 0.0, 1.0]
-_UNIT = 1e-3  # what the length of a quaternion of few digits may be off
+_UNIT = 1e-3  # the error that the length of a quaternion of few digits may have
 
 
 def recognizes(source: Source) -> bool:
