@@ -240,6 +240,7 @@ class _Layers:
 
         folder : the layer's folder; None if it is a text.
         """
+        offsets = dict(zip(layer.subLayerPaths, [*layer.subLayerOffsets], strict=True))
         for named in filter(None, layer.GetCompositionAssetDependencies()):  # without a name: the layer itself
             place = self._allowed(named, folder)
             inner = None
@@ -249,6 +250,8 @@ class _Layers:
             if inner is None:
                 self.left_out.append(named)
             layer.UpdateCompositionAssetDependency(named, inner.identifier if inner else "")
+            if inner is not None and named in offsets:  # which a new name sets back
+                layer.subLayerOffsets[[*layer.subLayerPaths].index(inner.identifier)] = offsets[named]
         clipped = []
 
         def look(path: Any) -> None:

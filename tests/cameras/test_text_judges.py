@@ -747,6 +747,8 @@ def test_vtks_window_center_and_horizontal_angle_are_its_formulas():
             "moves the view by other means",
         ),
         (CODE["three.js"] + "camera.rotation.x = 1;", "by other means"),
+        (CODE["three.js"] + "camera.scale.x = -1;", "by other means"),
+        (CODE["three.js"] + "camera.scale.set(1, 2, 1);", "by other means"),
         (CODE["three.js"] + "camera.position.applyAxisAngle(axis, 2);", "by other means"),
         (CODE["three.js"] + "camera.position.z += 2;", "moves the camera"),
         (CODE["weekend_4"] + "cam.lookfrom = point3(1, 2, 3);", "something else in line"),

@@ -277,7 +277,7 @@ class _Code:
                 if key in result and result[key] != value:
                     texts.fail(self.text, place, f"{name} is something else before, copy one camera")
                 result[key] = value
-        is_listed = any(map(opencv.is_distortion, result))  # of what is said one by one
+        is_listed = any(map(opencv.is_distortion, result))  # a list of what stands one by one, too
         return {key: value for key, value in result.items() if not (is_listed and key in _TERMS)}
 
     # ---- one array

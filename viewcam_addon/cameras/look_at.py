@@ -395,6 +395,8 @@ class _Code:
             return "set_view"
         if self._is_camera(parts[:-1]) and any(texts.plain(part) in _TURNED for part in parts[1:]):
             return "moves"
+        if "scale" in parts[1:] and self._is_camera(parts[:-1]) and _OF_THREE.search(self.text):
+            return "moves"  # which mirrors, or is seen where it is not one number
         if self._is_camera(parts[:-2]) and before in _PLACES and key not in ("set", "x", "y", "z") and sign == "(":
             return "moves"  # position.copy, .add, .applyAxisAngle
         if key == "set" and before:  # position.set(…)
