@@ -282,12 +282,57 @@ def test_pictures_that_can_not_be_compared_are_refused(tmp_path, capfd):
         (["render", "a", "b", "--threads", "none"], "'none'"),
         (["render", "a", "b", "--level", "magic"], "magic"),
         (["check", "a.blend", "--frame", "1.5"], "1.5"),
+        (["check", "a.blend", "--frame", "1_0"], "'1_0' is no whole number"),
+        (["check", "a.blend", "--find", "1e-300%", "--level", "path"], "is no share in percent from 0.0001%"),
+        (["render", "a", "b", "--threads", "5000"], "'5000' is no whole number from 1 to 1024"),
+        (["render", "a", "b", "--samples", "9" * 5000], "9'… is no whole number above 0"),
+        (["render", "a", "b", "--error", "1_0"], "'1_0' is no number above 0"),
+        (["render", "a", "b", "--labels", ","], "',' names none"),
         (["render", "a", "b", "--recenter"], "--recenter"),  # a scene file has its origin already
     ],
 )
 def test_wrong_usage_is_one_line_that_says_where_help_is(capfd, words, expected):
     line = fails(capfd, *words)
-    assert expected in line and "--help" in line, line
+    assert expected in line and "--help" in line and len(line) < 300, line
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["render", "scene.json", "scene.json"],
+        ["render", "scene.json", "./new.exr", "--json", "new.exr"],
+        ["render", "scene.json", "new.exr", "--json", "link.json"],
+        ["compare", "picture.exr", "other.exr", "--json", "other.exr"],
+        ["compare", "picture.exr", "other.exr", "--scene", "scene.json", "--junit", "scene.json"],
+        ["compare", "picture.exr", "other.exr", "--json", "new", "--junit", "new"],
+        ["export", "file.blend", "file.blend"],
+        ["cycles", "file.blend", "file.blend"],
+        ["check", "file.blend", "--json", "file.blend"],
+        ["batch", "file.blend", "--orbit", "2", "--out", "new", "--json", "file.blend"],
+        ["labels", "shots", "shots", "--to", "bop", "--overwrite"],
+        ["labels", "shots", "shots/a.labels.json"],
+        ["labels", "shots", "shots/a.exr", "--to", "tracks"],
+        ["camera", "scene.json", "--to", "look_at", "--out", "./scene.json"],
+    ],
+    ids=" ".join,
+)
+def test_nothing_is_written_over_what_is_read_or_over_another_output(tmp_path, capfd, monkeypatch, words, symlink):
+    """viewcam export file.blend file.blend left a scene file in place of the .blend."""
+    monkeypatch.chdir(tmp_path)
+    write_scene(tmp_path)
+    Path("shots").mkdir()
+    for name in ("picture.exr", "other.exr", "file.blend", "shots/a.labels.json", "shots/a.exr"):
+        Path(name).write_bytes(name.encode())
+    symlink(tmp_path / "link.json", tmp_path / "scene.json")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert "give" in (line := fails(capfd, *words)) and "name" in line, line
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize("words", [["compare", "FILE", "FILE"], ["labels", "FILE", "new"], ["render", "FILE", "new"]])
+def test_a_name_that_no_file_can_have_is_no_bug(capfd, words):
+    line = fails(capfd, *("a" * 300 if word == "FILE" else word for word in words))
+    assert "File name too long" in line or sys.platform == "win32", line
 
 
 def limit_files_to_4_kilobytes():
@@ -512,6 +557,8 @@ def test_a_picture_made_elsewhere_is_judged_by_the_channels_that_are_named(tmp_p
     assert "names no pass" in fails(capfd, *compare[:-1], "--channels", "depht=far")
     assert "position has 3 channels" in fails(capfd, *compare[:-1], "--channels", "position=far")
     assert "name depth, distance or position" in fails(capfd, *compare[:-1], "--channels", "object-index=id")
+    assert "names a pass twice" in fails(capfd, *compare[:-1], "--channels", "distance=far", "distance=id")
+    assert "leave one of them out" in fails(capfd, *compare[:-1], "--channels", "distance=far", "depth=id")
 
 
 def test_a_picture_by_mitsuba_of_the_same_scene_is_the_same_and_one_of_a_moved_ball_is_not(tmp_path):

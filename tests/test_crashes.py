@@ -96,17 +96,42 @@ def test_whoever_ends_the_command_ends_blender(run, tmp_path, name):
     assert blender != child.pid
     child.send_signal(number)
     child.communicate()
-    assert child.returncode == -number
+    assert child.returncode == (-number if number == signal.SIGKILL else 128 + number)
     while Path(f"/proc/{blender}").exists() and Path(f"/proc/{blender}/stat").read_text().rpartition(")")[2].split()[0] != "Z":
         time.sleep(0.02)
 
 
-def test_ctrl_c_ends_both_with_its_own_status(run, tmp_path):
-    child = run(WAIT, "check", "file.blend")
+RENDER = """
+import os, time
+from viewcam_addon.files import temporary_folder, written_whole
+with written_whole("picture.exr") as half, temporary_folder() as folder:
+    half.touch()
+    (folder / "scene.json").touch()
+    os.symlink(folder, "waiting")
+    while True:
+        try:
+            time.sleep(600)
+        except BaseException:
+            pass
+"""
+
+
+@pytest.mark.parametrize("send", [os.kill, getattr(os, "killpg", None)], ids=["kill", "terminal"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_what_renders_at_once_and_leaves_nothing_half_written(run, tmp_path, send, number):
+    """While Cycles rendered, Ctrl-C did nothing: Python hears of it afterwards, and Blender's handlers swallowed it."""
+    child = run(RENDER, "check", "file.blend")
     while not (tmp_path / "waiting").exists():
         time.sleep(0.02)
-    os.killpg(child.pid, signal.SIGINT)
-    assert child.communicate()[1] == "" and child.returncode == 130
+    folder = (tmp_path / "waiting").resolve()
+    assert folder.exists()
+    send(child.pid, number)
+    started = time.monotonic()
+    assert child.communicate(timeout=60)[1] == "" and child.returncode == 128 + number
+    assert time.monotonic() - started < 30
+    (tmp_path / "waiting").unlink()
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left <= {"file.blend", "transforms.json", "bpy.py", "__pycache__"} and not folder.exists(), left
 
 
 @pytest.mark.parametrize("send", [os.kill, getattr(os, "killpg", None)], ids=["kill", "terminal"])

@@ -2,6 +2,7 @@
 
 import ast
 import contextlib
+import gc
 import os
 import socket
 import stat
@@ -13,8 +14,10 @@ import time
 import zlib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from viewcam_addon import npy
 from viewcam_addon.errors import InputError
 from viewcam_addon.files import check_writable, read_bytes, written_whole
 from viewcam_addon.png import is_whole, strip
@@ -191,6 +194,25 @@ def test_what_can_be_no_name_of_a_file_is_refused_in_one_sentence(tmp_path, name
     for write in (check_writable, lambda path: written_whole(path).__enter__()):
         with pytest.raises(InputError, match=r"is no name that a file can have|can't be written"):
             write(tmp_path / name)
+
+
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_an_archive_of_arrays_has_the_bytes_of_numpys(tmp_path, save):
+    arrays = {"a": np.arange(5000.0).reshape(50, 100), "b": np.zeros((0, 3), np.int32), "c": np.array(True)}
+    save(tmp_path / "numpys.npz", **arrays)
+    npy.write_archive(tmp_path / "ours.npz", arrays, is_compressed=save is np.savez_compressed)
+    assert (tmp_path / "ours.npz").read_bytes() == (tmp_path / "numpys.npz").read_bytes()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_an_archive_that_meets_a_full_disk_prints_nothing(monkeypatch):
+    """Python's ZipFile tries once more as it is let go, and prints a traceback of that."""
+    printed = []
+    monkeypatch.setattr(sys, "unraisablehook", printed.append)
+    with pytest.raises(OSError, match="No space left"):
+        npy.write_archive(Path("/dev/full"), {"a": np.zeros(100_000)})
+    gc.collect()
+    assert printed == []
 
 
 def test_texts_have_the_same_bytes_on_every_system():

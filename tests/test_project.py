@@ -39,7 +39,7 @@ ROOMS = {
     "html_page": "errors",
     "junit": "checks files",
     "png": "",
-    "child_process": "errors events",
+    "child_process": "errors events files",
     "usd_stage": "errors child_process files",
     "crashes": "",
     "exact": "",
@@ -55,7 +55,7 @@ ROOMS = {
     "cameras": "errors checks files file_names terminal npy usd_stage pinhole rotation intrinsics",
     "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks machine files npy pinhole image",
-    "labels": "errors machine files png pinhole image cameras tracer",
+    "labels": "errors machine files npy png pinhole image cameras tracer",
     "api": "errors image comparison tracer labels",
     "pytest_plugin": "errors junit jobs",
     "jobs": (

@@ -326,6 +326,10 @@ def test_what_goes_wrong_with_a_batch_is_said_where_there_is_no_terminal_and_not
     failed, stopping = output.err.splitlines()
     assert failed == "viewcam batch: right: the lens is too long, shorten it"
     assert stopping.startswith("viewcam batch: SIGINT: this shot will be finished")
+    with events.opened(log_json=False) as caught:
+        caught.tell("started", command="check", words="check a.blend --frames 1..2")
+        caught.tell("shot_failed", shot="right", error="its camera is none")
+    assert capfd.readouterr().err == "viewcam check: right: its camera is none\n"
 
 
 def program(text):

@@ -4,55 +4,76 @@ import argparse
 import math
 from pathlib import Path
 
+_MOST_THREADS = 1024
+_LEAST_SHARE = 0.0001
+"""Percent: far below what any number of samples finds."""
+_MOST_DIGITS = 18
+"""More than any count has; Python reads no number of thousands of digits."""
+_LONGEST = 60
+"""Characters of a refused text that a sentence quotes."""
+
 
 def positive(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is no whole number above 0")
+    if not text.isdecimal() or len(text) > _MOST_DIGITS or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{_quoted(text)} is no whole number above 0")
+    return int(text)
+
+
+def threads(text: str) -> int:
+    if (count := positive(text)) > _MOST_THREADS:
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1 to {_MOST_THREADS}")
+    return count
+
+
+def frame(text: str) -> int:
+    if not text.removeprefix("-").isdecimal() or len(text) > _MOST_DIGITS:
+        raise argparse.ArgumentTypeError(f"{_quoted(text)} is no whole number")
     return int(text)
 
 
 def above_zero(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not 0 < number < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number above 0")
+    if not 0 < (number := _number(text)) < math.inf:
+        raise argparse.ArgumentTypeError(f"{_quoted(text)} is no number above 0")
     return number
+
+
+def _number(text: str) -> float:
+    """The number that a text is, nan where it is none; an underscore within one is a slip of the hand."""
+    try:
+        return math.nan if "_" in text else float(text)
+    except ValueError:
+        return math.nan
+
+
+def _quoted(text: str) -> str:
+    return repr(text) if len(text) <= _LONGEST else f"{text[:_LONGEST]!r}…"
 
 
 def percentage(text: str) -> str:
     """A share in percent as it is written shortest: "0.5%"."""
     number, percent, rest = text.partition("%")
-    try:
-        value = float(number)
-    except ValueError:
-        value = math.nan
-    if not (percent and not rest.strip() and 0 < value <= 100):
-        raise argparse.ArgumentTypeError(f"{text!r} is no share in percent above 0%, up to 100%: write 0.5%")
+    value = _number(number)
+    if not (percent and not rest.strip() and _LEAST_SHARE <= value <= 100):
+        raise argparse.ArgumentTypeError(f"{_quoted(text)} is no share in percent from {_LEAST_SHARE:.4f}% to 100%: write 0.5%")
     return f"{value:.12g}%"
 
 
 def share(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not 0 <= number <= 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number from 0 to 1")
+    if not 0 <= (number := _number(text)) <= 1:
+        raise argparse.ArgumentTypeError(f"{_quoted(text)} is no number from 0 to 1")
     return number
 
 
 def seed(text: str) -> int:
-    if not text.isdecimal() or int(text) >= 2**31:
-        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 0 to {2**31 - 1}")
+    if not text.isdecimal() or len(text) > _MOST_DIGITS or int(text) >= 2**31:
+        raise argparse.ArgumentTypeError(f"{_quoted(text)} is no whole number from 0 to {2**31 - 1}")
     return int(text)
 
 
 def size(text: str) -> tuple[int, int]:
     width, x, height = text.partition("x")
     if not x:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size: write 1920x1080")
+        raise argparse.ArgumentTypeError(f"{_quoted(text)} is no size: write 1920x1080")
     return positive(width), positive(height)
 
 
@@ -63,7 +84,10 @@ def path(text: str) -> Path:
 
 
 def names(text: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in text.split(",") if name.strip())
+    listed = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not listed:
+        raise argparse.ArgumentTypeError(f"{_quoted(text)} names none: write some, with commas between them")
+    return listed
 
 
 _OF_GEOMETRY = {"depth": 1, "distance": 1, "position": 3, "normal": 3, "uv": 2, "object-index": 1, "material-index": 1}

@@ -37,6 +37,7 @@ from typing import Any, Self
 
 from .errors import FullDiskError, InputError, NotModeledError, bug
 from .events import Events
+from .files import remove_unfinished
 
 _PACKAGE = Path(__file__).parent
 _ON_WINDOWS = sys.platform == "win32"
@@ -347,6 +348,7 @@ def _listen(asked: "connection.Connection", requests: queue.SimpleQueue, left: t
     except (EOFError, OSError):
         requests.put(None)
     if not left.wait(_GRACE):
+        remove_unfinished()
         os._exit(1)  # whoever wanted this answer is gone
 
 

@@ -10,6 +10,7 @@ import argparse
 import functools
 import importlib
 import json
+import os
 import shlex
 import signal
 import sys
@@ -22,7 +23,7 @@ from . import argument_types as types
 from . import commands, events
 from .commands import Result
 from .errors import InputError, bug
-from .files import check_writable, is_printed_to, written_whole
+from .files import check_writable, is_device, is_printed_to, written_whole
 
 _FOLDERS = ("yolo", "bop", "colmap", "kitti", "middlebury")
 """Datasets of labels that are folders, not files."""
@@ -111,7 +112,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         command = importlib.import_module(f".commands.{name}", __package__)
         added.set_defaults(run=command.run, writes=())
         if name != _SERVE:
-            added.add_argument("--threads", type=types.positive, metavar="N", help="threads to use (default: all)")
+            added.add_argument("--threads", type=types.threads, metavar="N", help="threads to use (default: all)")
             added.add_argument("--json", metavar="FILE", type=types.path, help="write the result as JSON")
             events_too = "tell on standard output a JSON object for each event"
             added.add_argument("--log-json", action="store_true", help=events_too)
@@ -151,6 +152,20 @@ def _check_outputs(options: argparse.Namespace) -> None:
         if path := getattr(options, name):
             is_folder = name == "report" or getattr(options, "to", None) in _FOLDERS
             _check_output(path / "index.html" if is_folder else path, is_text=False)
+    _check_distinct(options)
+
+
+def _check_distinct(options: argparse.Namespace) -> None:
+    """Refuse an output that would take the place of what the command reads, or of another output."""
+    written = [name for name in ("json", "junit", *options.writes) if getattr(options, name, None)]
+    others = [value for name, value in vars(options).items() if name not in written]
+    named = [path for value in others for path in (value if isinstance(value, list) else [value]) if isinstance(path, Path)]
+    for name in written:
+        path = getattr(options, name)
+        if any(os.path.realpath(path) == os.path.realpath(other) for other in named) and not is_device(path):
+            options.json = options.junit = None  # where this error would be told as well
+            raise InputError(f"{path} is named twice, and would be overwritten: give the name of another file to write")
+        named.append(path)
 
 
 def _check_output(path: Path, is_text: bool) -> None:

@@ -6,6 +6,7 @@ SIGSEGV (no Python runs after one) and a child by exec, which starts Python twic
 tells of the crash, and the status is its own.
 """
 
+import contextlib
 import ctypes
 import os
 import signal
@@ -47,13 +48,8 @@ def survived(words: list[str]) -> int | None:
         return None
 
     def answer(number: int, _: object) -> None:
-        try:
-            if is_batch:
-                os.kill(child, passing[number])
-            elif number == signal.SIGTERM:  # SIGINT the terminal has sent to both
-                os.kill(child, number)
-        except ProcessLookupError:  # it had the signal as well, has ended with it and been waited for
-            pass
+        with contextlib.suppress(ProcessLookupError):  # it had the signal as well, has ended with it and been waited for
+            os.kill(child, passing[number] if is_batch else number)
 
     for asked in _ASKED_FOR:
         if signal.getsignal(asked) is not signal.SIG_IGN:

@@ -5,11 +5,15 @@ can show `str(error)` as it stands and need no knowledge of what went wrong. A r
 and the like travel up and be translated at the top, where the object and the key are no longer known.
 """
 
+import errno
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
 _MOST_NAMED = 3  # in a sentence
+
+_OF_A_PATH = (errno.ENAMETOOLONG, errno.EACCES, errno.EPERM, errno.ELOOP, errno.EIO)
+"""The errors of a system that a path can cause, or the disk behind it."""
 
 
 class InputError(ValueError):
@@ -41,10 +45,10 @@ def listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def several(names: Sequence[str]) -> str:
+def several(names: Sequence[str], most: int = _MOST_NAMED) -> str:
     """Names in a sentence, not too long a one: a, b, c and 2 more."""
-    rest = len(names) - _MOST_NAMED
-    return ", ".join(names[:_MOST_NAMED]) + (f" and {rest:,} more" if rest > 0 else "")
+    rest = len(names) - most
+    return ", ".join(names[:most]) + (f" and {rest:,} more" if rest > 0 else "")
 
 
 def message_of(error: Exception) -> str:
@@ -58,7 +62,12 @@ def operator_reason(error: RuntimeError) -> str:
 
 
 def bug(error: Exception) -> str:
-    """One sentence for an error that no input should have caused, and where in the code it came from."""
+    """One sentence for an error that no input should have caused, and where in the code it came from.
+
+    A file that the system refuses, as for a name that is too long or a folder that nobody may enter, is none of the code's.
+    """
+    if isinstance(error, OSError) and error.filename is not None and error.errno in _OF_A_PATH:
+        return f"{error.filename} can't be reached ({error.strerror}): check its name, and who may read its folder"
     place = traceback.extract_tb(error.__traceback__)[-1]
     what = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {error}".splitlines()[0]
     return f"this is a bug, please report it ({what})"

@@ -34,10 +34,11 @@ class Sentences:
     """Sentences on standard error: one for all that goes wrong; nothing else."""
 
     def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+        self._stream, self._command = stream, "batch"
 
     def tell(self, event: str, **fields: Any) -> None:
-        if sentence := _sentence(event, fields):
+        self._command = fields.get("command", self._command)
+        if sentence := _sentence(event, fields, f"viewcam {self._command}".rstrip()):  # none where there is no such command
             self._say(sentence)
 
     def _say(self, sentence: str) -> None:
@@ -153,19 +154,18 @@ def _tqdm() -> type | None:
     return type("tqdm", (tqdm,), {"monitor_interval": 0})  # no thread that wakes up every ten seconds
 
 
-def _sentence(event: str, fields: dict[str, Any]) -> str:
+def _sentence(event: str, fields: dict[str, Any], command: str) -> str:
     """The sentence of an event where nobody reads JSON, plain; mostly none."""
     if event == "error":
-        command = f"viewcam {fields['command']}".rstrip()  # none where there is no such command
         lines = fields["text"].split("\n") if fields.get("problems") else [fields["text"]]
         return "\n".join(map(plain, [f"{command}: {lines[0]}", *lines[1:]]))
     if event == "note":
-        return plain(f"viewcam {fields['command']}: note: {fields['text']}")
+        return plain(f"{command}: note: {fields['text']}")
     if event == "forecast":
         samples, taken, seconds = fields["samples"], fields["taken"], fields["seconds"]
-        return f"viewcam check: some {samples:,} samples a pixel, about {seconds:.0f} s more ({taken:,} so far)"
+        return f"{command}: some {samples:,} samples a pixel, about {seconds:.0f} s more ({taken:,} so far)"
     if event == "shot_failed":
-        return plain(f"viewcam batch: {fields['shot']}: {fields['error']}")
+        return plain(f"{command}: {fields['shot']}: {fields['error']}")
     if event == "stopping":
-        return f"viewcam batch: {fields['signal']}: this shot will be finished; a second one ends it at once"
+        return f"{command}: {fields['signal']}: this shot will be finished; a second one ends it at once"
     return ""

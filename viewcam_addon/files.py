@@ -33,6 +33,9 @@ _FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG}
 _UNLOCKED_AT_MOST = 60.0
 """Seconds that a process may take from making a temporary folder to locking it."""
 
+_unfinished: set[Path] = set()
+"""The temporary files and folders of this process."""
+
 
 @contextlib.contextmanager
 def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
@@ -49,8 +52,7 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
         file = _replaceable(path)
         if file:
             file.parent.mkdir(parents=True, exist_ok=True)
-            temporary = _beside(file, file.parent)
-            ends.callback(_removed, temporary)
+            temporary = ends.enter_context(_temporary(_beside(file, file.parent)))
         else:
             temporary = ends.enter_context(temporary_folder()) / path.name
         yield temporary
@@ -76,7 +78,24 @@ def temporary_folder() -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix=_prefix(), ignore_cleanup_errors=True) as name, contextlib.ExitStack() as ends:
         with contextlib.suppress(OSError):  # where there are no locks nothing is removed either
             ends.enter_context(_locked(Path(name)))
-        yield Path(name)
+        yield ends.enter_context(_temporary(Path(name)))
+
+
+def remove_unfinished() -> None:
+    """Remove the temporary files and folders of this process, for a thread that is about to end it in the midst of its work."""
+    for path in [*_unfinished]:
+        _removed(path)
+
+
+@contextlib.contextmanager
+def _temporary(path: Path) -> Iterator[Path]:
+    """A context at whose end the temporary file or folder is gone, or with this process (see `remove_unfinished`)."""
+    _unfinished.add(path)
+    try:
+        yield path
+    finally:
+        _removed(path)
+        _unfinished.discard(path)
 
 
 def _prefix() -> str:
@@ -122,14 +141,11 @@ def written_together(folder: Path, name: str) -> Iterator[Path]:
     Raises InputError if it can't be made there; FullDiskError if the disk is full.
     """
     temporary = folder / f".{name}-{secrets.token_hex(4)}.labels"
-    with _in_a_sentence(folder):
+    with _in_a_sentence(folder), _temporary(temporary):
         temporary.mkdir()
-        try:
-            yield temporary
-            for path in sorted(temporary.iterdir()):
-                os.replace(path, folder / path.name)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
+        yield temporary
+        for path in sorted(temporary.iterdir()):
+            os.replace(path, folder / path.name)
 
 
 @contextlib.contextmanager
@@ -147,9 +163,8 @@ def folder_written_whole(folder: Path, may_replace: Callable[[Path], bool] = lam
         if os.path.lexists(folder) and not replaces and not (folder.is_dir() and not any(folder.iterdir())):
             raise InputError(f"{folder} is there already: give the name of a new folder")
         folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary = folder.with_name(f".{folder.name}-{secrets.token_hex(4)}.labels")
-        temporary.mkdir()
-        try:
+        with _temporary(folder.with_name(f".{folder.name}-{secrets.token_hex(4)}.labels")) as temporary:
+            temporary.mkdir()
             yield temporary
             getattr(os, "sync", lambda: None)()  # thousands of small files: at once, and not one by one
             if replaces:
@@ -161,8 +176,6 @@ def folder_written_whole(folder: Path, may_replace: Callable[[Path], bool] = lam
             if folder.exists():
                 folder.rmdir()
             os.replace(temporary, folder)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
@@ -207,6 +220,11 @@ def is_replaced(path: str | os.PathLike[str]) -> bool:
     path = Path(path)
     with _in_a_sentence(path):
         return _replaceable(path) is not None
+
+
+def is_device(path: str | os.PathLike[str]) -> bool:
+    """True if something stands there that `written_whole` writes to and does not replace."""
+    return os.path.exists(path) and not os.path.isdir(path) and not is_replaced(path)
 
 
 def is_printed_to(path: str | os.PathLike[str]) -> bool:
@@ -274,6 +292,10 @@ def _beside(file: Path, folder: Path) -> Path:
 
 
 def _removed(temporary: Path) -> None:
+    """Remove a file, or a folder with all that is in it."""
+    if temporary.is_dir():
+        shutil.rmtree(temporary, ignore_errors=True)
+        return
     with contextlib.suppress(OSError):  # where it could not be written, it is not there either
         temporary.unlink()
 

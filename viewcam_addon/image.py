@@ -20,6 +20,7 @@ must not have a second copy of that library.
 
 import contextlib
 import dataclasses
+import difflib
 import json
 import math
 import os
@@ -113,6 +114,8 @@ _ASPECT_ROUNDING = 4 * 2.0**-24
 _LAYER = "ViewLayer"
 _CAMERA_ATTRIBUTE = "virtualPinhole"
 
+_MOST_NAMED = 30  # channels in a sentence: those of some passes
+
 # All channels are read one by one, and then put together as passes.
 _COPIES = 2
 
@@ -186,11 +189,21 @@ def read_channels(path: str | os.PathLike[str], named: Mapping[str, Sequence[str
         if len(names) == 1:
             return pixels[names[0]]
         if names:
-            raise InputError(f"{path} has several channels {wanted!r}: name one of {', '.join(names)}")
-        raise InputError(f"{path} has no channel {wanted!r}: name some of {', '.join(pixels)}")
+            raise InputError(f"{path} has several channels {wanted!r}: name one of {_chosen(wanted, names)}")
+        raise InputError(f"{path} has no channel {wanted!r}: name some of {_chosen(wanted, pixels)}")
 
     channels = {name: [channel(wanted) for wanted in channels] for name, channels in named.items()}
     return _image(channels, file, path)
+
+
+def _chosen(wanted: str, names: Collection[str]) -> str:
+    """Names of channels in a sentence, of many the most alike ones first."""
+    likely = names if len(names) <= _MOST_NAMED else sorted(names, key=lambda name: -_likeness(wanted, name))
+    return several([*likely], _MOST_NAMED)
+
+
+def _likeness(wanted: str, name: str) -> float:
+    return difflib.SequenceMatcher(None, wanted.casefold(), name.casefold()).ratio()
 
 
 def text_attribute(path: str | os.PathLike[str], name: str) -> str:

@@ -1,4 +1,4 @@
-"""NumPy's arrays in files of strangers: nothing is allocated for one before its header is known to be true.
+"""NumPy's arrays in files, written, and read of strangers: nothing is allocated for one before its header is known to be true.
 
 A header says type and shape, of which follows how many bytes come after it; the file, or the archive's table, says how many do.
 NumPy's own readers allocate what a header says, and raise whatever the parser of Python does where it says nothing.
@@ -7,6 +7,8 @@ NumPy's own readers allocate what a header says, and raise whatever the parser o
 import io
 import math
 import zipfile
+from collections.abc import Mapping
+from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
@@ -52,3 +54,15 @@ def members(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
         for member in archive.infolist()
         if member.filename.endswith(".npy") and member.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
     }
+
+
+def write_archive(path: Path, arrays: Mapping[str, NDArray], is_compressed: bool = False) -> None:
+    """Write a .npz, the bytes of `np.savez`, which leaves an open archive that prints a traceback where a disk is full.
+
+    Raises OSError if it can't be written.
+    """
+    kind = zipfile.ZIP_DEFLATED if is_compressed else zipfile.ZIP_STORED
+    with open(path, "wb") as file, zipfile.ZipFile(file, "w", kind) as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                _format.write_array(member, np.asanyarray(array), allow_pickle=False)

@@ -11,6 +11,8 @@ pytest.importorskip("bpy")
 
 from viewcam_addon.cli import main
 from viewcam_addon.commands.demo import SCENE as DEMO_SCENE
+from viewcam_addon.errors import InputError
+from viewcam_addon.jobs import cluster
 
 ROOT = Path(__file__).parents[2]
 CORNELL = DEMO_SCENE.with_name("cornell.blend")
@@ -99,7 +101,8 @@ def test_a_thousand_rows_with_forty_kinds_of_bad_ones_are_named_by_line_and_colu
         ([CORNELL, "none.csv", "--out", "OUT"], "none.csv"),
         ([CORNELL, ROOT / "LICENSE", "--out", "OUT"], "LICENSE is no camera"),
         ([CORNELL, "FILE", "--out", "OUT"], "FILE: the text says where the camera is but not how it sees"),
-        (["none.blend", "--orbit", "4", "--out", "OUT"], "none.blend"),
+        (["none.blend", "--orbit", "4", "--out", "OUT"], "none.blend does not exist"),
+        ([ROOT, "--orbit", "4", "--out", "OUT"], "is no file: check the name of the .blend file"),
         ([ROOT / "README.md", "--orbit", "4", "--out", "OUT"], "not a .blend"),
         ([CORNELL, "--orbit", "4", "--out", "FILE"], "can't be a folder"),
     ],
@@ -166,6 +169,17 @@ def test_shards_are_the_whole_and_have_summaries_of_their_own(tmp_path, capfd):
         batch(capfd, CORNELL, "--orbit", "3", "--shard", shard, "--out", out, *SMALL)
     assert {"summary-1-of-2.json", "summary-2-of-2.json", "orbit_000.exr", "orbit_001.exr", "orbit_002.exr"} < {*files(out)}
     assert "3 of them kept" in batch(capfd, CORNELL, "--orbit", "3", "--out", out, *SMALL, "--resume").out
+
+
+def test_no_more_workers_are_started_than_there_are_shots(tmp_path, capfd, monkeypatch):
+    """A hundred thousand for two shots were."""
+
+    def opened(scheduler, workers, blender):
+        raise InputError(f"{workers} are enough")
+
+    monkeypatch.setattr(cluster, "opened", opened)
+    words = (CORNELL, "--orbit", "2", "--out", tmp_path / "out", "--workers", "100000", *SMALL)
+    assert "2 are enough" in fails(capfd, *words)
 
 
 def test_frames_and_cameras_make_shots_of_their_names(tmp_path, capfd):

@@ -46,7 +46,7 @@ def check(*words):
         (("--find", "0.5%", "--level", "direct", "--error", "0.1"), "leave --samples and --error out"),
         (("--find", "0.5%", "--engine", "EEVEE"), "--find is of light"),
         *(
-            (("--level", "path", f"--find={wrong}"), "is no share in percent above 0%, up to 100%: write 0.5%")
+            (("--level", "path", f"--find={wrong}"), "is no share in percent from 0.0001% to 100%: write 0.5%")
             for wrong in ("0%", "-1%", "0.5", "nan%", "101%", "much", "1%2")
         ),
     ],

@@ -70,6 +70,8 @@ def test_a_depth_that_is_off_otherwise_is_no_distance(paper_scene):
         (lambda depth: depth * 1000, "is 1,000 times the reference's, as in another unit"),
         (lambda depth: depth * 0.3048, "is 0.3048 times the reference's"),
         (lambda depth: np.where(depth == 0, 200, depth), "is 200 where nothing is: write 0"),
+        (lambda depth: np.where(depth == 0, 1, depth), "is 1 where nothing is: write 0"),
+        (lambda depth: np.where(depth == 0, 0, 0.2 + 2 * depth), "is in another scale"),
         (lambda depth: depth[::-1], "the picture looks upside down"),
         (lambda depth: depth[:, ::-1], "the picture looks mirrored left to right"),
         (lambda depth: depth[::-1, ::-1], "the picture looks turned by half a turn"),
@@ -80,6 +82,46 @@ def test_a_depth_that_is_written_otherwise_is_told_how(change, words, name, pape
     depth = np.where(test[name] >= BACKGROUND_DEPTH, 0, test[name])
     comparison = judged(paper_scene, replace(test, passes={name: change(depth).astype(np.float32)}))
     assert not comparison.passed and words in comparison.sentence, comparison.sentence
+
+
+@pytest.mark.parametrize("scale", [lambda inverse: 110 * inverse, lambda inverse: 1 - 0.1 * inverse])
+def test_disparities_and_the_depths_of_a_depth_buffer_are_told(scale, paper_scene):
+    depth = paper_scene.rendered()["Depth"].astype(float)
+    scaled = np.where(depth < BACKGROUND_DEPTH, scale(1 / depth), 0).astype(np.float32)
+    assert "Depth is in a scale of 1/depth" in judged(paper_scene, Image({"Depth": scaled})).sentence
+
+
+OF_CAMERA = "in the camera's axes: give it in world space"
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("Position", lambda position, _: 100 * position, "Position is 100 times (x, y, z) of the reference's"),
+        ("Position", lambda position, _: position[..., (0, 2, 1)] * (1, 1, -1), "Position is (x, z, -y) of the reference's"),
+        ("Position", lambda position, _: 0.01 * position[..., ::-1], "Position is 0.01 times (z, y, x) of the reference's"),
+        ("Position", lambda position, camera: (position - camera.eye) @ np.array(camera.basis()).T, OF_CAMERA),
+        ("Normal", lambda normal, camera: normal @ (np.array(camera.basis()) * [[1], [-1], [-1]]).T, OF_CAMERA),
+        ("Normal", lambda normal, _: normal[..., (0, 2, 1)] * (1, 1, -1), "Normal is (x, z, -y) of the reference's"),
+        ("Normal", lambda normal, _: 0.5 + 0.5 * normal, "Normal runs from 0 to 1"),
+        ("Normal", lambda normal, _: -normal, "turn it towards the eye"),
+        ("Object Index", lambda index, _: index + 1, "Object Index has other numbers for the same, as 2 for 1"),
+    ],
+)
+def test_a_pass_in_another_space_unit_or_numbering_is_told_which(name, change, words, paper_scene):
+    """Positions with y up were said to look upside down, and those in centimeters to be magnified."""
+    test = only(paper_scene.rendered(), "Position", "Normal", "Object Index")
+    hit = paper_scene.picture()["Depth"] < BACKGROUND_DEPTH
+    changed = np.where(hit, change(test[name].astype(float), test.camera), 0).astype(np.float32)
+    comparison = judged(paper_scene, replace(test, passes=test.passes | {name: changed}))
+    assert not comparison.passed and words in comparison.sentence, comparison.sentence
+
+
+def test_objects_that_are_taken_for_one_another_here_and_there_have_the_scenes_numbers(paper_scene):
+    test = only(paper_scene.rendered(), "Position", "Object Index")
+    index = test["Object Index"].copy()
+    index[:20] = 0
+    assert "other numbers" not in judged(paper_scene, replace(test, passes=test.passes | {"Object Index": index})).sentence
 
 
 def test_positions_turned_by_half_a_turn_are_told(paper_scene):

@@ -102,6 +102,8 @@ def test_depth_that_sixteen_bits_can_not_hold_is_none_and_never_another_depth():
     depths = np.array([[0.5, 65.535, 65.536, 70, 131.1, 1e10, 0.0004]], np.float32)
     assert files.depth_levels(depths, 1000).tolist() == [[500, 65535, 0, 0, 0, 0, 0]]
     assert files.depth_levels(depths, 256).tolist() == [[128, 16777, 16777, 17920, 33562, 0, 0]]
+    with np.errstate(all="raise"):
+        assert not files.depth_levels(depths, 1e308).any()
 
 
 def test_pycocotools_finds_the_same_masks_areas_and_boxes(written):

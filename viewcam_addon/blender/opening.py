@@ -74,7 +74,7 @@ def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, 
     """Open a .blend; a sentence for each thing that is off or was not read and might be seen. Raises as `opened` does."""
     path = Path(path).absolute()
     if not path.is_file():
-        raise InputError(f"{path} does not exist: check the name of the .blend file")
+        raise InputError(f"{path} {'is no file' if path.exists() else 'does not exist'}: check the name of the .blend file")
     try:
         with open(path, "rb") as file:
             start = file.read(7)

@@ -94,7 +94,8 @@ def carry_out(
             stack.close()  # the workers open the file themselves
             if (plan.scheduler or "").startswith("tcp://"):
                 events.tell("note", command=plan.command, text=_OPEN_TO_ALL.format(plan.scheduler))
-            machines = stack.enter_context(cluster.opened(plan.scheduler or None, plan.workers, program))
+            count = plan.workers and min(plan.workers, max(len(work_list.jobs), 1))  # more of them have nothing to do
+            machines = stack.enter_context(cluster.opened(plan.scheduler or None, count, program))
         folder = Folder(plan.out, plan.shard.strip().replace("/", "-of-") if plan.shard else "")
         if plan.transforms:
             dataset.check_folder(folder)

@@ -74,7 +74,7 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     group = added.add_argument_group("what a shot does not say itself")
     group.add_argument("--camera", metavar="NAME", help="of --orbit and --frames: the camera (default: the scene's)")
     group.add_argument("--size", type=types.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
-    group.add_argument("--frame", type=int, metavar="N", help="the frame (default: the file's current one)")
+    group.add_argument("--frame", type=types.frame, metavar="N", help="the frame (default: the file's current one)")
     group.add_argument("--engine", choices=ENGINES, help="who renders (default: the scene's)")
     group.add_argument("--samples", type=types.positive, metavar="N", help="samples a pixel (default: the scene's)")
     group.add_argument("--level", choices=LEVELS, help="how much VIEWCAM models (default: the scene's)")

@@ -5,6 +5,7 @@ A .blend is such a file, too. A file, a folder or, as "-", what stands on standa
 
 import argparse
 import dataclasses
+import os
 import sys
 from pathlib import Path
 
@@ -104,6 +105,8 @@ def run(options: argparse.Namespace) -> Result:
         return _st_maps(options)
     if options.out and not options.to:
         raise InputError("--out says where to, but not in which format: give --to")
+    if options.out and os.path.realpath(options.out) == os.path.realpath(options.file):
+        raise InputError(f"{options.out} is what is read, and would be overwritten: give --out another name")
     with silent_libraries():  # Blender tells what it opens, USD all that a stage lacks
         read = _read(options)
     notes = list(dict.fromkeys(note for camera in read for note in camera.notes))

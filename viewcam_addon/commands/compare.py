@@ -3,6 +3,7 @@
 import argparse
 
 from .. import argument_types as types
+from ..errors import InputError
 from ..terminal import say
 from . import Result
 from . import _options as shared
@@ -26,7 +27,9 @@ def run(options: argparse.Namespace) -> Result:
 
     report, difference = (path and str(path) for path in (options.report, options.difference))
     written = Written(report, difference, command=f"viewcam {options.words}")
-    channels = dict(options.channels) if options.channels else None
+    channels = dict(options.channels or ())
+    if len(channels) < len(options.channels or ()):
+        raise InputError("--channels names a pass twice: leave one of them out")
     result = compare_files(options.reference, options.tests, options.scene, options.threads, channels, written)
     say(*shared.ledger_lines(result["result"]["ledger"]), *result["lines"])
     return exit_status(result["answer"], options.strict), result["result"]

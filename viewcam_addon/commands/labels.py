@@ -7,7 +7,7 @@ import json
 from .. import argument_types as types
 from ..errors import InputError
 from ..files import written_whole
-from ..labels import bop, coco, colmap, kitti, stereo, tracks, yolo
+from ..labels import bop, coco, colmap, files, kitti, stereo, tracks, yolo
 from ..terminal import say
 from . import Result
 
@@ -39,6 +39,7 @@ def run(options: argparse.Namespace) -> Result:
         raise InputError("--points are those of a COLMAP model or of tracks: add --to colmap or --to tracks, or leave it out")
     if options.pair and options.to not in ("kitti", "middlebury"):
         raise InputError("--pair is for stereo: add --to kitti or --to middlebury, or leave it out")
+    files.refuse_own(options.folder, options.output)
     if options.to == "colmap":
         counts = colmap.write(options.folder, options.output, options.points or colmap.POINTS, options.overwrite)
     elif options.to == "bop":

@@ -6,6 +6,7 @@ so depth, normal and UV are compared with the reference's, and indices and cover
 at this level.
 """
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -46,6 +47,9 @@ _READ_ANEW = 1000
 _OF_THE_ERROR = 0.1
 # That share where the unit is another: depths that hardly vary are near a multiple of any others.
 _OF_A_UNIT = 1e-3
+# The share of pixels that lie at edges, at most, where another object may be seen; and that of all others.
+_STRAY = 0.05
+_OF_ALL_PIXELS = 1 - _STRAY
 # Passes that only the reference has: what tolerances are evaluated with.
 _FOR_TOLERANCES = ("Magnitude", "Facing")
 
@@ -125,15 +129,20 @@ def compare(
         lacking,
         in_one_place,
         renderer.name,
-        mistaken=_mistaken(pinhole, expected, seen, test, measured),
+        mistaken=_mistaken(pinhole, expected, seen, test, measured, partial),
     )
 
 
-def _mistaken(pinhole: Pinhole, expected: Seen, seen: Seen, test: Image, measured: set[str]) -> str:
+def _mistaken(pinhole: Pinhole, expected: Seen, seen: Seen, test: Image, measured: set[str], is_strangers: bool = False) -> str:
     """The sentence that the test's passes are not what they are taken for; empty where they are.
 
     measured : the passes that the test has.
+    is_strangers : true for a picture of another program, which may have axes, units and numbers of its own.
     """
+    if is_strangers:
+        sentences = [_mistaken_vectors(pinhole, expected, seen, name) for name in ("Position", "Normal") if name in measured]
+        if sentence := next(filter(None, [*sentences, _mistaken_indices(expected, seen)]), ""):
+            return sentence
     if "Position" not in measured:  # which tells by itself
         depths = [passes["Depth"].reshape(pinhole.height, pinhole.width).astype(np.float64) for passes in (expected, seen)]
         if turned := looks_turned(depths[0], depths[1], _unlike, _OF_THE_ERROR):
@@ -157,12 +166,65 @@ def _unlike(reference: Array, test: Array) -> Array:
 
 
 def _mistaken_background(expected: Seen, seen: Seen, depth: NDArray, name: str) -> str:
-    """The sentence that the test has one depth, behind all others, wherever nothing is."""
+    """The sentence that the test has one depth, which no surface has, wherever nothing is."""
     hit = tolerances.is_hit(expected)
     alone, others = depth.ravel()[~hit], depth.ravel()[hit]
-    if not len(alone) or not tolerances.is_hit(seen).all() or not (alone == alone[0]).all() or not (others < alone[0]).all():
+    if not len(alone) or not tolerances.is_hit(seen).all() or not (alone == alone[0]).all() or (others == alone[0]).any():
         return ""
     return f"{name} is {plain(float(alone[0]))} where nothing is: write 0, 1e10, inf or -1 there"
+
+
+def _mistaken_vectors(pinhole: Pinhole, expected: Seen, seen: Seen, name: str) -> str:
+    """The sentence that Position or Normal has other axes or another unit than the reference's; empty where it has not."""
+    if name not in expected or not len(hits := _some_hits(expected, seen)):
+        return ""
+    reference, test = (passes[name][hits].astype(np.float64) for passes in (expected, seen))
+
+    def off(read_anew: Array, right: Array) -> float:
+        return float(np.quantile(np.linalg.norm(read_anew - right, axis=-1), _OF_ALL_PIXELS))
+
+    def explains(read_anew: Array, right: Array) -> bool:
+        return off(read_anew, right) < _OF_A_UNIT * off(test, reference)
+
+    frame = np.array(pinhole.basis())
+    of_camera = (reference - (pinhole.eye if name == "Position" else 0.0)) @ frame.T
+    if explains(test, of_camera) or explains(test * (1, -1, -1), of_camera):
+        return f"{name} is in the camera's axes: give it in world space"
+    if name == "Normal":
+        if explains(2 * test - 1, reference):
+            return "Normal runs from 0 to 1: give it from -1 to 1"
+        if explains(np.sign((test * reference).sum(axis=-1, keepdims=True)) * test, reference):
+            return "Normal points away from the eye here and there: turn it towards the eye"
+    scale = float(np.median(np.linalg.norm(test, axis=-1)) / np.median(np.linalg.norm(reference, axis=-1)))
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1, -1), repeat=3):
+            if scale > 0 and explains(test / scale, reference[:, order] * signs):
+                axes = ", ".join(f"{'-' * (sign < 0)}{'xyz'[axis]}" for sign, axis in zip(signs, order, strict=True))
+                factor = "" if abs(scale - 1) < _OF_A_UNIT else f"{plain(scale, 6)} times "
+                return f"{name} is {factor}({axes}) of the reference's: give it in the scene's axes and unit"
+    return ""
+
+
+def _mistaken_indices(expected: Seen, seen: Seen) -> str:
+    """The sentence that objects or materials have other numbers, each another one; empty where they have the scene's."""
+    hits = _some_hits(expected, seen)
+    for name in ("Object Index", "Material Index"):
+        if name in expected and name in seen and len(hits):
+            both = np.stack([passes[name][hits, 0] for passes in (expected, seen)], axis=-1)
+            pairs, counts = np.unique(both, axis=0, return_counts=True)
+            renamed = dict(pairs[np.argsort(counts)].tolist())  # each as in most of its pixels
+            share = np.mean([renamed[ours] == theirs for ours, theirs in both.tolist()])
+            others = [(ours, theirs) for ours, theirs in renamed.items() if ours != theirs]
+            if others and share > _OF_ALL_PIXELS and len({*renamed.values()}) == len(renamed):
+                ours, theirs = (plain(number, 9) for number in min(others))
+                return f"{name} has other numbers for the same, as {theirs} for {ours}: give the scene's, or leave it out"
+    return ""
+
+
+def _some_hits(expected: Seen, seen: Seen) -> NDArray[np.intp]:
+    """Pixels, by their numbers, that see a surface on both sides."""
+    hits = np.flatnonzero(tolerances.is_hit(expected) & tolerances.is_hit(seen))
+    return hits[:: max(len(hits) // _READ_ANEW, 1)]
 
 
 def _mistaken_depth(pinhole: Pinhole, expected: Seen, seen: Seen, name: str) -> str:
@@ -171,8 +233,7 @@ def _mistaken_depth(pinhole: Pinhole, expected: Seen, seen: Seen, name: str) -> 
 
     name : the pass that the test's depths come from. It is the other one where reading it so leaves a tenth of the error.
     """
-    hits = np.flatnonzero(tolerances.is_hit(expected) & tolerances.is_hit(seen))
-    hits = hits[:: max(len(hits) // _READ_ANEW, 1)]
+    hits = _some_hits(expected, seen)
     rows, columns = np.divmod(hits, pinhole.width)
     cosine = -pinhole.ray_directions(columns, rows) @ pinhole.basis()[2]
     ratio = seen["Depth"][hits, 0].astype(np.float64) / expected["Depth"][hits, 0]
@@ -190,7 +251,20 @@ def _mistaken_depth(pinhole: Pinhole, expected: Seen, seen: Seen, name: str) -> 
         return f"{name} is below 0, as counted against the view: give it with the other sign"
     if (factor := float(np.median(ratio))) > 0 and explains(ratio / factor, _OF_A_UNIT):
         return f"{name} is {plain(factor, 6)} times the reference's, as in another unit: give it in the scene's"
+    reference, test = (passes["Depth"][hits, 0].astype(np.float64) for passes in (expected, seen))
+    for power, scale in ((1, "another scale"), (-1, "a scale of 1/depth, as of depth buffers and disparities")):
+        offset, slope = _line(reference**power, test)
+        if slope and explains(((test - offset) / slope) ** power / reference, _OF_A_UNIT):
+            begins = f", with {plain(offset, 4)} where the reference's is 0" if power == 1 else ""
+            return f"{name} is in {scale}{begins}: give it from the eye on, in the scene's unit"
     return ""
+
+
+def _line(x: Array, y: Array) -> tuple[float, float]:
+    """The offset and the slope of the line through points, by least squares; no slope where x has one value."""
+    spread = x - x.mean()
+    slope = float(spread @ y / total) if (total := spread @ spread) > 0 else 0.0
+    return float(y.mean() - slope * x.mean()), slope
 
 
 def _passes(reference: Image, test: Image, pinhole: Pinhole, partial: bool) -> tuple[Seen, Seen]:

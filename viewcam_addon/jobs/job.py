@@ -108,7 +108,7 @@ class Job:
     camera: str | None = _option("the camera object (default: the scene's)", metavar="NAME")
     width: int | None = None
     height: int | None = None
-    frame: int | None = _option("the frame (default: the file's current one)", type=int, metavar="N")
+    frame: int | None = _option("the frame (default: the file's current one)", type=argument_types.frame, metavar="N")
     engine: str | None = _option("who renders; all but Cycles at level geometry (default: CYCLES)", choices=TESTED)
     samples: int | None = None
     level: str | None = None

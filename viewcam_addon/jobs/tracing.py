@@ -204,6 +204,8 @@ def compare_files(
             raise InputError(f"--channels are of geometry, and {reference} shows light: trace it at level geometry")
         if not {"Depth", "Distance", "Position"} & channels.keys():
             raise InputError("--channels tells nothing of where things are: name depth, distance or position")
+        if {"Depth", "Distance"} <= channels.keys():
+            raise InputError("--channels names depth and distance, of which one makes the other: leave one of them out")
         pictures, renderer = [image.read_channels(path, channels) for path in tests], renderers.CYCLES
     else:
         pictures, (renderer, *_) = map(list, zip(*map(renderers.read, tests), strict=True))

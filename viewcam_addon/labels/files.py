@@ -177,6 +177,16 @@ def understood(path: Path) -> Iterator[None]:
         raise InputError(f"{path} is no label file that can be read: write it again with viewcam render --labels") from error
 
 
+def refuse_own(folder: Path, output: Path) -> None:
+    """Refuse an output that is one of the label files of a folder, or of their pictures; InputError."""
+    if not output.is_file() or not folder.is_dir() or not output.parent.samefile(folder):
+        return
+    for path in folder.glob("*.labels.json"):
+        ending = output.name.removeprefix(f"{name(path)}.")
+        if ending in ("labels.json", "labels.exr", *FILES, "exr", "png", "jpg", "jpeg") and ending != output.name:
+            raise InputError(f"{output} belongs to a picture of {folder}: give another name")
+
+
 def name(path: Path) -> str:
     """The name of a label file's picture and of all that belongs to it: shot of shot.labels.json."""
     return path.name.removesuffix(".labels.json")
@@ -248,7 +258,8 @@ def holds(folder: Path, least: Collection[str], most: Collection[str]) -> bool:
 
 def depth_levels(depth: NDArray[np.float32], steps: float) -> NDArray[np.uint16]:
     """Depths in steps, to the nearest; 0 where nothing is, or what 16 bits can't hold: nothing wraps and nothing is clipped."""
-    levels = np.rint(depth.astype(np.float64) * steps)
+    with np.errstate(over="ignore"):
+        levels = np.rint(depth.astype(np.float64) * steps)
     return np.where((depth < BACKGROUND_DEPTH) & (levels <= 65535), levels, 0).astype(np.uint16)
 
 

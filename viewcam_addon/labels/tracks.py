@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import npy
 from ..cameras import axes
 from ..errors import InputError
 from ..files import written_whole
@@ -80,16 +81,16 @@ def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
         which, _ = surface_points.visible(placed, number, view, depth, state)
         visibs[number, which] = True
     visibs &= valids
-    with written_whole(output) as temporary, open(temporary, "wb") as file:
-        np.savez_compressed(
-            file,
-            trajs_2d=trajs_2d,
-            trajs_3d=trajs_3d,
-            visibs=visibs,
-            valids=valids,
-            intrinsics=np.array([axes.intrinsics(view.pinhole) for view in views]),
-            extrinsics=np.array([axes.world_to_camera(view.pinhole) for view in views]),
-        )
+    arrays = {
+        "trajs_2d": trajs_2d,
+        "trajs_3d": trajs_3d,
+        "visibs": visibs,
+        "valids": valids,
+        "intrinsics": np.array([axes.intrinsics(view.pinhole) for view in views]),
+        "extrinsics": np.array([axes.world_to_camera(view.pinhole) for view in views]),
+    }
+    with written_whole(output) as temporary:
+        npy.write_archive(temporary, arrays, is_compressed=True)
     return {"pictures": shape[0], "points": shape[1], "places": int(visibs.sum())}
 
 

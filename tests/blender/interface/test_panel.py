@@ -1070,11 +1070,21 @@ def test_errors_are_one_sentence_and_leave_no_file(camera_object, own_presets, s
     with pytest.raises(RuntimeError, match="is orthographic, no pinhole") as error:
         execute("Lens 35 mm")
     assert "Traceback" not in str(error.value)
-    with pytest.raises(RuntimeError, match="The preset can't be read"):
-        bpy.ops.viewcam.execute_preset(filepath=str(tmp_path / "gone.py"))
     bpy.data.objects.remove(camera_object)
     with pytest.raises(RuntimeError, match="There is no camera"):
         bpy.ops.viewcam.add_preset(name="Mine")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"), [(None, "No such file or directory"), ("1 +", "invalid syntax"), ("bpy = 1 / 0", "division by zero")]
+)
+def test_a_preset_that_is_no_program_is_named_in_a_sentence(posed_camera, tmp_path, text, reason):
+    path = tmp_path / "mine.py"
+    if text is not None:
+        path.write_text(text, encoding="utf-8")
+    with pytest.raises(RuntimeError, match=rf"The preset 'mine.py' can't be run \({reason}.*\): remove it") as error:
+        bpy.ops.viewcam.execute_preset(filepath=str(path))
+    assert "Traceback" not in str(error.value)
 
 
 LEVEL = Pinhole((0, -5, 0), (0, 0, 0), (0, 0, 1), 50.0, 100, 60)

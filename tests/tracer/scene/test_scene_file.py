@@ -131,6 +131,9 @@ def test_many_instances_are_one_array_beside_the_scene(make_scene, ball, random_
     with np.load(tmp_path / "many.npz") as arrays:
         assert [array.shape for array in arrays.values()].count((20, 4, 4)) == 1
     assert_same_scene(scene, scene_file.read(tmp_path / "many.json"))
+    with pytest.raises(InputError, match=r"few\.npz is where this scene's arrays stand"):
+        scene_file.write(scene, tmp_path / "few.npz")
+    assert not (tmp_path / "few.npz").exists()
 
 
 def test_a_plane_is_two_triangles_with_a_uv_map_along_its_edges(example, read_document):

@@ -7,6 +7,7 @@ float32, and moves the camera at each of them.
 """
 
 import math
+import os
 from typing import ClassVar
 
 import bpy
@@ -73,11 +74,12 @@ class VIEWCAM_OT_execute_preset(bpy.types.Operator):
                 bpy.utils.execfile(self.filepath)
             else:
                 bpy.ops.viewcam.paste_camera(text=SHIPPED[self.shipped])
-        except OSError as error:
-            self.report({"ERROR"}, f"The preset can't be read ({error.strerror}): remove it")
-            return {"CANCELLED"}
         except RuntimeError as error:  # an operator's own report
             self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
+            return {"CANCELLED"}
+        except Exception as error:  # a preset is a program, of whoever wrote it
+            reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+            self.report({"ERROR"}, f"The preset {os.path.basename(self.filepath)!r} can't be run ({reason}): remove it")
             return {"CANCELLED"}
         return {"FINISHED"}
 

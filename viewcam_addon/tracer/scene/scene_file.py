@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import checks
+from ... import checks, npy
 from ...checks import quoted
 from ...errors import InputError
 from ...files import is_replaced, read_bytes, written_whole
@@ -330,6 +330,8 @@ def write(scene: Scene, path: str | os.PathLike[str]) -> None:
     arrays: dict[str, NDArray] = {}
     document = _document(scene, arrays)
     arrays_path = path.with_suffix(".npz")
+    if arrays_path == path:
+        raise InputError(f"{path} is where this scene's arrays stand: give the name of a file that ends in .json")
     if arrays and not is_replaced(path):
         raise InputError(f"{path} is no file, and this scene has arrays that stand in one beside it: give the name of a file")
     if arrays:
@@ -340,7 +342,7 @@ def write(scene: Scene, path: str | os.PathLike[str]) -> None:
         temporary.write_text(text + "\n", encoding="utf-8", newline="\n")
         if arrays:
             with written_whole(arrays_path) as temporary_arrays:
-                np.savez(temporary_arrays, **arrays)
+                npy.write_archive(temporary_arrays, arrays)
 
 
 def read(path: str | os.PathLike[str]) -> Scene:
