@@ -272,7 +272,7 @@ def test_ray_visibility_of_object_and_instancer(add, both_sides, mesh_from):
     )
     sides = both_sides()
     sides.check()
-    assert [placed.name for placed in sides.exported.objects] == ["Shown"]
+    assert [placed.name for placed in sides.exported.objects if "camera" not in placed.hidden_from] == ["Shown"]
 
 
 def test_holdouts_and_shadow_catchers_are_plain_objects_on_both_sides(add, scene, both_sides, mesh_from):
@@ -302,7 +302,7 @@ def test_a_holdout_that_the_camera_does_not_see_is_hidden_on_both_sides(add, sce
     bpy.context.view_layer.layer_collection.children["Indirect"].indirect_only = True
     sides = both_sides()
     sides.check()
-    assert {placed.name for placed in sides.exported.objects} == {"Plain"}
+    assert [placed.name for placed in sides.exported.objects if not placed.hidden_from] == ["Plain"]
 
 
 def test_objects_of_a_background_set_are_shown_and_its_holdouts_are_plain_on_both_sides(add, scene, both_sides, mesh_from):
@@ -410,6 +410,17 @@ def test_objects_with_a_mesh_of_their_own_have_normals_as_if_applied(add, both_s
     monkey.polygons.foreach_set("use_smooth", [True] * len(monkey.polygons))
     add(monkey, scale=(0.5, 2.0, -0.9), rotation_euler=(0.3, 0.4, 0.5))
     both_sides().check()
+
+
+def test_a_mesh_that_is_shared_with_what_the_camera_does_not_see_has_normals_as_if_shared(add, both_sides, mesh_from):
+    monkey = mesh_from("monkey")
+    monkey.polygons.foreach_set("use_smooth", [True] * len(monkey.polygons))
+    add(monkey, "Seen", scale=(0.5, 2.0, -0.9), rotation_euler=(0.3, 0.4, 0.5))
+    add(monkey, "Shadow", location=(2, 0, 0)).visible_camera = False
+    add(mesh_from("cube"), "Unseen", location=(-2, 0, 0)).visible_camera = False
+    sides = both_sides()
+    sides.check()
+    assert {placed.name for placed in sides.exported.objects} == {"Seen", "Shadow"}
 
 
 def test_materials_of_object_and_data_have_their_own_indices(add, scene, both_sides, mesh_from):

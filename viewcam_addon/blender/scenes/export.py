@@ -185,7 +185,7 @@ def _scene(
         matrix = matrices if len(matrices) > 1 else matrices[0]
         objects.append(Object(source.name, names[source.key], matrix, *placed, *links))
     if notes_doubles:
-        _note_doubles(objects, geometries, ledger)
+        _note_doubles([placed for placed in objects if lit or not placed.hidden_from], geometries, ledger)
     surfaces = {placed.name for placed in objects}
     light = _shown_by_light(depsgraph, ledger, shading, surfaces) if shading else {}
     if shading:
@@ -359,6 +359,8 @@ def placements(
             if placed.real != placed.parent:
                 placing.add(placed.parent.original)
         known[identity].append(number)
+    if not shading:
+        rows = _seen(rows)
     features.note_bare(ledger, placing)
     for source, numbers in rows.items():
         ledger.placed(source.name, len(numbers))
@@ -371,6 +373,15 @@ def placements(
             random = cycles_attributes.unit_number(draw.astype(np.uint32))
         result.append(Placement(source, _by_rows(matrices[numbers]), random))
     return list(_drawn(result, ledger))
+
+
+def _seen(rows: dict[Surface, list[int]]) -> dict[Surface, list[int]]:
+    """The surfaces that the camera sees. Beside one that alone has its mesh are also those that share it and are not seen: Cycles
+    interpolates the normals of a mesh that is shared otherwise."""
+    users: Counter[tuple[int, int]] = Counter()
+    for source, numbers in rows.items():
+        users[source.key] += 0 if source.hidden_from else len(numbers)
+    return {source: numbers for source, numbers in rows.items() if not source.hidden_from or users[source.key] == 1}
 
 
 def _draws(depsgraph: bpy.types.Depsgraph) -> tuple[NDArray[np.bool_], NDArray[np.uint32]]:
@@ -431,7 +442,7 @@ def _source(
     hidden_from = features.hidden_from(placed, layer)
     if "camera" in hidden_from:
         ledger.note(placed.name, "exported", "not visible to the camera")
-        if not shading or len(hidden_from) == len(RAYS):
+        if len(hidden_from) == len(RAYS):
             return None
     is_mesh = isinstance(evaluated.data, bpy.types.Mesh)
     if is_mesh and not layer.use_solid:
@@ -445,7 +456,8 @@ def _source(
             used = export_geometry.used_slots(mesh, len(slots))
         if not used:  # it has no faces
             return None
-    features.note_object(placed, slots, used, depsgraph, ledger, shading)
+    if shading or "camera" not in hidden_from:
+        features.note_object(placed, slots, used, depsgraph, ledger, shading)
     used = {index for index in used if not materials.is_volume_alone(slots[index])}
     if not used:
         return None
@@ -461,7 +473,7 @@ def _source(
         object_index=evaluated.pass_index,
         slots=tuple(slots),
         used=tuple(sorted(used)),
-        hidden_from=hidden_from if shading else frozenset(),
+        hidden_from=hidden_from if shading or "camera" in hidden_from else frozenset(),
         color=tuple(placed.parent.color) if shading else Object.color,
         receivers=receivers,
         blockers=blockers,
