@@ -376,8 +376,10 @@ def placements(
 
 
 def _seen(rows: dict[Surface, list[int]]) -> dict[Surface, list[int]]:
-    """The surfaces that the camera sees. Beside one that alone has its mesh are also those that share it and are not seen: Cycles
-    interpolates the normals of a mesh that is shared otherwise."""
+    """The surfaces that the camera sees.
+
+    Beside the only one of a mesh that is seen are the others, too: Cycles interpolates normals of a shared mesh otherwise.
+    """
     users: Counter[tuple[int, int]] = Counter()
     for source, numbers in rows.items():
         users[source.key] += 0 if source.hidden_from else len(numbers)
