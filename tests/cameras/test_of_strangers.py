@@ -794,6 +794,26 @@ def test_coefficients_that_code_says_one_by_one_are_a_lens(k):
     assert read(f"{k}\nk1 = [1, 2, 3]\n").lens is None
 
 
+@pytest.mark.parametrize("is_json", [False, True])
+def test_a_matrix_whose_name_may_be_a_poses_is_asked_for_its_way_in_code_as_in_json(is_json):
+    """ManiSkill's, beside its extrinsic_cv."""
+    pose = [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]
+    values = {"cam2world_gl": pose, "K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]]}
+    text = json.dumps(values) if is_json else "\n".join(f"{name} = np.array({rows})" for name, rows in values.items())
+    with pytest.raises(InputError, match="has cam2worldgl, and whose axes it means and which way it goes is not said"):
+        read(text)
+    (camera,) = cameras.read(text, options=Options(size=(640, 480), pose="c2w_opengl"))
+    assert camera.pinhole.eye == (1, 2, 3) and camera.pinhole.basis()[2] == pytest.approx((0, 0, 1))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "is_told"), [("crop", [9, 9, 99, 99], True), ("binning", 2, True), ("binning", 1, False)]
+)
+def test_what_may_have_been_cut_off_a_picture_is_told_where_k_is_taken(key, value, is_told):
+    text = json.dumps({"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "width": 640, "height": 480, key: value})
+    assert any(f"has {key}, which was not taken" in note for note in read(text).notes) == is_told
+
+
 def test_one_half_of_a_colmap_model_is_told_which_is_missing(tmp_path):
     (tmp_path / "images.txt").write_text("1 1 0 0 0 1 2 3 1 a.jpg\n\n")
     with pytest.raises(InputError, match=r"images\.txt of a COLMAP model and no cameras\.txt"):

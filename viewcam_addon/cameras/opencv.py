@@ -81,6 +81,10 @@ _HEIGHT = ("imageheight", "height", "h", "resy")
 _SIZE = ("imagesize", "size", "resolution", "imgsize", "imagesizewh")
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tx", "ty")
 """The names of the distortion's coefficients, in OpenCV's order."""
+_WINDOW = ("roi", "binningx", "binningy")
+_MAY_CUT = re.compile(r"crop|binning|roi|resiz|downs(?:ample|cale)")
+"""Beginnings of names of what may have been done to the pictures since."""
+
 _WIDEST = 50  # widths of the picture to a focal length, which are 177.7°
 _UNSAID = f"whose axes it means and which way it goes is not said: give --pose, one of {', '.join(POSES)}"
 _UNREAD = "of which no pose is read: write R and t, world to camera, or a matrix of 4 × 4"
@@ -559,6 +563,11 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     size, stated = _size(values, what, options)
     plane = plane_of_k(_numbers(f"K of {what}", k), size, half_pixel(options), what)
     plane, windowed = of_window(plane, values, what)
+    windowed += tuple(
+        f"{what} has {name}, which was not taken: K counts in a picture of {size[0]} × {size[1]}"
+        for name, value in values.items()
+        if _MAY_CUT.match(name) and name not in _WINDOW and value not in (0, 1, [], {}, "", False)
+    )
     bent = _coefficients(values, what, is_fisheye)
     if "inverse" in str(values.get("model", "")).lower() and any(
         bent.values() if isinstance(bent, dict) else bent
@@ -646,8 +655,13 @@ def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple
     return options.size_or_refuse(what), False
 
 
+def may_be_pose(name: str) -> bool:
+    """True if a plain name may mean a pose in words that nobody knows."""
+    return name not in _NO_POSE and _MAY_BE_POSE.search(name) is not None
+
+
 def _says_pose(values: Mapping[str, Any]) -> bool:
-    return any(is_of_pose(name) or (name not in _NO_POSE and _MAY_BE_POSE.search(name)) for name in values)
+    return any(is_of_pose(name) or may_be_pose(name) for name in values)
 
 
 def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.ndarray, tuple[str, ...]]:
@@ -664,10 +678,14 @@ def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.nd
         return _to_world(matrix, way, what), (_told_of(way), *notes)
     if turn is None and vector is None and translation is None:
         for name, value in values.items():
-            if name not in _NO_POSE and isinstance(value, list | dict) and _MAY_BE_POSE.search(name):
-                raise InputError(
-                    f"{what} has {name}, and {_UNSAID}" if options.pose is None else f"{what} has {name}, {_UNREAD}"
-                )
+            if isinstance(value, list | dict) and may_be_pose(name):
+                if options.pose is None:
+                    raise InputError(f"{what} has {name}, and {_UNSAID}")
+                numbers = _numbers(f"{name} of {what}", value)
+                if len(numbers) not in (12, 16):
+                    raise InputError(f"{what} has {name}, {_UNREAD}")
+                matrix, notes = _four_columns(numbers, f"{name} of {what}")
+                return _to_world(matrix, options.pose, what), (_told_of(options.pose), *notes)
         for names in _POSE_BY_NUMBER:
             if {*names} <= values.keys():
                 raise InputError(f"{what} has {', '.join(names)}, {_UNREAD}")
