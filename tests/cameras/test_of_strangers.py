@@ -1205,6 +1205,24 @@ def test_of_open3ds_cameras_one_with_skew_keeps_none_of_the_others_back():
 
 
 @pytest.mark.parametrize("form", ["calibration", "message"])
+def test_of_cameras_in_a_list_of_yaml_none_is_made_of_two(form):
+    rows = "[500, 0, 320, 0, 500, 240, 0, 0, 1]"
+    left = f"  width: 640\n  height: 480\n  K: {rows}\n"
+    head = "cameras:\n" if form == "message" else ""
+    assert "in a list: leave one out" in refusal(f"{head}- name: a\n{left}- name: b\n{left}  R: {rows}\n  t: [1, 0, 0]\n")
+
+
+def test_a_camera_on_its_body_stands_where_its_file_says():
+    """EuRoC's sensor.yaml and OpenVINS' kalibr_imucam_chain.yaml, whose two cameras stood in one place."""
+    inner = "intrinsics: [500, 500, 320, 240]\n  resolution: [640, 480]\n  camera_model: pinhole\n  distortion_model: none\n"
+    rows = "[1, 0, 0, {}, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1]"
+    chain = "".join(f"cam{i}:\n  T_imu_cam: {rows.format(i)}\n  {inner}" for i in range(2))
+    assert [camera.pinhole.eye for camera in cameras.read(chain)] == [(0, 2, 3), (1, 2, 3)]
+    (camera,) = cameras.read(f"T_BS:\n  rows: 4\n  cols: 4\n  data: {rows.format(9)}\n" + inner.replace("  ", ""))
+    assert camera.pinhole.eye == (9, 2, 3) and camera.pinhole.basis()[2] == pytest.approx((0, 0, -1))
+
+
+@pytest.mark.parametrize("form", ["calibration", "message"])
 def test_of_two_cameras_in_one_yaml_none_is_made(form):
     """The second document's numbers were read into the first one's; a message that was printed twice is one."""
     text = files.ros(form, (1280, 800), (1, 1), (0, 0, 0, 0))

@@ -72,9 +72,10 @@ _OTHER_LENS = re.compile(r"fisheye|omni|mei|u?cm$|kb\d|spherical|ortho|fov|divis
 _MAY_BE_POSE = re.compile(r"pose|extrin|rotation|rot$|transf|transl|2cam|2world|toworld|tocam|w2|c2|rvec|tvec|position|quat")
 _NO_POSE = ("tcamimu", "timushift", "rectificationmatrix", "projectionmatrix", "p")
 _BLENDERS = ("matrixworld",)
+_ON_BODY = ("tbs", "timucam")  # EuRoC's and OpenVINS', of a camera on its body
 _OTHER_POSE = (
     *("pose", "c2w", "cam2world", "camera2world", "cameratoworld", "camtoworld", "twc", "camerapose", "transform"),
-    *("transformmatrix", "tworldcam", "tworldcamera", *_BLENDERS, "quaternion", "q", "qvec"),
+    *("transformmatrix", "tworldcam", "tworldcamera", *_BLENDERS, *_ON_BODY, "quaternion", "q", "qvec"),
 )
 _WIDTH = ("imagewidth", "width", "w", "resx")
 _HEIGHT = ("imageheight", "height", "h", "resy")
@@ -120,7 +121,9 @@ def refuse_twice(source: Source) -> None:
     if source.is_folder or source.npz or source.document or source.text.lstrip().startswith(("<", "[", "{")):
         return
     if twice := [key for key in source.yaml_twice if is_known(plain(key))]:
-        raise InputError(f"{source.name} has the key {checks.quoted(twice[0])} twice, with other values: leave one out")
+        raise InputError(
+            f"{source.name} has the key {checks.quoted(twice[0])} twice, with other values or in a list: leave one out"
+        )
 
 
 def _four_rows(value: Any, name: str) -> np.ndarray:
@@ -671,7 +674,8 @@ def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.nd
     if turn is not None and translation is None and "p" in values:  # ROS: a stereo pair's rectification
         turn = None
     if whole is not None and (whole not in _EXTRINSIC or (turn is None and vector is None)):
-        way = options.pose or ("w2c_opencv" if whole in _EXTRINSIC else "c2w_opengl" if whole in _BLENDERS else None)
+        ways = dict.fromkeys(_EXTRINSIC, "w2c_opencv") | dict.fromkeys(_BLENDERS, "c2w_opengl")
+        way = options.pose or (ways | dict.fromkeys(_ON_BODY, "c2w_opencv")).get(whole)
         if way is None:
             raise InputError(f"{what} has {whole}, and {_UNSAID}")
         matrix, notes = _four_columns(_numbers(f"{whole} of {what}", values[whole]), f"{whole} of {what}")
@@ -682,7 +686,7 @@ def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.nd
                 if options.pose is None:
                     raise InputError(f"{what} has {name}, and {_UNSAID}")
                 numbers = _numbers(f"{name} of {what}", value)
-                if len(numbers) not in (12, 16):
+                if len(numbers) not in (12, 16) or name.startswith("stereo"):  # from one camera to another
                     raise InputError(f"{what} has {name}, {_UNREAD}")
                 matrix, notes = _four_columns(numbers, f"{name} of {what}")
                 return _to_world(matrix, options.pose, what), (_told_of(options.pose), *notes)
