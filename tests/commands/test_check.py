@@ -67,6 +67,17 @@ def test_a_folder_where_a_file_of_the_report_belongs_is_refused_before_anything_
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
+def test_a_scene_that_was_approved_is_not_replaced_by_the_reports_own_before_it_is_read(tmp_path, capfd):
+    """The picture was then compared with what the .blend holds now, and was the same whatever that was."""
+    report = tmp_path / "report"
+    assert main(["export", str(CORNELL), str(report / "scene.json"), "--size", "16x9"]) == 0
+    before = {path.name: path.read_bytes() for path in report.iterdir()}
+    words = ["--size", "16x9", "--scene", str(report / "scene.json"), "--report", f"{report}/../report"]
+    assert main(["check", str(CORNELL), *words]) == 2
+    assert "would be overwritten by the report's own" in capfd.readouterr().err
+    assert {path.name: path.read_bytes() for path in report.iterdir()} == before
+
+
 @pytest.mark.slow
 def test_each_camera_is_a_shot_with_its_report_and_a_junit_case(tmp_path, capfd):
     out, junit, result = tmp_path / "out", tmp_path / "a.xml", tmp_path / "a.json"
