@@ -40,6 +40,7 @@ def check(*words):
         (("--frames", "3..1"), "frames 3..1 run backwards"),
         (("--cameras", "Nobody*"), "no camera is called 'Nobody*'"),
         (("--resume",), "--resume is for many checks"),
+        (("--size", "65536x65536"), "need 448 GiB of memory and there are"),
         (("--workers", "2"), "--workers is for many checks"),
         (("--find", "0.5%"), "--find is of light, and level geometry has none"),
         (("--find", "0.5%", "--level", "path", "--samples", "64"), "leave --samples and --error out"),

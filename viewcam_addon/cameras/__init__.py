@@ -53,7 +53,7 @@ from types import ModuleType
 import numpy as np
 
 from .. import checks, file_names, terminal
-from ..errors import InputError, several
+from ..errors import InputError, bug, is_of_a_path, several
 from ..files import written_whole
 from ..pinhole import Pinhole
 from . import (
@@ -327,6 +327,8 @@ def _told_of_damage(source: Source, title: str) -> Iterator[None]:
             raise
         raise InputError(sentence) from error.__cause__
     except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
+        if is_of_a_path(error):
+            raise InputError(bug(error)) from error
         raise InputError(f"{source.name} is damaged where it says its cameras ({title}): export it again") from error
 
 
