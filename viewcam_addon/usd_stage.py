@@ -13,12 +13,13 @@ Rejected: OpenUSD's resolver, which can't be exchanged from Python; a sandbox of
 
 import contextlib
 import importlib.util
+import math
 import os
 import stat
 import sys
 import time
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -239,6 +240,7 @@ class _Layers:
 
         folder : the layer's folder; None if it is a text.
         """
+        offsets = dict(zip(layer.subLayerPaths, [*layer.subLayerOffsets], strict=True))
         for named in filter(None, layer.GetCompositionAssetDependencies()):  # without a name: the layer itself
             place = self._allowed(named, folder)
             inner = None
@@ -248,6 +250,8 @@ class _Layers:
             if inner is None:
                 self.left_out.append(named)
             layer.UpdateCompositionAssetDependency(named, inner.identifier if inner else "")
+            if inner is not None and named in offsets:  # which a new name sets back
+                layer.subLayerOffsets[[*layer.subLayerPaths].index(inner.identifier)] = offsets[named]
         clipped = []
 
         def look(path: Any) -> None:
@@ -289,7 +293,7 @@ def _unpacked(path: Path, folder: Path) -> Path:
 def _samples(prim: Any, stage: Any, size: str, usd: Any, usd_geom: Any) -> list[dict[str, Any]]:
     camera = usd_geom.Camera(prim)
     attributes = [*_attributes(prim, camera, usd_geom)]
-    times = sorted({time for attribute in attributes for time in attribute.GetTimeSamples()[:_MOST_SAMPLES]}) or [0.0]
+    times = sorted({time for attribute in attributes for time in _times(attribute)}) or [0.0]
     is_moving = len(times) > 1
     result = []
     for moment in times[:_MOST_SAMPLES]:
@@ -308,14 +312,25 @@ def _samples(prim: Any, stage: Any, size: str, usd: Any, usd_geom: Any) -> list[
 
 
 def _attributes(prim: Any, camera: Any, usd_geom: Any) -> Iterator[Any]:
-    """The attributes on which the picture depends: the camera's own, and the transforms of all above it."""
+    """The attributes on which the picture depends: the camera's own, and the transforms of all above it that move it."""
     for name in _LENS[1:-1]:
         yield getattr(camera, f"Get{name}Attr")()
     while prim and not prim.IsPseudoRoot():
         if prim.IsA(usd_geom.Xformable):
             for operation in usd_geom.Xformable(prim).GetOrderedXformOps():
                 yield operation.GetAttr()
+            if usd_geom.Xformable(prim).GetResetXformStack():
+                return
         prim = prim.GetParent()
+
+
+def _times(attribute: Any) -> Sequence[float]:
+    """The times at which an attribute has a sample; of a spline, its knots and all frames between them."""
+    if not (hasattr(attribute, "HasSpline") and attribute.HasSpline()):
+        return attribute.GetTimeSamples()[:_MOST_SAMPLES]
+    knots = [*attribute.GetSpline().GetKnots()][:_MOST_SAMPLES]
+    frames = range(math.ceil(min(knots, default=0.0)), math.ceil(max(knots, default=0.0)))
+    return [*knots, *frames[:_MOST_SAMPLES]]
 
 
 def _plain(value: Any) -> Any:

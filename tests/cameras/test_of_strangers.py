@@ -17,6 +17,7 @@ import pytest
 
 from viewcam_addon import cameras
 from viewcam_addon.cameras import Camera, Options, axes, distortion
+from viewcam_addon.cameras.source import Source
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 
@@ -656,6 +657,27 @@ def test_an_intrinsic_of_open3d_alone_has_its_columns_first():
     assert camera.pinhole.eye == (0, 0, 0) and camera.pinhole.basis()[1] == pytest.approx((0, -1, 0))
 
 
+def test_frames_that_are_kept_apart_for_tests_are_cameras_too():
+    """ScanNet++'s, which the pictures that a method is measured by are of."""
+    frames = [{"file_path": f"DSC{number}.JPG", "transform_matrix": np.eye(4).tolist()} for number in range(3)]
+    document = {"fl_x": 500, "w": 640, "h": 480, "frames": frames[:2], "test_frames": frames[2:]}
+    assert [camera.name for camera in cameras.read(json.dumps(document))] == ["DSC0", "DSC1", "DSC2"]
+
+
+@pytest.mark.parametrize(
+    ("frames", "sentence"),
+    [
+        ([], "holds no camera"),
+        ([{"file_path": "a.png", "w2c": np.eye(4).tolist()}], "frame 0 has no transform_matrix"),
+        ({"left": {"file_path": "a.png"}}, "frame 'left' has no transform_matrix"),
+        ([{"transform_matrix": [[True, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}], "of frame 0 is .*: give numbers, not true"),
+    ],
+)
+def test_what_frames_lack_is_told_of_a_transforms_json(frames, sentence):
+    with pytest.raises(InputError, match=sentence):
+        cameras.read(json.dumps({"fl_x": 500, "w": 640, "h": 480, "frames": frames}))
+
+
 def test_a_bare_list_of_frames_is_read_once_its_distance_and_size_are_said():
     plane = Pinhole((0, 0, 0), (0, 1, 0), (0, 0, 1), 500, 640, 480).plane
     pose = [[1.0, 0.0, 0.0, 2.0], [0.0, 1.0, 0.0, 3.0], [0.0, 0.0, 1.0, 4.0]]
@@ -708,7 +730,15 @@ def test_what_blenders_own_importers_read_is_sent_there(tmp_path, data):
         ("transforms.json", b"<!DOCTYPE html>\n<html>", "is a page of the web: download the file itself"),
         ("a.exr", b"v/1\x01\x02", "is a picture: give the file of its camera"),
         ("a.ply", b"ply\nformat ascii 1.0\n", "is a point cloud or a mesh"),
-        ("scene.ma", b"//Maya ASCII 2025 scene\n", "is a scene of Maya's: export its camera as USD or FBX"),
+        ("scene.ma", b"//Maya ASCII 2025 scene\n", "is a scene of Maya's, which is not read: export its cameras as USD"),
+        ("a.tscn", b'[gd_scene format=3]\n\n[node name="Camera3D"]\nfov = 60.0\n', "is a scene of Godot's, which is not read"),
+        ("a.dae", b'<?xml version="1.0"?>\n<COLLADA version="1.4.1"></COLLADA>', "is a scene of Collada's, which is not read"),
+        ("a.nk", b"Camera2 {\n translate {1 2 3}\n focal 35\n}\n", "is a script of Nuke's, which is not read"),
+        ("a.ass", b"persp_camera\n{\n name cam\n fov 54.4\n}\n", "is a scene of Arnold's, which is not read"),
+        ("a.scn", b"scene.camera.lookat.orig = 1 2 3\nscene.camera.lookat.target = 0 0 0\n", "is a scene of LuxCore's"),
+        ("a.xml", b"<cycles>\n<transform><camera type='perspective'/></transform>\n</cycles>", "is a scene of Cycles' own"),
+        ("a.x3d", b"<X3D><Scene><Viewpoint position='0 0 9'/></Scene></X3D>", "is a scene of X3D or VRML"),
+        ("a.t3d", b"Begin Map\n Begin Level\n", "is a part of a level of Unreal's"),
         ("database.db", b"SQLite format 3\0", "is a database, as COLMAP's, which has no poses"),
         ("poses.pkl", b"\x80\x04\x95", "is a pickle, which may run programs"),
         ("a.json", b" \n", "is empty"),
@@ -718,6 +748,56 @@ def test_a_file_of_another_kind_is_called_by_it_and_not_by_a_list_of_all_formats
     (tmp_path / name).write_bytes(data)
     with pytest.raises(InputError, match=f"{name} {sentence}"):
         cameras.read(tmp_path / name)
+
+
+@pytest.mark.parametrize("place", ["sparse/1", "dense/0/sparse", "nerf"])
+def test_a_folder_without_cameras_says_in_which_of_its_folders_they_are(tmp_path, place):
+    (tmp_path / place).mkdir(parents=True)
+    (tmp_path / "images" / "left").mkdir(parents=True)
+    with pytest.raises(InputError, match="is no camera that is understood"):
+        cameras.read(tmp_path)
+    (tmp_path / place / ("transforms.json" if place == "nerf" else "images.txt")).write_text("")
+    with pytest.raises(InputError, match=f"has no cameras itself: give {place} in it"):
+        cameras.read(tmp_path)
+
+
+def test_k_in_a_matrix_of_four_columns_is_k_where_these_add_nothing():
+    for more, is_read in ((0, True), (-50, False)):
+        for rows in (
+            [[500, 0, 320, more], [0, 500, 240, 0], [0, 0, 1, 0]],
+            [[500, 0, 320, 0], [0, 500, 240, more], [0, 0, 1, 0]],
+        ):
+            for last in ([], [[0, 0, 0, 1]]):
+                text = json.dumps({"intrinsic": rows + last, "width": 640, "height": 480})
+                if is_read:
+                    assert read(text).pinhole.distance == (500, 500)
+                    continue
+                with pytest.raises(InputError, match="more than K in its fourth"):
+                    read(text)
+
+
+def test_sections_in_brackets_are_no_damaged_json(tmp_path):
+    """ZED's calibration, and whatever else is INI."""
+    left = "[LEFT_CAM_HD]\nfx=700\nfy=700\ncx=640\ncy=360\n"
+    (tmp_path / "SN1.conf").write_text(left)
+    assert cameras.read(tmp_path / "SN1.conf", options=Options(size=(1280, 720)))[0].pinhole.distance == (700, 700)
+    (tmp_path / "SN1.conf").write_text(left + left.replace("700", "710"))
+    with pytest.raises(InputError, match="fx is something else before, copy one camera"):
+        cameras.read(tmp_path / "SN1.conf")
+
+
+@pytest.mark.parametrize("k", ["K = [[500, 0, 320], [0, 500, 240], [0, 0, 1]]", "fx = fy = 500\nfy = 500\ncx, cy = 320, 240"])
+def test_coefficients_that_code_says_one_by_one_are_a_lens(k):
+    bent = read(f"{k}\nk1 = -0.17\nk2 = 0.02\n")
+    assert bent.lens == distortion.opencv({"k1": -0.17, "k2": 0.02}), bent.notes
+    assert read(f"{k}\nk1, k2 = -0.17, 0.02\ndist = np.array([k1, k2, 0, 0])\n").lens == bent.lens
+    assert read(f"{k}\nk1 = [1, 2, 3]\n").lens is None
+
+
+def test_one_half_of_a_colmap_model_is_told_which_is_missing(tmp_path):
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 1 2 3 1 a.jpg\n\n")
+    with pytest.raises(InputError, match=r"images\.txt of a COLMAP model and no cameras\.txt"):
+        cameras.read(tmp_path)
 
 
 def test_a_pointer_of_git_lfs_says_how_to_get_the_file():
@@ -1347,3 +1427,27 @@ def test_a_node_of_gltf_with_two_poses_is_refused_where_they_differ():
             assert np.allclose(read(json.dumps(document)).pinhole.eye, CAMERAS["rolled"].eye)
         else:
             assert "has a matrix, and another as translation" in refusal(json.dumps(document))
+
+
+def test_a_picture_as_far_across_as_up_that_is_no_square_is_told():
+    for sides, is_told in (((0.7, 0.7), True), ((0.7, 0.4), False)):
+        angles = dict(zip(("camera_angle_x", "camera_angle_y"), sides, strict=True))
+        document = {**angles, "w": 1920, "h": 1080, "frames": [{"transform_matrix": np.eye(4).tolist()}]}
+        (camera,) = cameras.read(json.dumps(document))
+        assert any("1.78 times as high as wide" in note for note in camera.notes) == is_told, camera.notes
+
+
+def test_cameras_in_geocentric_coordinates_are_told():
+    for x, is_told in ((3_781_700, True), (378_170, False)):
+        pose = [[1, 0, 0, x], [0, 1, 0, 900_000], [0, 0, 1, 5_040_000]]
+        document = {"fl_x": 500, "w": 640, "h": 480, "frames": [{"transform_matrix": pose}]}
+        (camera,) = cameras.read(json.dumps(document))
+        assert any("in geocentric coordinates" in note for note in camera.notes) == is_told, camera.notes
+
+
+def test_a_lens_of_another_model_is_doubted_where_it_leads_far_out_of_the_picture():
+    pinhole = "1 {} 640 480 500 500 320 240\n"  # as many numbers as SIMPLE_RADIAL has, and others
+    for model, is_told in (("SIMPLE_RADIAL", True), ("PINHOLE", False)):
+        files = {"cameras.txt": pinhole.format(model), "images.txt": "1 1 0 0 0 0 0 0 1 a.jpg\n\n"}
+        notes = cameras.FORMATS["colmap"].read(Source(files), Options())[0].notes
+        assert any("which may be of another model" in note for note in notes) == is_told, notes

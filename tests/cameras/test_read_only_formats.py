@@ -367,6 +367,35 @@ def test_a_head_that_says_w_first_is_believed():
     the_same(cameras.read(text, options=Options(base=CAMERAS["plain"])), known)
 
 
+@pytest.mark.parametrize("first", ["timestamp tx ty tz qw qx qy qz", "time,x,y,z,q_w,q_x,q_y,q_z", "# t x y z qw qx qy qz"])
+def test_a_head_of_a_trajectory_may_stand_without_a_sign_and_part_its_columns_by_commas(first):
+    known = Known("plain")
+    x, y, z, w = known.quaternion()
+    line = f"12.5 {text_of(known.e)} {text_of([w, x, y, z])}\n"
+    text = f"{first}\n{line.replace(' ', ',') if ',' in first else line}"
+    assert the_same(cameras.read(text, options=Options(base=CAMERAS["plain"])), known).time == 12.5
+
+
+def test_times_of_a_trajectory_that_are_nanoseconds_are_seconds_of_our_age():
+    """ORB-SLAM3's of EuRoC's pictures, which are called by these."""
+    text = "1403636579758555392.000000 1 2 3 0 0 0 1\n1403636580758555392.000000 1 2 3 0 0 0 1\n"
+    first, second = (camera.time for camera in cameras.read(text, options=Options(base=CAMERAS["plain"])))
+    assert second - first == pytest.approx(1, abs=1e-6) and first == pytest.approx(1403636579.758555392), (first, second)
+
+
+def test_poses_of_kitti_360_have_a_frame_before_them(tmp_path):
+    known = Known("plain")
+    rows = [*np.column_stack([known.opencv.T, known.e]).ravel().tolist(), 0, 0, 0, 1]
+    (tmp_path / "cam0_to_world.txt").write_text(f"4 {text_of(rows)} \n")
+    read = the_same(cameras.read(tmp_path / "cam0_to_world.txt", options=Options(base=CAMERAS["plain"])), known)
+    assert read.time == pytest.approx(0.4)
+
+
+def test_places_and_quaternions_alone_are_told_what_they_lack():
+    with pytest.raises(InputError, match="whose axes and times it does not say: write t tx ty tz qx qy qz qw"):
+        cameras.read("1 2 3 0 0 0 1\n1.1 2 3 0 0 0.6 0.8\n", options=Options(base=CAMERAS["plain"]))
+
+
 def test_what_was_tracked_stands_on_euroc_s_body_as_its_own_sensor_says(tmp_path):
     known = Known("plain")
     plane = ViewPlane(known.pinhole.distance, known.pinhole.principal_point, known.width, known.height)
@@ -936,6 +965,17 @@ def test_a_window_of_a_sensor_sees_what_the_sensor_sees_there(form, size, binnin
     assert np.abs(np.column_stack([column, wanted[1] - row]) - there).max() < 1e-9
     is_noted = any("window of its sensor" in note for note in camera.notes)
     assert is_noted == ((across, down, *roi) != (1, 1, 0, 0, 0, 0))
+
+
+@pytest.mark.parametrize("form", ["message", "calibration", "flow"])
+def test_the_place_in_its_pair_of_a_camera_that_has_no_pose_is_told(form):
+    for offset, is_told in ((-49.26, True), (0.0, False)):
+        p = [410.5, 0, 633.25, offset, 0, 410.5, 372.75, 0, 0, 0, 1, 0]
+        key = f"P: {p}" if form == "message" else f"projection_matrix: {{rows: 3, cols: 4, data: {p}}}"
+        turn = ["R: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]"] if form == "message" else []
+        text = "\n".join([ros(form, (1280, 800), (0, 0), (0, 0, 0, 0)), *turn, key, ""])
+        (camera,) = cameras.read(text, options=Options(size=(1280, 800)))
+        assert any("stands 0.12 right and 0 down" in note for note in camera.notes) == is_told, camera.notes
 
 
 def test_yaml_in_brackets_is_read_as_pyyaml_reads_it():

@@ -532,6 +532,12 @@ def test_an_identity_and_zeros_are_numbers_too(pose):
     assert read.pinhole.eye == (0, 0, 0) and read.pinhole.axes()[1] == (0, -1, 0)
 
 
+def test_a_size_that_is_computed_is_told_where_the_one_given_counts():
+    for size, is_told in (("(w, h)", True), ("[640, 480]", False)):
+        (read,) = cameras.read(f"K = np.array({K.tolist()})\nsize = {size}\n", options=Options(size=(640, 480)))
+        assert any("size is computed" in note for note in read.notes) == is_told, read.notes
+
+
 def test_the_size_is_the_texts_own():
     (read,) = cameras.read(f"K = np.array({K.tolist()})\nh, w = 480, 640\n")
     assert read.size_stated and (read.pinhole.width, read.pinhole.height) == (640, 480)

@@ -7,6 +7,7 @@ Code for VTK and for textbook ray tracers: read back it is the same camera, and 
 
 import ast
 import dataclasses
+import json
 import math
 import re
 
@@ -736,10 +737,18 @@ def test_vtks_window_center_and_horizontal_angle_are_its_formulas():
         (CODE["weekend_4"] + "cam.lookfrom = orbit(frame);", "eye in plain"),
         (CODE["glm"] + "view = glm::rotate(view, 0.5f, glm::vec3(0, 1, 0));", "moves the view by other means"),
         (
+            CODE["glm"].replace("glm::lookAt(", "glm::rotate(one, 0.5f, glm::vec3(0, 1, 0)) * glm::lookAt("),
+            "more turns or moves",
+        ),
+        (CODE["glm"].replace("glm::lookAt(", "glm::translate(glm::lookAt("), "more turns or moves"),
+        ("glm::lookAt(eye(1,2,3), at(0,0,0), up(0,1,0))*glm::rotate(one, 1.f, up); glm::perspective(1.f, 1.f)", "more turns"),
+        (
             "glTranslatef(0, 0, -3); gluLookAt(1,2,3, 0,0,0, 0,1,0); gluPerspective(40, 1, 1, 9)",
             "moves the view by other means",
         ),
         (CODE["three.js"] + "camera.rotation.x = 1;", "by other means"),
+        (CODE["three.js"] + "camera.scale.x = -1;", "by other means"),
+        (CODE["three.js"] + "camera.scale.set(1, 2, 1);", "by other means"),
         (CODE["three.js"] + "camera.position.applyAxisAngle(axis, 2);", "by other means"),
         (CODE["three.js"] + "camera.position.z += 2;", "moves the camera"),
         (CODE["weekend_4"] + "cam.lookfrom = point3(1, 2, 3);", "something else in line"),
@@ -826,8 +835,6 @@ def test_unreals_quaternion_turns_its_forward_to_the_view():
 
 
 def test_unitys_matrices_show_its_left_handed_world_as_the_pinhole_shows_ours():
-    import json
-
     pinhole = CAMERAS["shifted_and_not_square"]
     (record,) = json.loads(cameras.write([of("shifted_and_not_square")], "unity"))["cameras"]
     points = points_before(pinhole)
@@ -952,17 +959,24 @@ def test_any_camera_comes_back(eye, view, size, d, shift):
     same(read.pinhole, shifted, exact=False)
 
 
-def test_unreals_quaternions_go_on_from_row_to_row():
+@pytest.mark.parametrize("form", ["unreal", "unity"])
+def test_quaternions_of_a_path_go_on_from_camera_to_camera(form):
     """A pan and a dive all around: with a sign that jumps, whatever goes from one row to the next spins."""
     rotation = pytest.importorskip("scipy.spatial.transform").Rotation
     eyes = [(5 * math.cos(a), 5 * math.sin(a), 3 * math.sin(2 * a)) for a in np.linspace(0, 4 * math.pi, 73)]
     written_cameras = [
         Camera(f"{number}", Pinhole(eye, (0, 0, 0.2), (0, 0, 1), 500, 640, 360)) for number, eye in enumerate(eyes)
     ]
-    rows = [line.split(",") for line in cameras.write(written_cameras, "unreal").splitlines()[1:]]
-    turns = np.array([[float(part) for part in row[4:8]] for row in rows])
+
+    def turns_of(path):
+        text = cameras.write(path, form)
+        if form == "unity":
+            return np.array([record["rotation"] for record in json.loads(text)["cameras"]])
+        return np.array([[float(part) for part in line.split(",")[4:8]] for line in text.splitlines()[1:]])
+
+    turns = turns_of(written_cameras)
     assert (turns[1:] * turns[:-1]).sum(axis=1).min() > 0.9
-    forward = rotation.from_quat(turns).apply([1, 0, 0])
-    assert np.abs(forward * [1, -1, 1] + np.array([camera.pinhole.axes()[2] for camera in written_cameras])).max() < 1e-12
-    alone = cameras.write(written_cameras[:1], "unreal").splitlines()[1].split(",")
-    assert float(alone[7]) >= 0
+    forward, flip = {"unreal": ([1, 0, 0], [1, -1, 1]), "unity": ([0, 0, 1], [1, 1, -1])}[form]
+    forward = rotation.from_quat(turns).apply(forward)
+    assert np.abs(forward * flip + np.array([camera.pinhole.axes()[2] for camera in written_cameras])).max() < 1e-12
+    assert turns_of(written_cameras[:1])[0, 3] >= 0

@@ -246,6 +246,34 @@ def test_a_time_of_a_camera_that_moves_is_what_the_stage_counts_by():
     assert all(math.isfinite(camera.pinhole.distance[0]) for camera in reread)
 
 
+@pytest.mark.usefixtures("openusd_in_this_process")
+def test_a_lens_that_a_spline_moves_is_read_at_its_knots_and_all_frames_between():
+    spline = "float focalLength.spline = { 1: 18; post linear, 5.5: 36; post linear }"
+    reread = read(stage().replace("float focalLength = 35", spline))
+    focals = {camera.time * 24: camera.pinhole.distance[0] * 36 / 640 for camera in reread}
+    assert focals == pytest.approx({time: 14 + 4 * time for time in (1, 2, 3, 4, 5, 5.5)}), focals
+
+
+@pytest.mark.usefixtures("openusd_in_this_process")
+def test_what_moves_above_a_camera_that_stands_in_the_world_makes_no_times_of_it():
+    head, _, still = stage().partition("def Camera")
+    moving = "double3 xformOp:translate.timeSamples = { 0: (0, 0, 5), 50: (3, 0, 5) }"
+    order = 'uniform token[] xformOpOrder = ["xformOp:translate"]'
+    still = still.replace('["', '["!resetXformStack!", "')
+    reread = read(f'{head}def Xform "Dolly"\n{{\n{moving}\n{order}\ndef Camera{still}}}\n')
+    assert [(camera.name, camera.pinhole.eye) for camera in reread] == [("Cam", (3, -1.5, -4.5))]
+
+
+@pytest.mark.usefixtures("openusd_in_this_process")
+def test_a_sublayers_times_are_where_its_offset_and_scale_put_them(tmp_path):
+    moving = "double3 xformOp:translate.timeSamples = { 0: (0, 0, 5), 50: (3, 0, 5) }"
+    (tmp_path / "shot.usda").write_text(stage().replace("double3 xformOp:translate = (3, -1.5, -4.5)", moving))
+    layers = "subLayers = [@gone.usda@ (offset = 5), @shot.usda@ (offset = 100; scale = 2)]"
+    (tmp_path / "all.usda").write_text(f'#usda 1.0\n(\n metersPerUnit = 1\n upAxis = "Z"\n {layers}\n)\n')
+    reread = cameras.read(tmp_path / "all.usda", options=GIVEN)
+    assert [(camera.name, camera.pinhole.eye) for camera in reread] == [("Cam 100", (0, 0, 5)), ("Cam 200", (3, 0, 5))]
+
+
 def test_where_openusd_is_not_here_a_sentence_says_what_to_do(monkeypatch):
     monkeypatch.setattr(usd_stage.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(InputError, match="pip install usd-core"):

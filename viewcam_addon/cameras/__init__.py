@@ -43,6 +43,7 @@ stand first, and what takes any text last.
 
 import contextlib
 import itertools
+import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -203,6 +204,11 @@ _JSON = (".json", ".gltf", ".sfm")
 _CODE = ("text", "blender_python", "vtk", "textbook", "mitsuba", "pov_ray", "pbrt", "matrices", "look_at", "arrays")
 """The formats that a damaged JSON file may look like."""
 _MOST_LOOKED_AT = 100
+_DEEPEST = 3
+_FILES_OF_DATA_SETS = (transforms.FILE, "images.bin", "images.txt")
+_HEAD = 4000  # characters by which a text is known
+_ON_EARTH = 6.33e6, 6.42e6  # meters from the Earth's middle, as far down and up as anybody takes pictures
+_SAME_SHAPE = 1e-3  # relative: what the angles of both sides may differ by for the few digits of one
 _REMEMBERED = re.compile(rf"{own.KEY}: (axes=\w+ scale=[\d.e+-]+)")
 
 
@@ -312,7 +318,7 @@ def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
     cameras = _to_the_bit(cameras, [pinhole for text in notes for pinhole in own.pinholes_in(text)], module, options)
     world = module.in_world(source, options) if hasattr(module, "in_world") else options
     noted = _told_of_world(notes, world)
-    noted += _told_of_size(cameras, source)
+    noted += _told_of_size(cameras, source) + _told_of_globe(cameras)
     result = [_readable(_doubted(_unmirrored(moved(camera, world), options))) for camera in cameras]
     return [camera.noted(*noted) for camera in result] if noted else result
 
@@ -342,7 +348,9 @@ _OTHER_FILES = {
     **dict.fromkeys((b"\x89PNG", b"\xff\xd8\xff", b"v/1\x01", b"II*\0", b"MM\0*", b"RIFF"), _A_PICTURE),
     **dict.fromkeys((b"<!DOCTYPE html", b"<!doctype html", b"<html"), _A_PAGE),
     **dict.fromkeys((b"ply\n", b"ply\r"), "is a point cloud or a mesh, which has no cameras: give the file of these"),
-    **dict.fromkeys((b"//Maya ASCII", b"FOR4", b"FOR8"), "is a scene of Maya's: export its camera as USD or FBX"),
+    **dict.fromkeys((b"FOR4", b"FOR8"), "is a scene of Maya's: export its camera as USD or FBX"),
+    b"QC4DC4D": "is a scene of Cinema 4D's: export its camera as USD or FBX",
+    b"\xd0\xcf\x11\xe0": "is a document, or a scene of 3ds Max's: export its camera as USD or FBX",
     b"SQLite format 3": "is a database, as COLMAP's, which has no poses: give the model, as the folder sparse/0",
     **dict.fromkeys(
         (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"), "is a pickle, which may run programs: save JSON or NPZ"
@@ -352,12 +360,41 @@ _OTHER_FILES = {
 """The first bytes of files that hold no camera that is read here, and what is to be said of them."""
 
 
+_OTHER_TEXTS = {
+    re.compile(r"^//Maya ASCII|^requires maya |^createNode camera ", re.MULTILINE): "a scene of Maya's",
+    re.compile(r"^\[gd_scene |^\[node name=", re.MULTILINE): "a scene of Godot's",
+    re.compile(r"<COLLADA\b", re.MULTILINE): "a scene of Collada's",
+    re.compile(r"^#! ?\S{0,200}[Nn]uke|^Camera[234]? \{$", re.MULTILINE): "a script of Nuke's",
+    re.compile(r"^ ?persp_camera$", re.MULTILINE): "a scene of Arnold's",
+    re.compile(r"^##RenderMan RIB|^ ?Projection \"perspective\"", re.MULTILINE): "a scene of RenderMan's",
+    re.compile(r"^scene\.camera\.", re.MULTILINE): "a scene of LuxCore's",
+    re.compile(r"^%TAG !u! tag:unity3d", re.MULTILINE): "a scene of Unity's",
+    re.compile(r"^ ?RenderView \w{1,60} ?\{", re.MULTILINE): "a scene of V-Ray's",
+    re.compile(r"^#VRML |<X3D\b", re.MULTILINE): "a scene of X3D or VRML",
+    re.compile(r"<cycles>", re.MULTILINE): "a scene of Cycles' own",
+    re.compile(r"<project format_revision=", re.MULTILINE): "a scene of Appleseed's",
+    re.compile(r"\"autoClear\":|new BABYLON\.", re.MULTILINE): "a scene of Babylon's",
+    re.compile(r"^Begin (?:Map|Actor|Object)\b", re.MULTILINE): "a part of a level of Unreal's",
+    re.compile(r"^(?:name|id),tx,ty,tz,qx,qy,qz,qw\b", re.MULTILINE): "a table of poses of Unreal's",
+}
+"""The first lines of texts of other programs that are not read, with one blank for several, and what these are."""
+
+
+def _refuse_others(source: Source) -> None:
+    """Raise InputError if it is a text of a program whose cameras are not read."""
+    head = re.sub(r"[ \t]+", " ", source.text[:_HEAD])
+    for pattern, kind in _OTHER_TEXTS.items():
+        if pattern.search(head):
+            raise InputError(f"{source.name} is {kind}, which is not read: export its cameras as USD, glTF or FBX")
+
+
 def recognized(source: str | Path | Source) -> str:
     """The name of the format. Raises InputError if it is none that can be read."""
     source = source if isinstance(source, Source) else Source(source)
     if source.path is None and not source.text.strip():
         raise InputError("there is no text: copy a camera first")
     is_json = source.path is not None and source.path.suffix.lower() in _JSON
+    _refuse_others(source)
     for name in readable():
         with _told_of_damage(source, FORMATS[name].TITLE):
             if _recognizes(FORMATS[name], source):
@@ -378,6 +415,14 @@ def recognized(source: str | Path | Source) -> str:
     for file in (source, *itertools.islice(source.files("*.[jx]*[nlp]"), _MOST_LOOKED_AT)):
         if file.problem:
             raise InputError(f"{file.name} {file.problem}")
+    for there, lacks in itertools.permutations(colmap.FILES):
+        for suffix in (".bin", ".txt"):
+            if source.is_folder and source.file(f"{there}{suffix}"):
+                raise InputError(
+                    f"{source.name} has {there}{suffix} of a COLMAP model and no {lacks}{suffix}: put it there, too"
+                )
+    if source.is_folder and source.path and (folders := _data_sets_in(source.path)):
+        raise InputError(f"{source.name} has no cameras itself: give {several(folders)} in it")
     if source.path is None:
         place = checks.quoted(source.text.strip()[:40])
         raise InputError(
@@ -385,6 +430,17 @@ def recognized(source: str | Path | Source) -> str:
             "eye=1,2,3 look_at=0,0,0 up=0,0,1 d=1000"
         )
     raise InputError(f"{source.name} is no camera that is understood: give a file of {', '.join(readable())}")
+
+
+def _data_sets_in(folder: Path) -> list[str]:
+    """The folders in a folder, to three deep, that have cameras by the names of their files."""
+    folders, level = list[Path](), [folder]
+    for _ in range(_DEEPEST):
+        with contextlib.suppress(OSError):
+            level = [Path(each) for parent in level for each in os.scandir(parent) if each.is_dir(follow_symlinks=False)]
+        level = sorted(level)[:_MOST_LOOKED_AT]
+        folders += [each for each in level if any((each / name).is_file() for name in _FILES_OF_DATA_SETS)]
+    return [each.relative_to(folder).as_posix() for each in folders]
 
 
 def write(cameras: Iterable[Camera], format: str, options: Options | None = None) -> str | dict[str, str | bytes]:
@@ -490,15 +546,33 @@ def _told_of_size(cameras: Sequence[Camera], source: Source) -> tuple[str, ...]:
     return (f"{file} has {pixels} pixels and its camera {of_camera}, which counts",)
 
 
+def _told_of_globe(cameras: Sequence[Camera]) -> tuple[str, ...]:
+    """A note where a camera is as far from the origin as what stands on the Earth is from its middle."""
+    if not any(_ON_EARTH[0] < math.hypot(*camera.pinhole.eye) < _ON_EARTH[1] for camera in cameras):
+        return ()
+    return (
+        "The cameras are as far from the origin as the Earth's surface from its middle: in geocentric coordinates z is not up, "
+        "and float32 keeps half a meter; export it in local coordinates",
+    )
+
+
 def _doubted(camera: Camera) -> Camera:
-    """The camera, with a note where its size can't well be that of the picture that its principal point is in."""
-    (c_x, c_y), pinhole = camera.pinhole.principal_point, camera.pinhole
-    if 0 <= c_x <= pinhole.width and 0 <= c_y <= pinhole.height:
-        if max(min(c_x, pinhole.width - c_x), min(c_y, pinhole.height - c_y)) > 0.5:
-            return camera
-        return camera.noted(f"The principal point of {camera.name} lies in a corner of its picture: is it known?")
-    size = f"{pinhole.width} × {pinhole.height}"
-    return camera.noted(f"The principal point of {camera.name} lies outside of a picture of {size} pixels: is that its size?")
+    """The camera, with notes where its principal point, size and pixels can't well be those of one picture."""
+    (c_x, c_y), (d_x, d_y), pinhole = camera.pinhole.principal_point, camera.pinhole.distance, camera.pinhole
+    shape, size = pinhole.width / pinhole.height, f"{pinhole.width} × {pinhole.height}"
+    if abs(d_x / d_y / shape - 1) < _SAME_SHAPE < abs(d_x / d_y - 1) / 10:
+        words = "high as wide" if shape > 1 else "wide as high"
+        camera = camera.noted(
+            f"{camera.name} sees as far across as up in a picture of {size} pixels, which are then "
+            f"{max(shape, 1 / shape):.3g} times as {words}: are they?"
+        )
+    if not (0 <= c_x <= pinhole.width and 0 <= c_y <= pinhole.height):
+        return camera.noted(
+            f"The principal point of {camera.name} lies outside of a picture of {size} pixels: is that its size?"
+        )
+    if max(min(c_x, pinhole.width - c_x), min(c_y, pinhole.height - c_y)) > 0.5:
+        return camera
+    return camera.noted(f"The principal point of {camera.name} lies in a corner of its picture: is it known?")
 
 
 def _readable(camera: Camera) -> Camera:

@@ -52,6 +52,7 @@ _UNPACKED = re.compile(r"\s*(?:[A-Za-z_]\w{0,40}\s*,\s*)+")
 _TEMPLATE = re.compile(r"\s*<[\w\s,:]{0,60}>")
 _ORDER = re.compile(r"byrow\s*=\s*(?:TRUE|T)\b")
 _SCALARS = ("fx", "fy", "cx", "cy")
+_TERMS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")
 _DIAGONAL = re.compile(r"\(\s*[1-4]\s*\)")
 # The words of consoles around the numbers of a matrix; and a text of numbers alone.
 _PRINTED_AROUND = re.compile(
@@ -116,7 +117,11 @@ def read(source: Source, options: Options) -> list[Camera]:
     for key in values.keys() - known.keys():
         if not opencv.is_size(key) and not (is_posed and opencv.is_of_pose(key)):
             raise InputError(f"{values[key].name} is computed from what the text does not say: write its numbers")
-    return [opencv.camera("Camera", known, options)]
+    camera = opencv.camera("Camera", known, options)
+    unread = [] if camera.size_stated else [value.name for key, value in values.items() if key not in known]
+    return [
+        camera.noted(*(f"{name} is computed from what the text does not say: the size is the one given" for name in unread))
+    ]
 
 
 def _of_toolbox(text: str) -> dict[str, dict[str, Any]]:
@@ -255,7 +260,7 @@ class _Code:
         result: dict[str, Any] = {}
         for name, places in list(self._assigned.items())[:_MOST_ARRAYS]:
             key = opencv.plain(name)
-            if not opencv.is_known(key) and key not in _SCALARS:
+            if not opencv.is_known(key) and key not in (*_SCALARS, *_TERMS):
                 continue
             filled = [place for place in places if self.text[place - 2 : place] == "<<"]  # whatever it was made as
             for place in (filled or places)[:20]:
@@ -265,14 +270,15 @@ class _Code:
                     value = _Unknown(name)
                 if key in _SCALARS or opencv.is_size(key):
                     value = value if isinstance(value, float | list) else _Unknown(name)
-                elif not isinstance(value, list | _Unknown):
+                elif not isinstance(value, float if key in _TERMS else list | _Unknown):  # K1 of a pair is no k1
                     continue
                 if key == "t" and isinstance(value, list) and len(_flat(value)) in (12, 16):
                     key = "transform"
                 if key in result and result[key] != value:
                     texts.fail(self.text, place, f"{name} is something else before, copy one camera")
                 result[key] = value
-        return result
+        is_listed = any(map(opencv.is_distortion, result))  # a list of what stands one by one, too
+        return {key: value for key, value in result.items() if not (is_listed and key in _TERMS)}
 
     # ---- one array
 

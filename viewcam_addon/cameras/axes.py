@@ -30,6 +30,7 @@ from .camera import Camera, Options
 
 Rows = list[list[float]]
 Quaternion = tuple[float, float, float, float]
+UNTURNED: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 # By Options.axes: the turn of a point out of a file, and back into it.
 _TURNS: dict[str, tuple[Callable[[Triple], Triple] | None, Callable[[Triple], Triple] | None]] = {
@@ -259,6 +260,13 @@ def _turn(w: Any, x: Any, y: Any, z: Any) -> tuple:
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
         (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
+
+
+def continued(quaternion: Quaternion, before: Quaternion) -> Quaternion:
+    """The one of a rotation's two quaternions that is nearer to the one before: else what goes from one to the next spins."""
+    opposed = sum(a * b for a, b in zip(quaternion, before, strict=True)) < 0
+    a, b, c, d = quaternion
+    return (0.0 - a, 0.0 - b, 0.0 - c, 0.0 - d) if opposed else quaternion
 
 
 def quaternion(rotation: Sequence[Sequence[float]]) -> Quaternion:

@@ -68,7 +68,7 @@ MODELS: dict[str, tuple[int, tuple[str, ...]]] = {
 """Name → its number in binary files, and its parameters."""
 
 _STRAIGHT = ("f", "fx", "fy", "cx", "cy")
-_FILES = ("cameras", "images")
+FILES = ("cameras", "images")
 _RIGS = ("rigs", "frames")
 _SENSORS = {"CAMERA": 0, "IMU": 1}
 _AS_THE_RIG = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # the pose in it of a rig's first sensor
@@ -167,7 +167,7 @@ def _poses(images: Sequence[_Image], planes: dict) -> list[tuple[Pinhole, tuple[
 
 def notes_in(source: Source) -> list[str]:
     folder, suffix = cast(_Model, model(source))
-    file = source.file(*folder, NOTES if suffix == ".bin" else f"{_FILES[1]}{suffix}")
+    file = source.file(*folder, NOTES if suffix == ".bin" else f"{FILES[1]}{suffix}")
     return [file.text] if file else []
 
 
@@ -175,7 +175,7 @@ def model(source: Source) -> _Model | None:
     """The place of the model in a folder, part by part, and the suffix of its files; None if there is none."""
     if not source.is_folder:
         path = source.path
-        if path is None or path.stem not in (*_FILES, *_RIGS, "points3D") or path.suffix not in (".txt", ".bin"):
+        if path is None or path.stem not in (*FILES, *_RIGS, "points3D") or path.suffix not in (".txt", ".bin"):
             return None
         return ((), path.suffix) if _files(source, (), path.suffix) else None
     for folder in _FOLDERS:
@@ -191,7 +191,7 @@ def model(source: Source) -> _Model | None:
     return None
 
 
-def _files(source: Source, folder: Sequence[str], suffix: str, names: Sequence[str] = _FILES) -> list[Source]:
+def _files(source: Source, folder: Sequence[str], suffix: str, names: Sequence[str] = FILES) -> list[Source]:
     """The files of cameras and images; none if one is not there."""
     files = [file for name in names if (file := source.file(*folder, f"{name}{suffix}")) is not None]
     return files if len(files) == len(names) else []

@@ -295,6 +295,8 @@ def settle(lens: Lens, plane: ViewPlane, what: str, left_out: bool) -> tuple[Len
     sentence = f"The lens distortion of {what} ({_listed(lens)})"
     if left_out or pixels < _UNSEEN:
         return None, (f"{sentence} was left out: it {_moves(pixels)}",)
+    if lens.projection == "pinhole" and pixels > math.hypot(plane.width, plane.height):
+        sentence += ", which may be of another model,"
     return lens, (f"{sentence} {_moves(pixels)}: the camera is the pinhole of the undistorted picture",)
 
 

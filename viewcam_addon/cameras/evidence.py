@@ -16,7 +16,7 @@ import numpy as np
 from .. import checks, npy
 from ..errors import InputError
 from ..files import read_bytes
-from . import clouds, colmap
+from . import clouds, colmap, transforms
 from .audit import Depths, Tracks
 from .camera import Camera
 from .source import Record, Source
@@ -98,7 +98,7 @@ def depths(path: Path, cameras: Sequence[Camera]) -> Depths | None:
     if source is None or source.path is None:
         return None
     document = source.document
-    frames = document.get("frames")
+    frames = transforms.listed(document)
     if not isinstance(frames, list) or len(frames) != len(cameras):
         return None
     key = next((key for key in _DEPTH_KEYS if all(isinstance(frame, dict) and key in frame for frame in frames)), None)

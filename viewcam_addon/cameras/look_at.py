@@ -31,6 +31,7 @@ quickstart guide; PyTorch3D's renderer/cameras.py (degrees of the picture's shor
 whose pole is y). Rejected: running the code.
 """
 
+import bisect
 import functools
 import math
 import re
@@ -60,6 +61,7 @@ _WINDOW = re.compile(r"renderer|ren\w{0,3}win|renderwindow")
 _MOST_CHARACTERS = 2**23
 _LIBRARIES = {"np", "numpy", "jnp", "torch", "Mat"}
 _MOST_STATEMENTS = 2_000
+_MOST_WORDS = 400  # between brackets that turn a view
 _IS_CODE = re.compile(r"\w\s*\(\s*[-\w.]|;\s*$|\w\.\w+\s*[=(]", re.MULTILINE)
 _CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
 _NAMED_CAMERA = re.compile(r"cam", re.IGNORECASE)
@@ -139,11 +141,12 @@ _OTHER_CONTROLS = {"FirstPersonControls", "DeviceOrientationControls"}
 _PLACES = {"position", "up", "direction"}
 # Functions that turn or move a view that a look-at made: glm::rotate(view, …), mat4.rotateY(view, view, …).
 _VIEW_MOVED = re.compile(r"(?:rotate|translate|scale)\w{0,3}", re.IGNORECASE)
+_MOVED_BEHIND = re.compile(r"\s*[*@]\s*(?:\w{1,40}(?:::|\.)){0,3}(?:rotate|translate|scale)\w{0,3}\s*\(", re.IGNORECASE)
 _GL_MOVES = {"gltranslatef", "gltranslated", "glrotatef", "glrotated", "glscalef", "glscaled", "glmultmatrixf", "glmultmatrixd"}
 _CHANGES_BY = {*"+-*/"}
 _COORDINATES = {*"xyzXYZ"}
 _CHANGES = {"glloadidentity", "glpushmatrix", "resetcamera", "add", *_GL_MOVES}
-_VECTORS = {"eye", "target", "up", "direction"}
+_VECTORS = ("eye", "target", "up", "direction")
 # Operations on what stands before them that no value is computed by.
 _GOES_ON = re.compile(r"(?<![ \t])[ \t]*(?:[@%?\[]|\*\*|if\b|\.[ \t]*[A-Za-z_])")
 _OF_VTK = re.compile(
@@ -349,6 +352,21 @@ class _Code:
                     return self._places[at]
         return None
 
+    def _is_multiplied(self, opened: int, start: int) -> bool:
+        """True if what a call makes is turned or moved where it stands, as in glm::lookAt(…) * glm::rotate(…)."""
+        _, _, end = self.reader.arguments(opened)
+        if _MOVED_BEHIND.match(self.text, end):
+            return True
+        words, before = self._words, bisect.bisect_left(self._places, start) - 1
+        depth, opening = 0, before if words[before] == "(" else None
+        if words[before] == "*":
+            for at in range(before - 1, max(0, before - _MOST_WORDS), -1):
+                depth += (words[at] == ")") - (words[at] == "(")
+                if not depth:
+                    opening = at
+                    break
+        return opening is not None and _VIEW_MOVED.fullmatch(words[opening - 1]) is not None
+
     def _may_say(self, parts: list[str], sign: str) -> bool:
         """True if a statement has a role, is one coordinate of what has one, or is a call that changes what others say."""
         if self._role(parts, sign):
@@ -377,6 +395,8 @@ class _Code:
             return "set_view"
         if self._is_camera(parts[:-1]) and any(texts.plain(part) in _TURNED for part in parts[1:]):
             return "moves"
+        if "scale" in parts[1:] and self._is_camera(parts[:-1]) and _OF_THREE.search(self.text):
+            return "moves"  # which mirrors, or is seen where it is not one number
         if self._is_camera(parts[:-2]) and before in _PLACES and key not in ("set", "x", "y", "z") and sign == "(":
             return "moves"  # position.copy, .add, .applyAxisAngle
         if key == "set" and before:  # position.set(…)
@@ -492,6 +512,8 @@ class _Code:
                     texts.fail(self.text, start, f"this is another camera than {placed[name][:40]}, copy one camera")
             if sign == "(" and role in _VECTORS and _GOES_ON.match(self.text, self.reader.arguments(at - 1)[2]):
                 role = "moves"  # position.set(…).multiplyScalar(…)
+            if role == "look_at" and self._is_multiplied(at - 1, start):
+                texts.fail(self.text, start, "more turns or moves this view, write eye, look-at and up")
             if role == "moves":
                 if sign != ":":
                     texts.fail(self.text, start, "this moves or bends the camera by other means, write eye, look-at and up")

@@ -222,9 +222,14 @@ def is_size(name: str) -> bool:
     return name in (*_WIDTH, *_HEIGHT, *_SIZE)
 
 
+def is_distortion(name: str) -> bool:
+    """True if a plain name is that of all of a lens's coefficients."""
+    return name in _DISTORTION
+
+
 def is_known(name: str) -> bool:
     """True if a plain name is that of anything that a camera has."""
-    return is_of_pose(name) or is_size(name) or name in (*_K, *_DISTORTION)
+    return is_of_pose(name) or is_size(name) or is_distortion(name) or name in _K
 
 
 def _is_camera(values: Mapping[str, Any]) -> bool:
@@ -232,7 +237,7 @@ def _is_camera(values: Mapping[str, Any]) -> bool:
     if k is None or len(values.keys() & {"frames", "poses", "object"}):
         return False
     try:
-        return len(_numbers("K", k)) in (4, 9, 12)
+        return len(_numbers("K", k)) in (4, 9, 12, 16)
     except InputError:
         return isinstance(k, dict) and {"rows", "cols", "data"} <= k.keys()  # a matrix, and what is wrong is said
 
@@ -429,14 +434,16 @@ def _numbers(name: str, value: Any) -> tuple[float, ...]:
 
 
 def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float, float]:
-    """(fx, fy, cx, cy) of nine numbers, row after row, of the twelve of a 3 × 4, or of these four themselves.
+    """(fx, fy, cx, cy) of nine numbers, row after row, of a 3 × 4 or 4 × 4 that adds nothing, or of these four themselves.
 
     Raises InputError if it has no last row 0 0 1, or a focal length that is not above 0; NoPinholeError if it has skew.
     """
     if len(values) == 4:
         f_x, f_y, c_x, c_y = values
     else:
-        if len(values) == 12:
+        if len(values) in (12, 16):
+            if any(values[3:12:4]) or [*values[12:]] not in ([], [0, 0, 0, 1]):
+                raise InputError(f"K of {what} has more than K in its fourth row or column: give nine numbers")
             values = [values[i] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)]
         if len(values) != 9:
             raise InputError(f"K of {what} has {counted(len(values), 'number')}: give nine")
@@ -499,6 +506,19 @@ def of_window(plane: ViewPlane, values: Mapping[str, Any], what: str) -> tuple[V
     return cut, (f"{notes}, in a picture of {size[0]} × {size[1]}",)
 
 
+def told_of_pair(values: Mapping[str, Any], what: str) -> tuple[str, ...]:
+    """The note that a camera is the second of a rectified pair, by the place that ROS' P says with its fourth column.
+
+    values : by plain names; P is p or projection_matrix.
+    """
+    p = _first(values, ("p", "projectionmatrix"))
+    numbers = _numbers(f"P of {what}", p) if isinstance(p, list | dict) else ()
+    if len(numbers) != 12 or numbers[0] == 0 or not any((numbers[3], numbers[7])):
+        return ()
+    right, down = -numbers[3] / numbers[0], -numbers[7] / numbers[0]
+    return (f"{what} stands {right + 0.0:g} right and {down + 0.0:g} down of its pair's first camera by P: that was left out",)
+
+
 def coefficients(numbers: Sequence[float], what: str) -> dict[str, float]:
     """OpenCV's distortion coefficients by name. Raises InputError if they are more than OpenCV has."""
     if len(numbers) not in (0, 1, 2, 3, 4, 5, 8, 12, 14):
@@ -551,6 +571,8 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
         pinhole = dataclasses.replace(standing, **vars(plane))
         return Camera(name, pinhole, stated, (*notes, "The text does not say where the camera stands: where it did"), lens=lens)
     matrix, more = _pose(values, what, options)
+    if _first(values, (*_T, *_EXTRINSIC, *_OTHER_POSE)) is None:
+        more += told_of_pair(values, what)
     pinhole, more_of_pose = axes.pinhole(matrix, plane, what)
     return Camera(name, pinhole, stated, (*notes, *more, *more_of_pose), lens=lens)
 

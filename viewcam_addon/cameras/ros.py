@@ -59,6 +59,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         if np.abs(turn - np.eye(3)).max() > 1e-9:
             notes += (f"{what} is one of a rectified pair: this is the raw picture's camera, not the rectified one's",)
     notes += (f"{what} has no pose, which ROS keeps in tf: it stands at the origin and looks along z, y down",)
+    notes += opencv.told_of_pair({opencv.plain(key): value for key, value in document.values.items()}, what)
     pinhole, more = axes.pinhole(axes.from_world_to_camera(np.eye(3), (0, 0, 0), what), plane, what)
     return [Camera(name, pinhole, True, (*notes, *more), lens=lens)]
 

@@ -33,6 +33,7 @@ _DEEPEST = 100
 _MOST_BYTES_OF_ARRAY, _MOST_ARRAYS = 2**16, 1000
 _STRING = r'"[^"\\]*(?:\\.[^"\\]*)*"?'
 _COMMENT = re.compile(rf"{_STRING}|//[^\n]*|/\*.*?(?P<end>\*/|\Z)", re.DOTALL)
+_LIKE_INI = re.compile(r"\[[A-Za-z][\w ./-]{0,60}\][ \t]*\n")
 _LIKE_XML = re.compile(r"\s*<[?!A-Za-z]")
 _TRAILING_COMMA = re.compile(rf"{_STRING}|,(?=\s*[\]}}])", re.DOTALL)
 _XML_DECLARATION = re.compile(rb"\s*<\?xml\s[^>]{0,200}\bencoding\s*=\s*[\"']([^\"'>]{0,40})[\"']")
@@ -131,7 +132,7 @@ class Source:
     @cached_property
     def _json(self) -> tuple[Any, str]:
         text = self.text.strip().rstrip("\0")  # Azure Kinect's ends as a text of C
-        if text[:1] not in ("{", "["):
+        if text[:1] not in ("{", "[") or _LIKE_INI.match(text):
             return None, ""
         problem = ""
         attempts: tuple[Callable[[], str], ...] = (lambda: text, lambda: _without_comments(text))

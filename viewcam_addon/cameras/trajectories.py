@@ -1,8 +1,8 @@
 """Trajectories as evo and the benchmarks have them: TUM, KITTI, EuRoC, Replica, Redwood. Poses alone; how it sees is given.
 
-    TUM     t tx ty tz qx qy qz qw      seconds, camera to world
+    TUM     t tx ty tz qx qy qz qw      seconds, or nanoseconds as ORB-SLAM3 writes; camera to world
     KITTI   twelve numbers              3 × 4, row by row, camera to the world of the first one
-    Replica sixteen numbers             4 × 4, the same with the row 0 0 0 1
+    Replica sixteen numbers             4 × 4, the same with the row 0 0 0 1; seventeen in KITTI-360's, a frame first
     Redwood three numbers, then 4 × 4   five lines a pose: the .log of Open3D and of Tanks and Temples
     EuRoC   ns, p, q w x y z, …         of the body; a cam0/sensor.yaml of the data set says how the camera stands on it
 
@@ -30,9 +30,12 @@ TITLE = "trajectories of TUM, KITTI, EuRoC, Replica and Redwood (.log)"
 
 _MOST = 1_000_000
 _WHOSE = "The file does not say whose poses it has: taken as the camera's, to the world, x right, y down, z into the view"
-_W_FIRST = re.compile(r"^#.*\bq_?w\b.*\bq_?x\b", re.MULTILINE)
-_STEPS = {"KITTI": 0.1, "Replica": 1 / 30, "Redwood": 1 / 30}  # seconds; their pictures are taken at 10 and 30 Hz
+_W_FIRST = re.compile(r"^(?:#|\s*t).*\bq_?w\b.*\bq_?x\b", re.MULTILINE)
+_HEAD = re.compile(r"\s*t(?:ime)?(?:_?stamp)?\w{0,8}(?:[\s,;]+(?:[tp]_?)?[xyz]){3}(?:[\s,;]+q_?[xyzw]){4}\s*")  # without #
+_NANOSECONDS = 1e15  # as seconds these are 30 million years
+_STEPS = {"KITTI": 0.1, "KITTI-360": 0.1, "Replica": 1 / 30, "Redwood": 1 / 30}  # seconds; pictures at 10 and 30 Hz
 _PINNED = [0.0, 0.0, 0.0, 1.0]
+_UNIT = 1e-3  # the error that the length of a quaternion of few digits may have
 
 
 def recognizes(source: Source) -> bool:
@@ -46,7 +49,12 @@ def read(source: Source, options: Options) -> list[Camera]:
             f"{source.name} is Nuke's chan, with angles whose order it does not say: import it with Blender's Nuke Animation "
             "Format, or export cameras in another format"
         )
-    lines = numbered_lines(source)
+    if kind == "bare":
+        raise InputError(
+            f"{source.name} has places and quaternions whose axes and times it does not say: write t tx ty tz qx qy qz qw in "
+            "each line, as TUM's, camera to world, x right, y down, z into the view"
+        )
+    lines = [(number, line) for number, line in numbered_lines(source) if not _HEAD.fullmatch(line)]
     if kind == "Redwood":
         lines = [(number, " ".join(line for _, line in lines[at : at + 4])) for at, (number, _) in enumerate(lines)][1::5]
     rows = table(source.name, lines)
@@ -61,12 +69,13 @@ def read(source: Source, options: Options) -> list[Camera]:
     whats = [f"pose {index}" for index in range(len(rows))]
     matrices = np.tile(np.eye(4), (len(rows), 1, 1))
     if kind in _STEPS:
-        times = np.arange(len(rows)) * _STEPS[kind]
+        frames, rows = np.hsplit(rows, [1]) if kind == "KITTI-360" else (np.arange(len(rows)), rows)
+        times = frames.ravel() * _STEPS[kind]
         for index in np.flatnonzero((rows[:, 12:] != _PINNED[: rows.shape[1] - 12]).any(axis=1)).tolist():
             axes.upper_rows(rows[index].reshape(4, 4), whats[index])
         matrices[:, :3] = rows[:, :12].reshape(-1, 3, 4)
     else:
-        times = rows[:, 0] * (1 if kind == "TUM" else 1e-9)
+        times = rows[:, 0] * (1 if kind == "TUM" and rows[0, 0] < _NANOSECONDS else 1e-9)
         w_stands_last = kind == "TUM" and not _W_FIRST.search(source.text[:2000])
         quaternions = rows[:, [7, 4, 5, 6] if w_stands_last else [4, 5, 6, 7]]  # w x y z
         matrices[:, :3, :3], matrices[:, :3, 3] = axes.rotations_of(quaternions, whats), rows[:, 1:4]
@@ -87,19 +96,25 @@ def _kind(source: Source) -> str | None:
     counts: set[tuple[int, bool]] = set()
     rows: list[list[float]] = []
     for line in source.text[:20000].split("\n")[:-1][:20] or [source.text[:20000]]:
-        if line.strip() and not line.lstrip().startswith("#"):
+        if line.strip() and not line.lstrip().startswith("#") and not _HEAD.fullmatch(line):
             words = re.split(r"[\s,]+", line.strip())
             if not all(re.fullmatch(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", word) for word in words):
                 return None
             counts.add((len(words), "," in line))
             rows.append([*map(float, words)])
+    has_head = _HEAD.match(source.text[:200]) is not None
     if counts <= {(7, False), (8, False)} and rows and (_is_named_chan(source) or all(map(_is_of_chan, rows))):
         return "chan"
     if [len(row) for row in rows[:5]] == [3, 4, 4, 4, 4]:
         return "Redwood" if rows[4] == _PINNED else None
     if counts == {(16, False)}:
         return "Replica" if all(row[12:] == _PINNED for row in rows) else None
-    return {(8, False): "TUM", (12, False): "KITTI"}.get(counts.pop()) if len(counts) == 1 else None
+    if counts == {(17, False)}:
+        return "KITTI-360" if all(row[0].is_integer() and row[13:] == _PINNED for row in rows) else None
+    if counts <= {(7, False), (7, True)} and rows:
+        return "bare" if all(abs(math.hypot(*row[3:]) - 1) < _UNIT for row in rows) else None
+    kinds = {(8, False): "TUM", (8, has_head): "TUM", (12, False): "KITTI"}
+    return kinds.get(counts.pop()) if len(counts) == 1 else None
 
 
 def _is_named_chan(source: Source) -> bool:

@@ -297,7 +297,7 @@ def _beside(dataset: Path, cameras: Sequence[Camera]) -> list[dict[str, Path]]:
     of their suffix.
     """
     folder = dataset if dataset.is_dir() else dataset.parent
-    listed = _document(dataset).get("frames")
+    listed = transforms.listed(_document(dataset))
     frames = {str(frame.get("file_path")): frame for frame in listed or () if isinstance(frame, dict)}
     result = []
     for camera in cameras:

@@ -26,14 +26,18 @@ _TO_LEFT_HANDED = np.diag([1.0, 1, -1, 1])
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
-    return json.dumps({"cameras": [_written(camera) for camera in cameras]}, indent=1) + "\n"
+    records, before = [], axes.UNTURNED
+    for camera in cameras:
+        u, v, w = ((a, b, -c) for a, b, c in camera.pinhole.axes())
+        forward = tuple(-x for x in w)
+        before = axes.continued(axes.quaternion([*zip(u, v, forward, strict=True)]), before)
+        records.append(_written(camera, before))
+    return json.dumps({"cameras": records}, indent=1) + "\n"
 
 
-def _written(camera: Camera) -> dict:
+def _written(camera: Camera, quaternion: axes.Quaternion) -> dict:
     pinhole = camera.pinhole
-    u, v, w = ((a, b, -c) for a, b, c in pinhole.axes())
-    forward = tuple(-x for x in w)
-    qw, qx, qy, qz = axes.quaternion([*zip(u, v, forward, strict=True)])
+    qw, qx, qy, qz = quaternion
     try:
         angle = {"fieldOfView": centered_field_of_view(camera, "Unity")[1]}
     except InputError:

@@ -24,20 +24,13 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
 
     Raises InputError if a camera is shifted, mirrored or has pixels that are not square: then no field of view says it.
     """
-    lines, before = [], (1.0, 0.0, 0.0, 0.0)
+    lines, before = [], axes.UNTURNED
     for camera in cameras:
         u, v, w = camera.pinhole.axes()
         forward, right, up = ((a, -b, c) for a, b, c in (tuple(-x for x in w), u, v))
-        before = _continued(axes.quaternion([*zip(forward, right, up, strict=True)]), before)
+        before = axes.continued(axes.quaternion([*zip(forward, right, up, strict=True)]), before)
         lines.append(_line(camera, before))
     return "\n".join(["name,tx,ty,tz,qx,qy,qz,qw,fov,width,height", *lines, ""])
-
-
-def _continued(quaternion: axes.Quaternion, before: axes.Quaternion) -> axes.Quaternion:
-    """The one of a rotation's two quaternions that is nearer to the row before: else what goes from row to row spins."""
-    opposed = sum(a * b for a, b in zip(quaternion, before, strict=True)) < 0
-    a, b, c, d = quaternion
-    return (0.0 - a, 0.0 - b, 0.0 - c, 0.0 - d) if opposed else quaternion
 
 
 def _line(camera: Camera, quaternion: axes.Quaternion) -> str:
