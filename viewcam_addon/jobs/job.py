@@ -36,7 +36,7 @@ _FRAMES = (-1048574, 1048574)
 _SAMPLES = (1, 2**24)
 _SEEDS = (0, 2**31 - 1)
 _THREADS = (1, 1024)
-# Of a pixel, the passes of geometry of both sides: 14 channels in float32 each.
+# The bytes of a pixel in the passes of geometry of both sides: 14 channels in float32 each.
 _BYTES_OF_A_CHECK = 2 * 14 * 4
 _ASPECTS = (1 / 200, 200.0)
 _LARGEST_FLOAT32, _SMALLEST_FLOAT32 = (2.0 - 2.0**-23) * 2.0**127, 2.0**-126
