@@ -750,6 +750,16 @@ def test_a_file_of_another_kind_is_called_by_it_and_not_by_a_list_of_all_formats
         cameras.read(tmp_path / name)
 
 
+def test_code_of_a_scenes_camera_is_none_of_another_programs_texts():
+    python = "scene.camera.location = (7, -6, 5)\nscene.camera.rotation_euler = (1.1, 0, 0.8)\nscene.camera.data.lens = 35\n"
+    assert read(python).pinhole.eye == (7, -6, 5)
+    babylon = (
+        "camera.position = new BABYLON.Vector3(1, 2, 3);\ncamera.setTarget(new BABYLON.Vector3(0, 1, 0));\ncamera.fov = 0.8;\n"
+    )
+    with pytest.raises(InputError, match="does not say which way is up"):
+        read(babylon)
+
+
 @pytest.mark.parametrize("place", ["sparse/1", "dense/0/sparse", "nerf"])
 def test_a_folder_without_cameras_says_in_which_of_its_folders_they_are(tmp_path, place):
     (tmp_path / place).mkdir(parents=True)

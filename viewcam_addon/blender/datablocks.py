@@ -6,6 +6,7 @@ import operator
 from collections.abc import Iterable
 
 import bpy
+import numpy as np
 
 from .. import intrinsics
 from ..errors import InputError
@@ -158,7 +159,7 @@ def length(value: float, scene: bpy.types.Scene, digits: int = 6) -> str:
 
 def render_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The camera that a render of the current frame takes: where markers are bound to cameras, theirs and not the scene's."""
-    return bound_camera(bindings_of(scene), scene.frame_current) or scene.camera
+    return bound_camera(bindings_of(scene), time_of_markers(scene, scene.frame_current, scene.frame_subframe)) or scene.camera
 
 
 def require_render_camera(scene: bpy.types.Scene) -> bpy.types.Object:
@@ -174,8 +175,16 @@ def bindings_of(scene: bpy.types.Scene) -> list[tuple[bpy.types.TimelineMarker, 
     return [(marker, marker.camera) for marker in scene.timeline_markers if marker.camera]
 
 
+def time_of_markers(scene: bpy.types.Scene, frame: int, subframe: float = 0.0) -> int:
+    """The frame at which Blender looks for markers as it renders a frame: in the time that the scene stretches, cut off."""
+    stretched = np.float32(scene.render.frame_map_old) / np.float32(scene.render.frame_map_new)
+    return int(np.float32(frame + subframe) * stretched)
+
+
 def bound_camera(bindings: Iterable[tuple[bpy.types.TimelineMarker, bpy.types.Object]], frame: int) -> bpy.types.Object | None:
     """The camera that markers bind at a frame, as Blender has it: the last one's before it, else the first one's of all.
+
+    frame : see time_of_markers.
 
     Those that are hidden in renders bind nothing. None where no marker does.
     """

@@ -181,9 +181,8 @@ def _shots(options: argparse.Namespace, rig: Rig | None, renderer: Any) -> Seque
         plane = rig and rig.of(options.camera).plane
         size = (plane.width, plane.height) if plane else options.size
         return makers.orbit(renderer.pinhole(options.camera, size, options.frame), options.orbit)
-    camera = renderer.scene_camera if options.camera is None else options.camera
-    if camera not in renderer.cameras:
-        wrong = "the scene has no camera" if camera is None else f"the file has no camera {camera!r}"
+    if options.camera not in (None, *renderer.cameras) or renderer.scene_camera is None:
+        wrong = "the scene has no camera" if options.camera is None else f"the file has no camera {options.camera!r}"
         raise InputError(f"{wrong}: name one with --camera, of {', '.join(renderer.cameras) or 'none'}")
     return makers.frames(options.frames, options.camera)
 

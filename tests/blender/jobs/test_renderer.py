@@ -82,6 +82,52 @@ def test_the_camera_of_a_frames_marker(blend, add_camera, scene):
     assert jobs.export(Job(blend=path, frame=25, camera="Camera")).camera.eye[2] == 6
 
 
+@pytest.mark.parametrize(("length", "frame", "is_others"), [(200, 39, False), (200, 40, True), (50, 9, False), (50, 10, True)])
+def test_a_marker_is_met_in_the_time_that_the_scene_stretches(add_camera, scene, monkey, both_sides, length, frame, is_others):
+    """Blender stretches time before it looks for markers."""
+    other, own = add_camera("Other"), bpy.data.objects["Camera"]
+    other.matrix_world = own.matrix_world.copy()
+    other.location.x = 1
+    for camera, at in ((own, 1), (other, 20)):
+        scene.timeline_markers.new(camera.name, frame=at).camera = camera
+    scene.render.frame_map_new = length
+    sides = both_sides(frame=frame)
+    sides.check()
+    eye = sides.exported.camera.eye
+    assert eye[0] == (1 if is_others else own.location.x), f"frame {frame} is seen from {eye}"
+
+
+@pytest.mark.parametrize("by_marker", [False, True])
+def test_the_camera_of_a_scene_may_be_in_another_one(add_camera, scene, monkey, both_sides, by_marker):
+    elsewhere = add_camera("Elsewhere")
+    elsewhere.matrix_world = bpy.data.objects["Camera"].matrix_world.copy()
+    elsewhere.location.x = 1
+    scene.collection.objects.unlink(elsewhere)
+    bpy.data.scenes.new("Other").collection.objects.link(elsewhere)
+    scene.camera = bpy.data.objects["Camera"] if by_marker else elsewhere
+    if by_marker:
+        scene.timeline_markers.new("Elsewhere", frame=1).camera = elsewhere
+    sides = both_sides()
+    sides.check()
+    assert sides.exported.camera.eye[0] == 1, sides.exported.camera.eye
+
+
+def test_cameras_of_one_name_are_told_apart_by_their_library(blend, add_camera, link_object, scene):
+    other = add_camera("Other")
+    other.location = (1, 2, 9)
+    library = blend("library.blend", copy=True)
+    scene.camera = bpy.data.objects["Camera"]
+    bpy.data.objects.remove(other)
+    link_object(library, "Other")
+    add_camera("Other")
+    for name, z in (("Other [library.blend]", 9), ("Other", 0)):
+        exported = jobs.export(Job(blend=blend(), camera=name))
+        assert exported.camera.eye[2] == z, f"{name} is at {exported.camera.eye}"
+    scene = bpy.context.scene
+    scene.camera = next(each for each in scene.objects if each.name == "Other" and each.library)
+    assert jobs.export(Job(blend=blend())).camera.eye[2] == 9
+
+
 @pytest.mark.parametrize("size", [(320, 240), (80, 60), (200, 60), (60, 200)])
 def test_another_size_shows_the_same_and_is_stated_so(blend, scene, size):
     path = blend()
@@ -236,7 +282,7 @@ def test_a_missing_library_is_told(blend, link_object):
 def test_bad_files_and_cameras_are_one_sentence(blend, scene, camera_object, tmp_path):
     path = blend()
     fails(Job(blend=tmp_path / "none.blend"), "does not exist")
-    fails(Job(blend=tmp_path), "does not exist")
+    fails(Job(blend=tmp_path), "is no file: check the name")
     (tmp_path / "text.blend").write_text("not a blend")
     fails(Job(blend=tmp_path / "text.blend"), "is not a .blend file")
     (tmp_path / "empty.blend").touch()
@@ -249,6 +295,7 @@ def test_bad_files_and_cameras_are_one_sentence(blend, scene, camera_object, tmp
 
 def test_a_file_without_a_camera_is_one_sentence(blend, scene, camera_object):
     scene.collection.objects.unlink(camera_object)
+    scene.camera = None
     fails(Job(blend=blend()), "scene 'Scene' has no camera: add one, or give another file")
 
 

@@ -292,6 +292,19 @@ def test_holdouts_and_shadow_catchers_are_plain_objects_on_both_sides(add, scene
     assert bpy.context.view_layer.layer_collection.children["Held out"].holdout and bpy.data.objects["Holdout"].is_holdout
 
 
+def test_a_holdout_that_the_camera_does_not_see_is_hidden_on_both_sides(add, scene, both_sides, mesh_from):
+    """Cycles shows the hole all the same, and a plain object in its place to other rays only."""
+    cube = mesh_from("cube", size=0.8)
+    add(cube, "Plain", location=(-1, 0, 0))
+    collection = bpy.data.collections.new("Indirect")
+    scene.collection.children.link(collection)
+    add(cube, "Holdout", location=(1, 0, 0), collection=collection).is_holdout = True
+    bpy.context.view_layer.layer_collection.children["Indirect"].indirect_only = True
+    sides = both_sides()
+    sides.check()
+    assert {placed.name for placed in sides.exported.objects} == {"Plain"}
+
+
 def test_objects_of_a_background_set_are_shown_and_its_holdouts_are_plain_on_both_sides(add, scene, both_sides, mesh_from):
     cube = mesh_from("cube", size=0.8)
     add(cube, "Own", location=(-1, 0, 0))
@@ -415,6 +428,22 @@ def test_materials_of_object_and_data_have_their_own_indices(add, scene, both_si
     assert {placed.name: placed.material_indices for placed in sides.exported.objects} == {"Data": (5, 7, 0), "Own": (11, 7, 0)}
 
 
+def test_an_empty_slot_of_an_object_beside_an_empty_one_of_its_mesh(add, both_sides, mesh_from):
+    """Until 5.0 it shows the mesh's material, and the stand-in for what has none must not."""
+    cube, red = mesh_from("cube"), bpy.data.materials.new("Red")
+    red.pass_index = 5
+    for material in (red, None):
+        cube.materials.append(material)
+    cube.polygons.foreach_set("material_index", [0, 1, 0, 1, 0, 1])
+    own = add(cube, "Own", rotation_euler=(2.5, 0.5, 0.5))
+    own.material_slots[0].link = "OBJECT"
+    own.material_slots[0].material = None
+    sides = both_sides()
+    sides.check()
+    indices = {0, 5} if bpy.app.version < (5, 1) else {0}
+    assert set(np.unique(sides.cycles["Material Index"])) == indices
+
+
 def test_a_material_override_of_the_view_layer_overrides_the_index(monkey, both_sides):
     material = bpy.data.materials.new("Clay")
     material.pass_index = 3
@@ -497,6 +526,18 @@ def test_custom_normals_that_differ_about_a_vertex_are_those_of_cycles(add, both
     both_sides().check()
 
 
+@pytest.mark.parametrize("are_smooth", ["all", "some", "none is marked"])
+def test_faces_that_are_smooth_between_edges_that_are_all_sharp(monkey, both_sides, are_smooth):
+    """Blender has the normals of faces there; Cycles those of vertices, unless no face is marked as smooth or flat."""
+    mesh = monkey.data
+    mesh.edges.foreach_set("use_edge_sharp", [True] * len(mesh.edges))
+    mesh.polygons.foreach_set("use_smooth", [are_smooth == "all" or index % 3 > 0 for index in range(len(mesh.polygons))])
+    if are_smooth == "none is marked":
+        mesh.attributes.remove(mesh.attributes["sharp_face"])
+    assert mesh.normals_domain == "FACE"
+    both_sides().check()
+
+
 def test_bent_flat_faces_beside_a_smooth_one(add, both_sides, mesh_from):
     grid = mesh_from("grid", x_subdivisions=8, y_subdivisions=8, size=5)
     heights = np.random.default_rng(2).normal(scale=0.3, size=len(grid.vertices))
@@ -562,6 +603,22 @@ def test_point_clouds_are_spheres_of_their_radii(beads, both_sides):
     (spheres,) = sides.exported.geometries.values()
     assert isinstance(spheres, Spheres) and np.allclose(spheres.radii, 0.1 + 0.01 * np.arange(36), atol=1e-6)
     assert set(np.unique(sides.cycles["Material Index"])) == {0, 4}
+
+
+def test_points_without_a_place_or_a_radius_are_left_out_and_told(beads, both_sides, node_group):
+    beads.data.vertices[0].co.x = float("nan")
+    radius = beads.data.attributes.new("size", "FLOAT", "POINT")
+    radius.data.foreach_set("value", [-0.2, -0.2, float("nan"), float("inf"), 0, *[0.2] * 31])
+    tree, source, target = node_group()
+    named, store = tree.nodes.new("GeometryNodeInputNamedAttribute"), tree.nodes.new("GeometryNodeStoreNamedAttribute")
+    named.inputs["Name"].default_value, store.inputs["Name"].default_value = "size", "radius"
+    tree.links.new(named.outputs[0], store.inputs["Value"])
+    tree.links.new(source.outputs[0], store.inputs["Geometry"])
+    tree.links.new(store.outputs[0], target.inputs[0])
+    beads.modifiers.new("Sizes", "NODES").node_group = tree
+    sides = both_sides()
+    sides.check()
+    assert "4 points have a place that is not finite or no radius" in entry(sides.exported, "Beads").reason
 
 
 def test_stretched_point_clouds_are_ellipsoids(beads, both_sides):

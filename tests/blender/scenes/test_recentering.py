@@ -373,12 +373,15 @@ def test_a_held_roll_is_held(look, camera_object, check, add_map):
     assert abs(tilt) > 0.2 and sides.comparison.conversion.largest < 1e-3
 
 
-def test_an_object_that_is_nowhere_is_one_sentence(look, add, mesh_from):
+def test_an_object_that_is_nowhere_is_left_out_and_told(look, add, add_map, mesh_from):
     look(UTM)
+    add_map(UTM)
     add(mesh_from("cube"), "Lost", UTM).scale.x = float("nan")
     for recenter in (False, True):
-        with pytest.raises(InputError, match="'Lost' holds a number that is not finite"):
-            jobs.export(Job(recenter=recenter))
+        exported = jobs.export(Job(recenter=recenter))
+        (reason,) = [entry.reason for entry in exported.ledger if entry.object == "Lost"]
+        assert "has a transform that is not finite, and Cycles does not draw it" in reason, reason
+        assert "Lost" not in [placed.name for placed in exported.objects]
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])

@@ -109,11 +109,10 @@ class JobSettings:
             self._overrides.set(render, "threads_mode", "FIXED")
             self._overrides.set(render, "threads", threads)
 
-    def scene_camera(self, frame: int | None = None) -> str | None:
-        """The name of the scene's own camera at a frame, that of the file where None; None if it has none."""
-        of_markers = datablocks.bound_camera(self._bindings, self._time_of_file[0] if frame is None else frame)
-        camera_object = of_markers or self._camera_of_file
-        return camera_object.name if camera_object else None
+    def scene_camera(self, frame: int | None = None) -> bpy.types.Object | None:
+        """The object that is the scene's own camera at a frame, that of the file where None; None if it has none."""
+        time = self._time_of_file if frame is None else (frame, 0.0)
+        return datablocks.bound_camera(self._bindings, datablocks.time_of_markers(self._scene, *time)) or self._camera_of_file
 
     def look_through(self, camera_object: bpy.types.Object, is_scenes: bool = False) -> None:
         """Make it the camera that renders.

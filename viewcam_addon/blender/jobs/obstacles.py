@@ -1,6 +1,7 @@
 """The obstacles to rendering a shot, known before anything is: of a batch of a thousand, the last one counts as well."""
 
 import itertools
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import bpy
@@ -58,9 +59,11 @@ def obstacles(
 
 
 def cameras_of(scene: bpy.types.Scene, own: bpy.types.Object | None) -> dict[str, bpy.types.Object]:
-    """The scene's cameras but for the batch's own, by name, sorted."""
-    cameras = {each.name: each for each in scene.objects if each.type == "CAMERA" and each != own}
-    return dict(sorted(cameras.items()))
+    """The scene's cameras but for the batch's own, by name, sorted. Where libraries have cameras of one name, it is theirs
+    with the library's."""
+    cameras = [each for each in scene.objects if each.type == "CAMERA" and each != own]
+    times = Counter(each.name for each in cameras)
+    return dict(sorted((each.name if times[each.name] == 1 else each.name_full, each) for each in cameras))
 
 
 def camera_of(
@@ -68,13 +71,15 @@ def camera_of(
 ) -> bpy.types.Object:
     """The camera of the file that takes a shot without the four values. among : cameras_of(scene).
 
+    The scene's own may be in another scene, and Blender renders through it all the same.
+
     Raises InputError if none is called so, if the scene has none of its own, or if it is no perspective camera.
     """
-    name = settings.scene_camera(shot.frame) if shot.camera is None else shot.camera
-    camera_object = None if name is None else among.get(name)
-    if camera_object is None:
+    camera_object = settings.scene_camera(shot.frame) if shot.camera is None else among.get(shot.camera)
+    if camera_object is None or camera_object.type != "CAMERA":
         if not among:
             raise InputError(f"scene {scene.name!r} has no camera: add one, or give another file")
+        name = shot.camera or (camera_object and camera_object.name)
         lacking = "no camera of its own" if name is None else f"no camera {name!r}"
         raise InputError(f"scene {scene.name!r} has {lacking}: choose from {', '.join(itertools.islice(among, 8))}")
     datablocks.check_perspective(camera_object)

@@ -85,7 +85,8 @@ class BlenderRenderer:
     @property
     def scene_camera(self) -> str | None:
         """The name of the camera that a render of the file takes, at the file's frame."""
-        return self._settings.scene_camera()
+        camera_object = self._settings.scene_camera()
+        return camera_object.name if camera_object else None
 
     @property
     def blend(self) -> Path | None:
@@ -240,7 +241,7 @@ class BlenderRenderer:
 
         like : the camera whose clip range it has, the scene's own where None.
         """
-        like = like or self.scene.objects.get(self.scene_camera or "")
+        like = like or self._settings.scene_camera()
         if self._own is None:
             self._own = _own_camera(self._overrides, self.scene)
         if like and like.type == "CAMERA":

@@ -341,6 +341,7 @@ def placements(
     matrices = export_geometry.read(depsgraph.object_instances, "matrix_world", np.float32, 16)
     rows: dict[Surface, list[int]] = {}
     known: dict[tuple[int, ...], list[int]] = {}
+    placing: set[bpy.types.Object] = set()
     links = linking.Links(depsgraph) if shading else None
     for number, instance in enumerate(depsgraph.object_instances):
         features.note_hair(instance, ledger)
@@ -355,7 +356,10 @@ def placements(
             if read and source and source not in rows:
                 read(source, evaluated)
             known[identity] = rows.setdefault(source, []) if source else []
+            if placed.real != placed.parent:
+                placing.add(placed.parent.original)
         known[identity].append(number)
+    features.note_bare(ledger, placing)
     for source, numbers in rows.items():
         ledger.placed(source.name, len(numbers))
     draws = _draws(depsgraph) if shading and any(shading.asks_for_random(source.slots) for source in rows) else None
@@ -386,16 +390,20 @@ def random_number(name: str) -> int:
 
 
 def _drawn(placed: list[Placement], ledger: Ledger) -> Iterator[Placement]:
-    """The placements that no scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
+    """The placements that Cycles draws: those that are somewhere, and of those that a scale of 0 flattens meshes that no other
+    object uses."""
     users: Counter[tuple[int, int]] = Counter()
     for source, matrices, _ in placed:
         users[source.key] += len(matrices)
     for source, matrices, random in placed:
-        with np.errstate(invalid="ignore"):  # an infinite matrix is not flat
-            drawn = np.linalg.det(matrices[:, :3, :3]) != 0
-        if not drawn.all() and (users[source.key] > 1 or not source.is_mesh):
+        is_somewhere = np.isfinite(matrices).all(axis=(1, 2))
+        if not is_somewhere.all():
+            ledger.note(source.name, "exported", "has a transform that is not finite, and Cycles does not draw it")
+            matrices, random = matrices[is_somewhere], random if random is None else random[is_somewhere]
+        is_flat = np.linalg.det(matrices[:, :3, :3]) == 0
+        if is_flat.any() and (users[source.key] > 1 or not source.is_mesh):
             ledger.note(source.name, "exported", "flattened by its scale, and Cycles does not draw it")
-            matrices, random = matrices[drawn], random if random is None else random[drawn]
+            matrices, random = matrices[~is_flat], random if random is None else random[~is_flat]
         if len(matrices):
             yield Placement(source, matrices, random)
 
@@ -419,6 +427,7 @@ def _source(
         return None
     evaluated, real, _ = placed
     layer = depsgraph.view_layer_eval
+    features.note_holdout(placed, depsgraph, ledger)
     hidden_from = features.hidden_from(placed, layer)
     if "camera" in hidden_from:
         ledger.note(placed.name, "exported", "not visible to the camera")
@@ -474,7 +483,11 @@ def _materials(evaluated: bpy.types.Object, original: bpy.types.Object) -> list[
 
 def _geometry(source: Surface, evaluated: bpy.types.Object, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
     if not source.is_mesh:
-        return export_geometry.spheres_of(evaluated.data)
+        spheres = export_geometry.spheres_of(evaluated.data)
+        if nowhere := len(evaluated.data.points) - len(spheres.radii):
+            reason = f"{nowhere} points have a place that is not finite or no radius, and Cycles draws none of them"
+            ledger.note(source.name, "exported", reason)
+        return spheres
     has_colors = shading is not None and shading.asks_for_colors(source.slots)
     attributes = shading.attributes(source.slots) if shading else ()
     with export_geometry.mesh_shown(evaluated, split=True) as data:

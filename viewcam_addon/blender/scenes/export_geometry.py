@@ -9,6 +9,8 @@ faces those of their triangles. Where an edge is sharp or a normal custom, Cycle
 and those of flat faces (`is_split`), and reads all from the mesh that comes of it; each vertex has the normal of its last
 corner. Blender's corner normals also stop at an edge whose faces are wound against each other, or are not two, and Cycles' do
 not: there no vertex is split.
+
+Where all edges are sharp, Blender has the normals of faces, and every Cycles those of vertices on faces that are marked smooth.
 """
 
 import contextlib
@@ -95,11 +97,13 @@ def mesh_shown(evaluated: bpy.types.Object, split: bool = False) -> Iterator[bpy
 
 
 def spheres_of(points: bpy.types.PointCloud) -> Spheres:
-    """The points of an evaluated point cloud, object space. Cycles gives all of them the first material."""
+    """The points of an evaluated point cloud, object space: those that Cycles draws, and all of its first material."""
     centers: Any = _attribute(points, "position", "vector", np.float32, 3)  # which every point cloud has
     radii = _attribute(points, "radius", "value", np.float32)
     if radii is None:
         radii = np.full(len(centers), DEFAULT_RADIUS, np.float32)
+    drawn = np.isfinite(centers).all(axis=1) & np.isfinite(radii) & (radii >= 0)
+    centers, radii = centers[drawn], radii[drawn]
     return Spheres(centers.astype(np.float64), radii.astype(np.float64), np.zeros(len(centers), np.int32))
 
 
@@ -136,15 +140,15 @@ def _corner_normals(
     mesh: bpy.types.Mesh, vertices: Array, corner_vertices: Array, corners: Array, faces: Array
 ) -> Array | None:
     """(triangles, 3, 3) float32, or None where all faces are flat."""
-    if mesh.normals_domain == "FACE":
+    sharp: Any = _attribute(mesh, "sharp_face", "value", np.bool_, domain="FACE")
+    if mesh.normals_domain == "FACE" and (sharp is None or sharp.all()):
         return None
     if is_split(mesh):
         return read(mesh.corner_normals, "vector", np.float32, 3)[_last_of_each(corner_vertices)][corners]
-    if mesh.normals_domain == "POINT" or not versions.CYCLES_HAS_VERTEX_NORMALS:
+    if mesh.normals_domain == "POINT" or (mesh.normals_domain == "CORNER" and not versions.CYCLES_HAS_VERTEX_NORMALS):
         return read(mesh.corner_normals, "vector", np.float32, 3)[corners]
     triangles = corner_vertices[corners]
     normals = read(mesh.vertex_normals, "vector", np.float32, 3)[triangles]
-    sharp: Any = _attribute(mesh, "sharp_face", "value", np.bool_, domain="FACE")  # else its normals were the points'
     flat = sharp[faces]
     first, second, third = np.moveaxis(vertices[triangles[flat]], 1, 0)
     across = np.cross(second - first, third - first)

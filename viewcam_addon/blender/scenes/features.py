@@ -88,15 +88,19 @@ def hidden_from(placed: Placed, layer: bpy.types.ViewLayer) -> frozenset[str]:
     """The kinds of rays (lights.RAYS) that don't see an object, be it by its own flags or by those of what places it."""
     evaluated, _, parent = placed
     hidden = {ray for ray in RAYS if not all(getattr(each, f"visible_{ray}") for each in (evaluated, parent))}
-    if parent.indirect_only_get(view_layer=layer) and not _is_holdout(parent, layer):
+    if parent.indirect_only_get(view_layer=layer):
         hidden.add("camera")
     return frozenset(hidden)
 
 
-def _is_holdout(parent: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
-    """True if a hole takes the place of what this object places. The layer knows of none in a background set, where 5.2 has
-    one."""
-    return parent.is_holdout or parent.holdout_get(view_layer=layer)
+def note_holdout(placed: Placed, depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> None:
+    """Note what a hole takes the place of. The layer knows of none in a background set, where 5.2 has one."""
+    parent = placed.parent
+    if parent.is_holdout or parent.holdout_get(view_layer=depsgraph.view_layer_eval):
+        ledger.note(placed.name, "approximated", "a holdout, a plain object on both sides")
+        ledger.set_for_cycles(parent.original, "is_holdout", False)
+        for collection in _layer_collections(depsgraph.view_layer.layer_collection):
+            ledger.set_for_cycles(collection, "holdout", False)
 
 
 def is_surface(placed: Placed, ledger: Ledger, shading: Shading | None) -> bool:
@@ -134,11 +138,6 @@ def note_object(
     """
     evaluated, real, parent = placed
     name = placed.name
-    if _is_holdout(parent, depsgraph.view_layer_eval):
-        ledger.note(name, "approximated", "a holdout, a plain object on both sides")
-        ledger.set_for_cycles(parent.original, "is_holdout", False)
-        for collection in _layer_collections(depsgraph.view_layer.layer_collection):
-            ledger.set_for_cycles(collection, "holdout", False)
     for each in (evaluated, parent):
         if each.is_shadow_catcher:
             ledger.note(name, "approximated", "a shadow catcher, a plain object on both sides")
@@ -151,7 +150,7 @@ def note_object(
     if not shading and versions.DEFAULT_SURFACE_BENDS_NORMALS and is_empty:
         ledger.call_for_cycles(real.original, materials.fill_empty_slots, stands_in=False)
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
-            ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
+            ledger.bare[name] = real.original
     if used and all(materials.is_volume_alone(slots[index]) for index in used):
         # Transparent alone, where it lies on a floor a ray that has gone through it would miss the floor.
         ledger.set_for_cycles(real.original, "hide_render", True)
@@ -159,6 +158,16 @@ def note_object(
         _note_material(material, placed, ledger, shading)
     if shading:
         _note_light(placed, slots, ledger, shading)
+
+
+def note_bare(ledger: Ledger, placing: Collection[bpy.types.Object]) -> None:
+    """Note the objects whose nodes make surfaces without a material. placing : the objects that place others, which would be
+    their own as soon as a node sets materials."""
+    for name, block in ledger.bare.items():
+        if block.is_editable and block not in placing:
+            ledger.call_for_cycles(block, materials.fill_what_nodes_make, stands_in=False)
+        else:
+            ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
 
 
 def _note_material(material: bpy.types.Material, placed: Placed, ledger: Ledger, shading: Shading | None) -> None:

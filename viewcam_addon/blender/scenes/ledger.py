@@ -19,7 +19,13 @@ _WORSE = ("exported", "approximated", "skipped")
 
 
 class Ledger:
+    """The findings and remedies of a scene.
+
+    bare : by name, the objects whose geometry nodes make surfaces without a material.
+    """
+
     def __init__(self) -> None:
+        self.bare: dict[str, bpy.types.Object] = {}
         self._findings: dict[str, dict[str, str]] = {}
         self._placed: dict[str, int] = {}
         self.remedies: dict[tuple, Remedy] = {}

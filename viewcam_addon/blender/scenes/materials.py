@@ -236,9 +236,34 @@ def fill_empty_slots(overrides: Overrides, block: bpy.types.Object) -> None:
     if not block.material_slots:
         overrides.afterwards(block.data.materials.clear)  # pop would leave a slot behind on the object
         block.data.materials.append(material)
-    for slot in block.material_slots:
-        if slot.material is None:
+    for number, slot in enumerate(block.material_slots):
+        stays_empty = versions.EMPTY_SLOTS_OF_OBJECTS_STAY_EMPTY or block.data.materials[number] is None
+        if slot.material is None and stays_empty:
             overrides.set(slot, "material", material)
+
+
+def fill_what_nodes_make(overrides: Overrides, block: bpy.types.Object) -> None:
+    """Give what the geometry nodes of an object make a material where it has none, by a modifier until the overrides end."""
+    tree = overrides.shared(_nodes_that_fill)
+    modifier = block.modifiers.new(tree.name, "NODES")
+    overrides.afterwards(block.modifiers.remove, modifier)
+    modifier.show_viewport, modifier.node_group = False, tree
+
+
+def _nodes_that_fill(overrides: Overrides) -> bpy.types.NodeTree:
+    tree = bpy.data.node_groups.new("Virtual Pinhole", "GeometryNodeTree")
+    overrides.afterwards(bpy.data.node_groups.remove, tree)
+    for direction in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    geometry = tree.nodes.new("NodeGroupInput").outputs[0]
+    for _ in range(2):  # the first gives an empty slot to meshes that have none
+        fill = tree.nodes.new("GeometryNodeSetMaterial")
+        fill.inputs["Material"].default_value = overrides.shared(plain)
+        tree.links.new(tree.nodes.new("GeometryNodeMaterialSelection").outputs[0], fill.inputs["Selection"])
+        tree.links.new(geometry, fill.inputs[0])
+        geometry = fill.outputs[0]
+    tree.links.new(geometry, tree.nodes.new("NodeGroupOutput").inputs[0])
+    return tree
 
 
 def plain(overrides: Overrides) -> bpy.types.Material:

@@ -206,8 +206,6 @@ def _seen(
             if source.is_linked:
                 ledger.note(source.name, "approximated", _UNLINKED)
     for source, matrix in ((source, matrix) for source, matrices, _ in placed_objects for matrix in matrices):
-        if not np.isfinite(matrix).all():
-            raise InputError(f"the matrix of object {source.name!r} holds a number that is not finite: check its transform")
         matrix[:3, 3] -= eye
         if source.key not in copies:
             data = geometries[source.key]
