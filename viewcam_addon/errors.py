@@ -9,6 +9,7 @@ import errno
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeGuard
 
 _MOST_NAMED = 3  # in a sentence
 
@@ -61,12 +62,17 @@ def operator_reason(error: RuntimeError) -> str:
     return str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
 
 
+def is_of_a_path(error: Exception) -> TypeGuard[OSError]:
+    """True if a system refuses the path of a file, whatever is in it."""
+    return isinstance(error, OSError) and error.filename is not None and error.errno in _OF_A_PATH
+
+
 def bug(error: Exception) -> str:
     """One sentence for an error that no input should have caused, and where in the code it came from.
 
     A file that the system refuses, as for a name that is too long or a folder that nobody may enter, is none of the code's.
     """
-    if isinstance(error, OSError) and error.filename is not None and error.errno in _OF_A_PATH:
+    if is_of_a_path(error):
         return f"{error.filename} can't be reached ({error.strerror}): check its name, and who may read its folder"
     place = traceback.extract_tb(error.__traceback__)[-1]
     what = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {error}".splitlines()[0]

@@ -750,6 +750,16 @@ def test_a_file_of_another_kind_is_called_by_it_and_not_by_a_list_of_all_formats
         cameras.read(tmp_path / name)
 
 
+def test_code_of_a_scenes_camera_is_none_of_another_programs_texts():
+    python = "scene.camera.location = (7, -6, 5)\nscene.camera.rotation_euler = (1.1, 0, 0.8)\nscene.camera.data.lens = 35\n"
+    assert read(python).pinhole.eye == (7, -6, 5)
+    babylon = (
+        "camera.position = new BABYLON.Vector3(1, 2, 3);\ncamera.setTarget(new BABYLON.Vector3(0, 1, 0));\ncamera.fov = 0.8;\n"
+    )
+    with pytest.raises(InputError, match="does not say which way is up"):
+        read(babylon)
+
+
 @pytest.mark.parametrize("place", ["sparse/1", "dense/0/sparse", "nerf"])
 def test_a_folder_without_cameras_says_in_which_of_its_folders_they_are(tmp_path, place):
     (tmp_path / place).mkdir(parents=True)
@@ -792,6 +802,26 @@ def test_coefficients_that_code_says_one_by_one_are_a_lens(k):
     assert bent.lens == distortion.opencv({"k1": -0.17, "k2": 0.02}), bent.notes
     assert read(f"{k}\nk1, k2 = -0.17, 0.02\ndist = np.array([k1, k2, 0, 0])\n").lens == bent.lens
     assert read(f"{k}\nk1 = [1, 2, 3]\n").lens is None
+
+
+@pytest.mark.parametrize("is_json", [False, True])
+def test_a_matrix_whose_name_may_be_a_poses_is_asked_for_its_way_in_code_as_in_json(is_json):
+    """ManiSkill's, beside its extrinsic_cv."""
+    pose = [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]
+    values = {"cam2world_gl": pose, "K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]]}
+    text = json.dumps(values) if is_json else "\n".join(f"{name} = np.array({rows})" for name, rows in values.items())
+    with pytest.raises(InputError, match="has cam2worldgl, and whose axes it means and which way it goes is not said"):
+        read(text)
+    (camera,) = cameras.read(text, options=Options(size=(640, 480), pose="c2w_opengl"))
+    assert camera.pinhole.eye == (1, 2, 3) and camera.pinhole.basis()[2] == pytest.approx((0, 0, 1))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "is_told"), [("crop", [9, 9, 99, 99], True), ("binning", 2, True), ("binning", 1, False)]
+)
+def test_what_may_have_been_cut_off_a_picture_is_told_where_k_is_taken(key, value, is_told):
+    text = json.dumps({"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "width": 640, "height": 480, key: value})
+    assert any(f"has {key}, which was not taken" in note for note in read(text).notes) == is_told
 
 
 def test_one_half_of_a_colmap_model_is_told_which_is_missing(tmp_path):
@@ -1182,6 +1212,24 @@ def test_of_open3ds_cameras_one_with_skew_keeps_none_of_the_others_back():
     ]
     (camera,) = cameras.read(json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": parameters}))
     assert camera.name == "00000" and any("'00001'" in note and "skew" in note for note in camera.notes)
+
+
+@pytest.mark.parametrize("form", ["calibration", "message"])
+def test_of_cameras_in_a_list_of_yaml_none_is_made_of_two(form):
+    rows = "[500, 0, 320, 0, 500, 240, 0, 0, 1]"
+    left = f"  width: 640\n  height: 480\n  K: {rows}\n"
+    head = "cameras:\n" if form == "message" else ""
+    assert "in a list: leave one out" in refusal(f"{head}- name: a\n{left}- name: b\n{left}  R: {rows}\n  t: [1, 0, 0]\n")
+
+
+def test_a_camera_on_its_body_stands_where_its_file_says():
+    """EuRoC's sensor.yaml and OpenVINS' kalibr_imucam_chain.yaml, whose two cameras stood in one place."""
+    inner = "intrinsics: [500, 500, 320, 240]\n  resolution: [640, 480]\n  camera_model: pinhole\n  distortion_model: none\n"
+    rows = "[1, 0, 0, {}, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1]"
+    chain = "".join(f"cam{i}:\n  T_imu_cam: {rows.format(i)}\n  {inner}" for i in range(2))
+    assert [camera.pinhole.eye for camera in cameras.read(chain)] == [(0, 2, 3), (1, 2, 3)]
+    (camera,) = cameras.read(f"T_BS:\n  rows: 4\n  cols: 4\n  data: {rows.format(9)}\n" + inner.replace("  ", ""))
+    assert camera.pinhole.eye == (9, 2, 3) and camera.pinhole.basis()[2] == pytest.approx((0, 0, -1))
 
 
 @pytest.mark.parametrize("form", ["calibration", "message"])

@@ -171,6 +171,17 @@ def test_shards_are_the_whole_and_have_summaries_of_their_own(tmp_path, capfd):
     assert "3 of them kept" in batch(capfd, CORNELL, "--orbit", "3", "--out", out, *SMALL, "--resume").out
 
 
+@pytest.mark.parametrize("name", ["a.json", "summary.json"])
+@pytest.mark.parametrize("kept", [[], ["--overwrite"], ["--resume"]], ids=" ".join)
+def test_a_list_stays_what_it_is_where_a_file_of_the_batch_would_have_its_name(tmp_path, capfd, monkeypatch, name, kept):
+    """With --overwrite the list shots.json became the sidecar of its shot `shots`."""
+    monkeypatch.chdir(tmp_path)
+    shots = json.dumps([{"name": "a", "camera": CAMERA, "width": 16, "height": 16, "samples": 1}])
+    (tmp_path / name).write_text(shots)
+    assert f"{name} is what the batch would write over" in fails(capfd, CORNELL, name, "--out", ".", *kept)
+    assert (tmp_path / name).read_text() == shots and files(tmp_path) == [name]
+
+
 def test_no_more_workers_are_started_than_there_are_shots(tmp_path, capfd, monkeypatch):
     """A hundred thousand for two shots were."""
 

@@ -40,6 +40,7 @@ def check(*words):
         (("--frames", "3..1"), "frames 3..1 run backwards"),
         (("--cameras", "Nobody*"), "no camera is called 'Nobody*'"),
         (("--resume",), "--resume is for many checks"),
+        (("--size", "65536x65536"), "need 448 GiB of memory and there are"),
         (("--workers", "2"), "--workers is for many checks"),
         (("--find", "0.5%"), "--find is of light, and level geometry has none"),
         (("--find", "0.5%", "--level", "path", "--samples", "64"), "leave --samples and --error out"),
@@ -65,6 +66,17 @@ def test_a_folder_where_a_file_of_the_report_belongs_is_refused_before_anything_
     output = capfd.readouterr().err
     assert f"{name} is a folder" in output and output.count("\n") == 1, output
     assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_a_scene_that_was_approved_is_not_replaced_by_the_reports_own_before_it_is_read(tmp_path, capfd):
+    """The picture was then compared with what the .blend holds now, and was the same whatever that was."""
+    report = tmp_path / "report"
+    assert main(["export", str(CORNELL), str(report / "scene.json"), "--size", "16x9"]) == 0
+    before = {path.name: path.read_bytes() for path in report.iterdir()}
+    words = ["--size", "16x9", "--scene", str(report / "scene.json"), "--report", f"{report}/../report"]
+    assert main(["check", str(CORNELL), *words]) == 2
+    assert "would be overwritten by the report's own" in capfd.readouterr().err
+    assert {path.name: path.read_bytes() for path in report.iterdir()} == before
 
 
 @pytest.mark.slow

@@ -142,6 +142,13 @@ def test_a_pass_in_half_floats_is_told(name, paper_scene, tmp_path):
     assert f"{name} is in half floats, of 11 bits: write 32 bits" in comparison.sentence, comparison.sentence
 
 
+def test_a_note_of_another_program_that_looks_like_ours_is_told(tmp_path):
+    picture = Image({"Depth": np.ones((2, 2, 1), np.float32)}, attributes={renderers.NOTE: f"{renderers.MARK} WORKBENCH near"})
+    image.write(tmp_path / "a.exr", picture)
+    with pytest.raises(InputError, match="its depths begin at 'near', which is no number"):
+        renderers.read(tmp_path / "a.exr")
+
+
 def test_a_compression_that_changes_positions_is_told(paper_scene, tmp_path):
     """A picture in DWAA was said to be magnified."""
     openexr = pytest.importorskip("OpenEXR")

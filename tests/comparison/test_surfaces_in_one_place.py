@@ -118,6 +118,8 @@ def test_any_of_several_surfaces_in_one_place_is_right_and_the_objects_are_named
     assert sum(pairs.values()) == pytest.approx(another.sum(), abs=0.02 * another.sum())
     assert "pixels show another of several surfaces in one place: " in comparison.sentence
     assert comparison.to_json()["in_one_place"]["pixels"] == len(comparison.in_one_place.columns)
+    alone = replace(comparison.in_one_place, **{name: values[:1] for name, values in vars(comparison.in_one_place).items()})
+    assert "; 1 pixel shows another of several" in replace(comparison, in_one_place=alone).sentence
 
 
 def test_a_twin_whose_normals_are_a_little_off_is_told_from_the_one_that_is_seen():

@@ -54,7 +54,7 @@ from types import ModuleType
 import numpy as np
 
 from .. import checks, file_names, terminal
-from ..errors import InputError, several
+from ..errors import InputError, bug, is_of_a_path, several
 from ..files import written_whole
 from ..pinhole import Pinhole
 from . import (
@@ -333,6 +333,8 @@ def _told_of_damage(source: Source, title: str) -> Iterator[None]:
             raise
         raise InputError(sentence) from error.__cause__
     except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
+        if is_of_a_path(error):
+            raise InputError(bug(error)) from error
         raise InputError(f"{source.name} is damaged where it says its cameras ({title}): export it again") from error
 
 
@@ -365,13 +367,13 @@ _OTHER_TEXTS = {
     re.compile(r"^#! ?\S{0,200}[Nn]uke|^Camera[234]? \{$", re.MULTILINE): "a script of Nuke's",
     re.compile(r"^ ?persp_camera$", re.MULTILINE): "a scene of Arnold's",
     re.compile(r"^##RenderMan RIB|^ ?Projection \"perspective\"", re.MULTILINE): "a scene of RenderMan's",
-    re.compile(r"^scene\.camera\.", re.MULTILINE): "a scene of LuxCore's",
+    re.compile(r"^scene\.camera\.(?:lookat\.|fieldofview ?=|screenwindow ?=)", re.MULTILINE): "a scene of LuxCore's",
     re.compile(r"^%TAG !u! tag:unity3d", re.MULTILINE): "a scene of Unity's",
     re.compile(r"^ ?RenderView \w{1,60} ?\{", re.MULTILINE): "a scene of V-Ray's",
     re.compile(r"^#VRML |<X3D\b", re.MULTILINE): "a scene of X3D or VRML",
     re.compile(r"<cycles>", re.MULTILINE): "a scene of Cycles' own",
     re.compile(r"<project format_revision=", re.MULTILINE): "a scene of Appleseed's",
-    re.compile(r"\"autoClear\":|new BABYLON\.", re.MULTILINE): "a scene of Babylon's",
+    re.compile(r"\"autoClear\":", re.MULTILINE): "a scene of Babylon's",
     re.compile(r"^Begin (?:Map|Actor|Object)\b", re.MULTILINE): "a part of a level of Unreal's",
     re.compile(r"^(?:name|id),tx,ty,tz,qx,qy,qz,qw\b", re.MULTILINE): "a table of poses of Unreal's",
 }

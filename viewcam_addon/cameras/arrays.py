@@ -101,7 +101,12 @@ def recognizes(source: Source) -> bool:
 
 
 def _is_whole_pose(name: str, value: object) -> bool:
-    return opencv.is_of_pose(name) and isinstance(value, list) and len(_flat(value)) in (12, 16)
+    return opencv.is_of_pose(name) and _is_whole(value)
+
+
+def _is_whole(value: object) -> bool:
+    """True if it has as many numbers as a whole pose."""
+    return isinstance(value, list) and len(_flat(value)) in (12, 16)
 
 
 def _flat(rows: list) -> list:
@@ -260,7 +265,8 @@ class _Code:
         result: dict[str, Any] = {}
         for name, places in list(self._assigned.items())[:_MOST_ARRAYS]:
             key = opencv.plain(name)
-            if not opencv.is_known(key) and key not in (*_SCALARS, *_TERMS):
+            is_known = opencv.is_known(key) or key in (*_SCALARS, *_TERMS)
+            if not is_known and not opencv.may_be_pose(key):
                 continue
             filled = [place for place in places if self.text[place - 2 : place] == "<<"]  # whatever it was made as
             for place in (filled or places)[:20]:
@@ -270,9 +276,9 @@ class _Code:
                     value = _Unknown(name)
                 if key in _SCALARS or opencv.is_size(key):
                     value = value if isinstance(value, float | list) else _Unknown(name)
-                elif not isinstance(value, float if key in _TERMS else list | _Unknown):  # K1 of a pair is no k1
-                    continue
-                if key == "t" and isinstance(value, list) and len(_flat(value)) in (12, 16):
+                elif not (isinstance(value, float if key in _TERMS else list | _Unknown) and (is_known or _is_whole(value))):
+                    continue  # K1 of a pair is no k1
+                if key == "t" and _is_whole(value):
                     key = "transform"
                 if key in result and result[key] != value:
                     texts.fail(self.text, place, f"{name} is something else before, copy one camera")

@@ -72,15 +72,20 @@ _OTHER_LENS = re.compile(r"fisheye|omni|mei|u?cm$|kb\d|spherical|ortho|fov|divis
 _MAY_BE_POSE = re.compile(r"pose|extrin|rotation|rot$|transf|transl|2cam|2world|toworld|tocam|w2|c2|rvec|tvec|position|quat")
 _NO_POSE = ("tcamimu", "timushift", "rectificationmatrix", "projectionmatrix", "p")
 _BLENDERS = ("matrixworld",)
+_ON_BODY = ("tbs", "timucam")  # EuRoC's and OpenVINS', of a camera on its body
 _OTHER_POSE = (
     *("pose", "c2w", "cam2world", "camera2world", "cameratoworld", "camtoworld", "twc", "camerapose", "transform"),
-    *("transformmatrix", "tworldcam", "tworldcamera", *_BLENDERS, "quaternion", "q", "qvec"),
+    *("transformmatrix", "tworldcam", "tworldcamera", *_BLENDERS, *_ON_BODY, "quaternion", "q", "qvec"),
 )
 _WIDTH = ("imagewidth", "width", "w", "resx")
 _HEIGHT = ("imageheight", "height", "h", "resy")
 _SIZE = ("imagesize", "size", "resolution", "imgsize", "imagesizewh")
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tx", "ty")
 """The names of the distortion's coefficients, in OpenCV's order."""
+_WINDOW = ("roi", "binningx", "binningy")
+_MAY_CUT = re.compile(r"crop|binning|roi|resiz|downs(?:ample|cale)")
+"""Beginnings of names of what may have been done to the pictures since."""
+
 _WIDEST = 50  # widths of the picture to a focal length, which are 177.7°
 _UNSAID = f"whose axes it means and which way it goes is not said: give --pose, one of {', '.join(POSES)}"
 _UNREAD = "of which no pose is read: write R and t, world to camera, or a matrix of 4 × 4"
@@ -116,7 +121,9 @@ def refuse_twice(source: Source) -> None:
     if source.is_folder or source.npz or source.document or source.text.lstrip().startswith(("<", "[", "{")):
         return
     if twice := [key for key in source.yaml_twice if is_known(plain(key))]:
-        raise InputError(f"{source.name} has the key {checks.quoted(twice[0])} twice, with other values: leave one out")
+        raise InputError(
+            f"{source.name} has the key {checks.quoted(twice[0])} twice, with other values or in a list: leave one out"
+        )
 
 
 def _four_rows(value: Any, name: str) -> np.ndarray:
@@ -559,6 +566,11 @@ def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     size, stated = _size(values, what, options)
     plane = plane_of_k(_numbers(f"K of {what}", k), size, half_pixel(options), what)
     plane, windowed = of_window(plane, values, what)
+    windowed += tuple(
+        f"{what} has {name}, which was not taken: K counts in a picture of {size[0]} × {size[1]}"
+        for name, value in values.items()
+        if _MAY_CUT.match(name) and name not in _WINDOW and value not in (0, 1, [], {}, "", False)
+    )
     bent = _coefficients(values, what, is_fisheye)
     if "inverse" in str(values.get("model", "")).lower() and any(
         bent.values() if isinstance(bent, dict) else bent
@@ -646,8 +658,13 @@ def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple
     return options.size_or_refuse(what), False
 
 
+def may_be_pose(name: str) -> bool:
+    """True if a plain name may mean a pose in words that nobody knows."""
+    return name not in _NO_POSE and _MAY_BE_POSE.search(name) is not None
+
+
 def _says_pose(values: Mapping[str, Any]) -> bool:
-    return any(is_of_pose(name) or (name not in _NO_POSE and _MAY_BE_POSE.search(name)) for name in values)
+    return any(is_of_pose(name) or may_be_pose(name) for name in values)
 
 
 def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.ndarray, tuple[str, ...]]:
@@ -657,17 +674,22 @@ def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.nd
     if turn is not None and translation is None and "p" in values:  # ROS: a stereo pair's rectification
         turn = None
     if whole is not None and (whole not in _EXTRINSIC or (turn is None and vector is None)):
-        way = options.pose or ("w2c_opencv" if whole in _EXTRINSIC else "c2w_opengl" if whole in _BLENDERS else None)
+        ways = dict.fromkeys(_EXTRINSIC, "w2c_opencv") | dict.fromkeys(_BLENDERS, "c2w_opengl")
+        way = options.pose or (ways | dict.fromkeys(_ON_BODY, "c2w_opencv")).get(whole)
         if way is None:
             raise InputError(f"{what} has {whole}, and {_UNSAID}")
         matrix, notes = _four_columns(_numbers(f"{whole} of {what}", values[whole]), f"{whole} of {what}")
         return _to_world(matrix, way, what), (_told_of(way), *notes)
     if turn is None and vector is None and translation is None:
         for name, value in values.items():
-            if name not in _NO_POSE and isinstance(value, list | dict) and _MAY_BE_POSE.search(name):
-                raise InputError(
-                    f"{what} has {name}, and {_UNSAID}" if options.pose is None else f"{what} has {name}, {_UNREAD}"
-                )
+            if isinstance(value, list | dict) and may_be_pose(name):
+                if options.pose is None:
+                    raise InputError(f"{what} has {name}, and {_UNSAID}")
+                numbers = _numbers(f"{name} of {what}", value)
+                if len(numbers) not in (12, 16) or name.startswith("stereo"):  # from one camera to another
+                    raise InputError(f"{what} has {name}, {_UNREAD}")
+                matrix, notes = _four_columns(numbers, f"{name} of {what}")
+                return _to_world(matrix, options.pose, what), (_told_of(options.pose), *notes)
         for names in _POSE_BY_NUMBER:
             if {*names} <= values.keys():
                 raise InputError(f"{what} has {', '.join(names)}, {_UNREAD}")

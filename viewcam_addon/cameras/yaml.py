@@ -23,23 +23,28 @@ _DEEPEST = 8
 def read(text: str) -> tuple[dict[str, Any], list[str]]:
     """The keys of a text and what stands there; none of what is not of this part of YAML.
 
-    Returns the keys, of several documents all of them, and the names of those that are there twice with other values.
+    Returns the keys, of several documents all of them, and the names of those that are there twice, with other values or in
+    several objects of a list.
     """
     root: dict[str, Any] = {}
     twice: list[tuple[str, Any, Any]] = []
     stack: list[tuple[int, dict[str, Any]]] = [(-1, root)]
     block: list[tuple[int, list]] = []
+    listed: set[int] = set()  # holders of objects of a list, which are not told apart
     for line in _joined(text):
-        if block and (item := _ITEM.match(line)) and len(item[1]) >= block[0][0]:
+        match = _key(line)
+        if block and (item := _ITEM.match(line)) and len(item[1]) >= block[0][0] and not match:
             _append(block, len(item[1]), item[2])
             continue
-        if not (match := _key(line)):
+        if not match:
             continue
         indent, key, value = match
         while indent <= stack[-1][0]:
             stack.pop()
         holder, block = stack[-1][1], []
         before = holder.get(key)
+        if line.lstrip().startswith("- "):
+            listed.add(id(holder))
         if value:
             holder[key] = _value(value)
         elif len(stack) <= _DEEPEST:
@@ -48,7 +53,7 @@ def read(text: str) -> tuple[dict[str, Any], list[str]]:
             stack.append((indent, inner))
             block = [(indent, inner.items_of_list)]
         if before is not None:
-            twice.append((key, before, holder[key]))
+            twice.append((key, None, line) if id(holder) in listed else (key, before, holder[key]))
     return _settled_blocks(root), [key for key, *values in twice if not _are_same(*values)]
 
 

@@ -89,6 +89,7 @@ def carry_out(
     with silent_libraries(), Interruption(on_signal, crashes.passed_on) as interruption, contextlib.ExitStack() as stack:
         renderer = stack.enter_context(opened(plan, events))
         work_list = _work_list(plan, jobs_of(renderer), complete, renderer, source)
+        _refuse_to_replace(source, plan, work_list)
         if plan.is_on_cluster:
             blend, program = renderer.blend, renderer.program
             stack.close()  # the workers open the file themselves
@@ -155,6 +156,15 @@ def _work_list(plan: Plan, listed: Sequence[Job], complete: Callable[[Job], Job]
     made_from = renderer.made_from()
     settings = {job.name: settings_hash(job, made_from) for job in all_jobs}
     return _WorkList(all_jobs, jobs, made_from, settings)
+
+
+def _refuse_to_replace(source: str, plan: Plan, work_list: _WorkList) -> None:
+    """Refuse a list, or a file of cameras, in whose place a file of the batch itself would stand."""
+    if not source or os.path.dirname(os.path.realpath(source)) != os.path.realpath(plan.out):
+        return
+    name, own = one_file(os.path.basename(source)), ["summary.json", *["transforms.json"][: bool(plan.transforms)]]
+    if name in own or name in (one_file(f"{job.name}.json") for job in work_list.jobs):
+        raise InputError(f"{source} is what the batch would write over: give another folder for --out")
 
 
 def _refuse_names_of_labels(shots: Sequence[Job]) -> None:

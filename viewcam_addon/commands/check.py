@@ -84,12 +84,11 @@ def _check_many(options: argparse.Namespace, job: Any) -> Result:
     from ..jobs.folder import Outputs
 
     _refuse_of_many(options)
+    frames = None if options.frames is None else makers.frames(options.frames, options.camera)
     outputs = Outputs(picture=False, check=True, report=options.report is not None)
 
     def jobs_of(renderer: Any) -> Sequence[Any]:
-        if options.cameras is not None:
-            return makers.from_cameras(options.cameras, renderer.cameras)
-        return makers.frames(options.frames, options.camera)
+        return makers.from_cameras(options.cameras, renderer.cameras) if frames is None else frames
 
     def complete(shot: Any) -> Any:
         stated = {"camera": shot.camera, "name": shot.name} | ({} if shot.frame is None else {"frame": shot.frame})

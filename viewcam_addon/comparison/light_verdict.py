@@ -223,7 +223,7 @@ class RadianceComparison:
         if self.taken_out.seen_otherwise:
             table.append(f"{'Seen by some rays':<18}light or shadows of {_few(self.taken_out.seen_otherwise)}")
         if self.taken_out:
-            table.append(f"{'Taken out':<17}{self.taken_out.count:,} pixels")
+            table.append(f"{'Taken out':<17}{counted(self.taken_out.count, 'pixel')}")
         seen = self.appearance
         expected = "" if seen.expected_relmse is None else f", of which noise explains {seen.expected_relmse:.2e}"
         flip = "" if seen.flip is None else f"; FLIP {seen.flip:.4f}"
@@ -249,7 +249,7 @@ class RadianceComparison:
 
 def _without(comparison: RadianceComparison) -> str:
     taken_out = comparison.taken_out
-    return f"; the {taken_out.count:,} pixels that {_which(taken_out)}, are taken out" if taken_out else ""
+    return f"; the {taken_out.count:,} pixels that {_which(taken_out)}, are taken out" if taken_out.count else ""
 
 
 def _which(taken_out: TakenOut) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import image
+from ..errors import InputError
 from ..image import BACKGROUND_DEPTH, Image
 from ..pinhole import Pinhole
 from . import tolerances
@@ -76,7 +77,11 @@ def read(path: str | os.PathLike[str]) -> tuple[Image, Renderer]:
     note = image.text_attribute(path, NOTE).split()
     if len(note) != 3 or note[0] != MARK or note[1] not in RENDERERS:
         return image.read(path), CYCLES
-    engine, near = note[1], float(note[2])
+    engine = note[1]
+    try:
+        near = float(note[2])
+    except ValueError as error:
+        raise InputError(f"{path} says that its depths begin at {note[2]!r}, which is no number: render it again") from error
     renderer = replace(RENDERERS[engine], near=near) if engine == "WORKBENCH" else RENDERERS[engine]
     return _decoded(image.read_channels(path, _channels_of(engine)), engine), renderer
 

@@ -237,7 +237,8 @@ def allowed_unexplained(pinhole: Pinhole) -> int:
 
 def in_one_place_text(in_one_place: InOnePlace) -> str:
     """The sentence: pixels show another of several surfaces in one place: 'Floor' and 'Carpet', and 2 more pairs."""
-    return f"pixels show another of several surfaces in one place: {pairs_text(in_one_place.pairs())}"
+    show = "pixel shows" if len(in_one_place.columns) == 1 else "pixels show"
+    return f"{show} another of several surfaces in one place: {pairs_text(in_one_place.pairs())}"
 
 
 def pairs_text(pairs: Iterable[tuple[str, str]]) -> str:

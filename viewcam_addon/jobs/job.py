@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
-from .. import argument_types, checks
+from .. import argument_types, checks, machine
 from .. import file_names as names
 from ..cameras.calibration import Calibration
 from ..errors import InputError
@@ -36,6 +36,8 @@ _FRAMES = (-1048574, 1048574)
 _SAMPLES = (1, 2**24)
 _SEEDS = (0, 2**31 - 1)
 _THREADS = (1, 1024)
+# The bytes of a pixel in the passes of geometry of both sides: 14 channels in float32 each.
+_BYTES_OF_A_CHECK = 2 * 14 * 4
 _ASPECTS = (1 / 200, 200.0)
 _LARGEST_FLOAT32, _SMALLEST_FLOAT32 = (2.0 - 2.0**-23) * 2.0**127, 2.0**-126
 
@@ -153,6 +155,10 @@ class Job:
 
     def refuse_unchecked(self) -> None:
         """Raise InputError if no such check can be made."""
+        if self.size:
+            width, height = self.size
+            what = f"the passes of {width} × {height} pixels, of Cycles and of the tracer,"
+            machine.check(what, _BYTES_OF_A_CHECK * width * height, "give a smaller --size")
         if self.engine not in (None, *TESTED):
             raise InputError(f"engine {self.engine} is the tracer itself: choose from {', '.join(TESTED)}")
         if self.find and self.level in (None, LEVELS[0]):

@@ -282,7 +282,7 @@ def test_a_missing_library_is_told(blend, link_object):
 def test_bad_files_and_cameras_are_one_sentence(blend, scene, camera_object, tmp_path):
     path = blend()
     fails(Job(blend=tmp_path / "none.blend"), "does not exist")
-    fails(Job(blend=tmp_path), "does not exist")
+    fails(Job(blend=tmp_path), "is no file: check the name")
     (tmp_path / "text.blend").write_text("not a blend")
     fails(Job(blend=tmp_path / "text.blend"), "is not a .blend file")
     (tmp_path / "empty.blend").touch()

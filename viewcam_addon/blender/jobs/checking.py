@@ -24,6 +24,7 @@ from typing import Any
 import bpy
 
 from ...comparison.sequential import TOTALS
+from ...errors import InputError
 from ...events import Events
 from ...files import check_writable
 from ...jobs.job import Job
@@ -122,6 +123,10 @@ class Checker:
         tests = [folder / (f"{engine}-{i + 1}.exr" if count > 1 else f"{engine}.exr") for i in range(count)]
         everything = folder / "everything.exr"
         if keep:
+            if job.scene and Path(job.scene).resolve() == (keep / "scene.json").resolve():
+                raise InputError(
+                    f"{job.scene} would be overwritten by the report's own: copy it, or give another report folder"
+                )
             for path in (*tests, everything, *(keep / name for name in ("scene.json", "scene.npz", "reference.exr"))):
                 check_writable(path)
         with numbered_indices(_numbered(job.scene)), staged(job, scene, camera_object, notes) as stage:
