@@ -277,12 +277,13 @@ def test_a_thousand_updates_of_nothing_change_no_bit(posed_camera, scene):
 @pytest.mark.parametrize("steps", [300, pytest.param(2000, marks=pytest.mark.exhaustive)])
 def test_values_and_camera_agree_whoever_is_edited(posed_camera, scene, empty, steps, parented):
     """Random edits of values, transforms, lens, sensor, what carries the camera, frames, undo and redo, some before Blender
-    evaluates. 4,600 in all."""
+    evaluates. 4,600 in all. Nothing is deleted: Blender crashes as it undoes that here, the add-on or not."""
     random = np.random.default_rng(steps)
     if parented:
         posed_camera.parent = parent = empty("Parent", (1, 2, 3))
         parent.rotation_euler = (0.3, 0.2, 0.1)
     posed_camera.rotation_mode = "QUATERNION" if parented else "XYZ"
+    empty("Mover")
     bpy.ops.ed.undo_push(message="start")
 
     def camera_():
@@ -296,8 +297,6 @@ def test_values_and_camera_agree_whoever_is_edited(posed_camera, scene, empty, s
         setattr(camera_(), name, random.normal(0, 1, 4 if parented else 3))
 
     def mover():
-        if "Mover" not in bpy.data.objects:
-            bpy.context.scene.collection.objects.link(bpy.data.objects.new("Mover", None))
         return bpy.data.objects["Mover"]
 
     def constrain():
@@ -310,7 +309,6 @@ def test_values_and_camera_agree_whoever_is_edited(posed_camera, scene, empty, s
         "constraint": constrain,
         "no constraints": lambda: camera_().constraints.clear(),
         "mover's location": lambda: setattr(mover(), "location", random.normal(0, 8, 3)),
-        "mover deleted": lambda: bpy.data.objects.remove(mover()),
         "eye": lambda: setattr(group(), "eye", random.normal(0, 8, 3)),
         "look-at": lambda: setattr(group(), "look_at", random.normal(0, 8, 3)),
         "up": lambda: setattr(group(), "up", random.normal(0, 1, 3)),
