@@ -47,9 +47,8 @@ _READ_ANEW = 1000
 _OF_THE_ERROR = 0.1
 # That share where the unit is another: depths that hardly vary are near a multiple of any others.
 _OF_A_UNIT = 1e-3
-# The share of pixels that lie at edges, at most, where another object may be seen; and that of all others.
-_STRAY = 0.05
-_OF_ALL_PIXELS = 1 - _STRAY
+# The share of pixels that another reading must explain: others may lie at edges, where another object may be seen. Chosen.
+_OF_ALL_PIXELS = 0.95
 # Passes that only the reference has: what tolerances are evaluated with.
 _FOR_TOLERANCES = ("Magnitude", "Facing")
 
